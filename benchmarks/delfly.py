@@ -83,8 +83,8 @@ class Fitted:
     def local(self) -> LocalEstimate:
         """As input of the global model."""
         found, name = self.estimate, self.recording.name
-        bounds = dict(zip(found.free, np.sqrt(np.diag(found.covariance)).tolist(), strict=True))
-        return LocalEstimate(name, (name,), found.values, bounds, (), (), found.cost, True, ())
+        bounds = dict(zip(found.free, np.sqrt(np.diag(found.uncertainty.covariance)).tolist(), strict=True))
+        return LocalEstimate(name, (name,), found.values, bounds, (), (), found.uncertainty.cost, True, ())
 
 
 def problem_of(model: BladeElementWing, recording: Recording) -> Problem:
@@ -125,7 +125,7 @@ def coverage(
         trial, beat = TRIALS[k % len(TRIALS)], beats[k % len(TRIALS)]
         raw = record(beat, trial, balance, np.random.default_rng([seed, 4, k]))
         found = estimate(problem_of(model, low_passed(raw, LowPass(CUTOFF))), evaluator, {})
-        for name, error in zip(found.free, np.sqrt(np.diag(found.covariance)), strict=True):
+        for name, error in zip(found.free, np.sqrt(np.diag(found.uncertainty.covariance)), strict=True):
             held[name] += bool(abs(found.values[name] - trial.coefficients[name]) <= INTERVAL * error)
     return {name: 100 * count / repetitions for name, count in held.items()}
 
@@ -304,7 +304,9 @@ def rows(fitted: Mapping[str, list[Fitted]]) -> list[dict[str, Any]]:
             "standard_error_percent": {
                 n: 100 * e / abs(one.estimate.values[n]) for n, e in one.local.standard_errors.items()
             },
-            "largest_correlation": float(np.abs(one.estimate.correlation - np.eye(len(COEFFICIENTS))).max()),
+            "largest_correlation": float(
+                np.abs(one.estimate.uncertainty.correlation - np.eye(len(COEFFICIENTS))).max()
+            ),
             "lift_rmse_n": one.agreement["lift"].rmse,
             "lift_rmse_percent": one.agreement["lift"].rmse_percent,
             "lift_correlation": one.agreement["lift"].correlation,

@@ -12,12 +12,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from deap import cma
 
 from wingfit.calibration.genetic import FAILED, Individual, finite, reflected
-
-Array = npt.NDArray[np.float64]
+from wingfit.records.array_types import Array
 
 SIGMA = 0.2  # unit coordinates: the start is an estimate, and the truth some tenths of the box away
 
@@ -50,15 +48,6 @@ class Distribution:
         """A search that begins at ``start`` in unit coordinates."""
         zeros = [0.0] * len(start)
         return cls([float(u) for u in start], zeros, list(zeros), np.eye(len(start)).tolist(), unit=list(start))
-
-    def as_json(self) -> dict[str, Any]:
-        """Checkpoint."""
-        return dict(self.__dict__)
-
-    @classmethod
-    def from_json(cls, state: dict[str, Any]) -> Distribution:
-        """Back from a checkpoint."""
-        return cls(**state)
 
     @property
     def diversity(self) -> float:

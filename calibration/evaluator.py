@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.calibration.problem import Evaluation, Misfit, Problem, concatenate, misfit
+from wingfit.records.array_types import Array, ArrayLike
 from wingfit.records.blas_threads import one_blas_thread
 from wingfit.sim.kernels import LANES
 
@@ -21,7 +21,7 @@ from wingfit.sim.kernels import LANES
 class Evaluator(Protocol):
     """Evaluates batches of individuals; the implementation decides where the work runs."""
 
-    def evaluate(self, problem: Problem, values: npt.ArrayLike, *, residuals: bool = False) -> Evaluation:
+    def evaluate(self, problem: Problem, values: ArrayLike, *, residuals: bool = False) -> Evaluation:
         """Misfits of ``values`` [B, F] to every recording of the problem."""
         ...
 
@@ -49,7 +49,7 @@ def units(problem: Problem, individuals: int) -> list[Unit]:
 
 
 @one_blas_thread
-def run_unit(problem: Problem, values: npt.NDArray[np.float64], unit: Unit, *, residuals: bool = False) -> Misfit:
+def run_unit(problem: Problem, values: Array, unit: Unit, *, residuals: bool = False) -> Misfit:
     """Evaluate one unit of the batch ``values`` [B, F]."""
     return misfit(problem, values[unit.start : unit.stop], unit.recording, residuals=residuals)
 
@@ -60,7 +60,7 @@ def gather(problem: Problem, done: Sequence[Misfit]) -> Evaluation:
     return Evaluation(tuple(concatenate(done[r * per : (r + 1) * per]) for r in range(len(problem.recordings))))
 
 
-def as_batch(values: npt.ArrayLike) -> npt.NDArray[np.float64]:
+def as_batch(values: ArrayLike) -> Array:
     """``values`` as a contiguous, non-empty [B, F] array."""
     batch = np.ascontiguousarray(np.atleast_2d(np.asarray(values, float)))
     if batch.ndim != 2 or not len(batch):

@@ -11,13 +11,11 @@ import random
 import threading
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from deap import base, tools
 
-Array = npt.NDArray[np.float64]
+from wingfit.records.array_types import Array
 
 _LOCK = threading.Lock()
 
@@ -60,15 +58,6 @@ class Population:
     generation: int = -1
     stall: int = 0
     best: float = FAILED
-
-    def as_json(self) -> dict[str, Any]:
-        """Checkpoint."""
-        return dict(self.__dict__)
-
-    @classmethod
-    def from_json(cls, state: dict[str, Any]) -> Population:
-        """Back from a checkpoint."""
-        return cls(**state)
 
     @property
     def mean(self) -> float:

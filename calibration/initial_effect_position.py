@@ -11,7 +11,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.calibration.effects import effect_of, sizes
 from wingfit.calibration.estimates.linearised import Linearised, free_genes, linearise, residuals_of, values_at
@@ -19,9 +18,8 @@ from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.problem import Evaluation, Problem
 from wingfit.inference.noise.white import Noise, whitened_sensitivity
 from wingfit.inference.score_test import INVISIBLE, Nuisance, amounts, remaining, spread
+from wingfit.records.array_types import Array
 from wingfit.sim.effects.contract import Effect
-
-Array = npt.NDArray[np.float64]
 
 PLACES = 15  # places tried, besides the initial one: with a single size a batch of two groups of lanes
 SMALL = 0.02  # of a size's box

@@ -5,7 +5,7 @@ All that does not fit together is refused here, before anything is simulated.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
@@ -59,7 +59,9 @@ def prepare(spec: CalibrationSpec, dataset: Dataset) -> Prepared:
     spec = resolved(spec, dataset)
     model = model_for(dataset, spec)
     known = [gene.name for gene in model.genes]
-    _refuse_unknown("gene", [*spec.genes, *spec.fixed], known)
+    for name in (*spec.genes, *spec.fixed):
+        if name not in known:
+            raise ValueError(f"unknown gene {name!r}; there are {', '.join(known)}")
     base_genome(model, spec.fixed)
     fitted = _fitted(spec, dataset)
     for recording in dataset.recordings:  # all of them are judged in the end
@@ -76,7 +78,9 @@ def prepare(spec: CalibrationSpec, dataset: Dataset) -> Prepared:
 
 def _fitted(spec: CalibrationSpec, dataset: Dataset) -> tuple[Recording, ...]:
     """Recordings to fit, as they were recorded."""
-    _refuse_repeated("recording", spec.recordings)
+    for name, times in Counter(spec.recordings).items():
+        if times > 1:
+            raise ValueError(f"recording {name!r} is named {times} times; name it once")
     recordings = dataset.select(spec.recordings) if spec.recordings else dataset.fitted
     if not recordings:
         raise ValueError("every recording of the dataset is held out, and nothing is left to fit; hold out fewer")
@@ -124,18 +128,6 @@ def _staged(free: tuple[str, ...], recordings: tuple[Recording, ...]) -> tuple[S
         )
     stages = (Stage("structure", structural, vacuum), Stage("aerodynamics", aerodynamic, air))
     return tuple(stage for stage in stages if stage.free)
-
-
-def _refuse_unknown(what: str, names: Iterable[str], known: list[str]) -> None:
-    for name in names:
-        if name not in known:
-            raise ValueError(f"unknown {what} {name!r}; there are {', '.join(known)}")
-
-
-def _refuse_repeated(what: str, names: tuple[str, ...]) -> None:
-    for name in names:
-        if names.count(name) > 1:
-            raise ValueError(f"{what} {name!r} is named {names.count(name)} times; name it once")
 
 
 def _refuse_unusable(spec: CalibrationSpec, dataset: Dataset, recording: Recording, fitted: bool) -> None:

@@ -9,13 +9,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.records import Genome, Recording
+from wingfit.records.array_types import Array, ArrayLike, Mask
 from wingfit.records.dataset import Kind
 from wingfit.sim.model import Model
-
-Array = npt.NDArray[np.float64]
 
 DEFAULT_AXES = ("x",)  # Armanini et al. 2016 fit the X force only
 
@@ -41,7 +39,7 @@ class Problem:
             pickle.dumps((self.model, self.recordings, self.free, self.base, self.axes), 5)
         ).hexdigest()
 
-    def genomes(self, values: npt.ArrayLike) -> Array:
+    def genomes(self, values: ArrayLike) -> Array:
         """Full genomes [B, G] for ``values`` [B, F] of the free genes."""
         batch = np.atleast_2d(np.asarray(values, float))
         if batch.shape[1] != len(self.free):
@@ -75,7 +73,7 @@ class Misfit:
     kind: Kind = "tracks"
 
 
-def misfit(problem: Problem, values: npt.ArrayLike, recording: int, *, residuals: bool = False) -> Misfit:
+def misfit(problem: Problem, values: ArrayLike, recording: int, *, residuals: bool = False) -> Misfit:
     """Misfit of ``values`` [B, F] to the problem's recording number ``recording``."""
     record = problem.recordings[recording]
     observed = problem.model.observe(problem.genomes(values), record)
@@ -101,7 +99,7 @@ def misfit(problem: Problem, values: npt.ArrayLike, recording: int, *, residuals
     return Misfit(squares, distance, kept.shape[1], reasons, difference if residuals else None, record.kind)
 
 
-def compared(recording: Recording, axes: tuple[str, ...] = ()) -> npt.NDArray[np.bool_]:
+def compared(recording: Recording, axes: tuple[str, ...] = ()) -> Mask:
     """True [T, C] where a recording of forces is fitted: at instants at which every fitted axis was recorded."""
     axes = axes or DEFAULT_AXES
     for axis in axes:

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.calibration.effects import absent
 from wingfit.calibration.estimates.uncertainty import Standing, standing
@@ -16,6 +15,7 @@ from wingfit.calibration.problem import Problem, base_genome
 from wingfit.calibration.spec import CalibrationSpec, wing_model
 from wingfit.inference.noise.harmonic import noise_distance
 from wingfit.records import Dataset, Gene, Genome
+from wingfit.records.array_types import Array
 from wingfit.records.blas_threads import one_blas_thread
 from wingfit.sim.model import Solution
 from wingfit.sim.wing.alignment import recorded_crossing
@@ -44,6 +44,18 @@ class GeneResult:
     standard_error: float | None
     identifiable: bool | None
     absolute_error: float | None = None
+
+    @classmethod
+    def of(cls, gene: Gene, nominal: float, best: float, found: Standing | None) -> GeneResult:
+        """Result of ``gene`` with what was ``found`` of it; None where it was not searched."""
+        lower, upper = (gene.lower, gene.upper) if gene.share_of is None else (0.0, 1.0)
+        error, identifiable, absolute = (
+            (found.standard_error, found.identifiable, found.absolute) if found else [None] * 3
+        )
+        searched = found is not None
+        return cls(
+            gene.name, gene.unit, gene.description, nominal, best, lower, upper, searched, error, identifiable, absolute
+        )
 
 
 @dataclass(frozen=True)
@@ -85,10 +97,10 @@ class Comparison:
     """
 
     recording: str
-    phase: npt.NDArray[np.float64]
+    phase: Array
     markers: tuple[str, ...]
-    recorded: npt.NDArray[np.float64]
-    simulated: npt.NDArray[np.float64]
+    recorded: Array
+    simulated: Array
     accuracy: float
     solution: Solution
 
@@ -170,27 +182,13 @@ def _genes(
     for stage in stages:
         known |= standing(Problem(model, stage.recordings, stage.free, best), evaluator)
     before, after = nominal.normalised(), best.normalised()
-    return tuple(
-        GeneResult(
-            gene.name,
-            gene.unit,
-            gene.description,
-            before[gene.name],
-            after[gene.name],
-            gene.lower if gene.share_of is None else 0.0,
-            gene.upper if gene.share_of is None else 1.0,
-            gene.name in known,
-            known[gene.name].standard_error if gene.name in known else None,
-            known[gene.name].identifiable and adequate and not _at_bound(gene, best) if gene.name in known else None,
-            _absolute(gene, known[gene.name], after[gene.name]) if gene.name in known else None,
-        )
-        for gene in model.genes
-    )
-
-
-def _absolute(gene: Gene, found: Standing, best: float) -> float:
-    """Standard error in the gene's unit; of a share, of its normalised value ``best``."""
-    return found.absolute if gene.share_of is None else found.standard_error * best
+    for gene in model.genes:
+        if gene.name in known:
+            found = known[gene.name]
+            absolute = found.absolute if gene.share_of is None else found.standard_error * after[gene.name]
+            identifiable = found.identifiable and adequate and not _at_bound(gene, best)
+            known[gene.name] = replace(found, identifiable=identifiable, absolute=absolute)
+    return tuple(GeneResult.of(g, before[g.name], after[g.name], known.get(g.name)) for g in model.genes)
 
 
 def _at_bound(gene: Gene, best: Genome) -> bool:

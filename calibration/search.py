@@ -6,8 +6,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-
 from wingfit.calibration import cma, genetic
 from wingfit.calibration.estimates.likelihood import ITERATIONS, Step, iterate
 from wingfit.calibration.estimates.linearised import free_genes, values_at
@@ -17,6 +15,7 @@ from wingfit.calibration.preparation import Prepared, prepare
 from wingfit.calibration.problem import Problem, base_genome
 from wingfit.calibration.spec import CalibrationSpec, model_for, resolved
 from wingfit.records import Dataset, Gene
+from wingfit.records.array_types import Array
 from wingfit.records.blas_threads import one_blas_thread
 from wingfit.sim.model import Model
 
@@ -107,17 +106,13 @@ class _State:
 
     @classmethod
     def from_json(cls, state: dict[str, Any], spec: CalibrationSpec) -> _State:
-        fields = dict(state) | {"population": type(_empty(spec)).from_json(state["population"])}
+        population = type(_empty(spec))(**state["population"])
         found = {name: dict(genome) for name, genome in state["found"].items()}
-        return cls(**fields | {"base": dict(state["base"]), "found": found})
+        return cls(**dict(state) | {"population": population, "base": dict(state["base"]), "found": found})
 
     def as_json(self) -> dict[str, Any]:
         found = {name: dict(genome) for name, genome in self.found.items()}
-        return dict(self.__dict__) | {
-            "population": self.population.as_json(),
-            "base": dict(self.base),
-            "found": found,
-        }
+        return vars(self) | {"population": dict(vars(self.population)), "base": dict(self.base), "found": found}
 
 
 def _empty(spec: CalibrationSpec) -> Population:
@@ -153,13 +148,11 @@ class _Run:
         spec, state, name = self.spec, self.state, self.stage.name
         unit = self._drawn()
         evaluation = self.evaluator.evaluate(self.problem, values_at(self.genes, unit))
+        outcome = unit, evaluation.fitness, evaluation.distance, spec.tolerance
         if isinstance(state.population, cma.Distribution):
-            learn = cma.learnt
-            state.population = learn(state.population, unit, evaluation.fitness, evaluation.distance, spec.tolerance)
+            state.population = cma.learnt(state.population, *outcome)
         else:
-            state.population = genetic.survive(
-                state.population, unit, evaluation.fitness, evaluation.distance, spec.tolerance
-            )
+            state.population = genetic.survive(state.population, *outcome)
         population, reasons = state.population, [reason for reason in evaluation.reasons if reason]
         fitness, distance, best = _leader(population)
         if fitness >= FAILED:
@@ -172,7 +165,7 @@ class _Run:
             population.diversity, distance, reasons,
         )  # fmt: skip
 
-    def _drawn(self) -> np.ndarray[Any, np.dtype[np.float64]]:
+    def _drawn(self) -> Array:
         spec, state, name = self.spec, self.state, self.stage.name
         if state.population.generation < 0:
             start = [float(gene.to_unit(state.base[gene.name])) for gene in self.genes]

@@ -11,6 +11,7 @@ from importlib.metadata import PackageNotFoundError, version
 from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.preparation import prepare
 from wingfit.calibration.problem import base_genome
+from wingfit.diagnosis.evidence.context import FitContext
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.finding import Finding
 from wingfit.diagnosis.rigs import subject_of
@@ -64,20 +65,20 @@ def diagnose_subject(
     began = time.monotonic()
     yield Progress(0.0, "reading the recordings", 0)
     held_out, copies = _without_copies(fitted, held_out)
-    state = SearchState(subject, WhitenedData.of(fitted, axes, spec.policy))
-    counted = CountingEvaluator(evaluator, state)
-    for fraction, stage in run_search(state, spec, free or tuple(subject.model.searched), counted):
-        yield Progress(SEARCH_FRACTION * fraction, stage, state.evaluations)
+    counted = CountingEvaluator(evaluator)
+    state = SearchState(FitContext(subject, WhitenedData.of(fitted, axes, spec.policy), counted), spec)
+    for fraction, stage in run_search(state, free or tuple(subject.model.searched)):
+        yield Progress(SEARCH_FRACTION * fraction, stage, counted.evaluations)
     finding: Finding | None = None
-    for fraction, stage, found in build_finding(state, name, held_out, counted):
+    for fraction, stage, found in build_finding(state, name, held_out):
         finding = found
-        yield Progress(SEARCH_FRACTION + (1.0 - SEARCH_FRACTION) * fraction, stage, state.evaluations)
+        yield Progress(SEARCH_FRACTION + (1.0 - SEARCH_FRACTION) * fraction, stage, counted.evaluations)
     if finding is None:
         raise ValueError("the diagnosis ended without a finding")
-    spent = time.monotonic() - began
+    spent, evaluations = time.monotonic() - began, counted.evaluations
     remarks = (*finding.remarks, *copies)
-    finding = replace(finding, remarks=remarks, seconds=spent, evaluations=state.evaluations, versions=_versions())
-    yield Progress(1.0, "done", state.evaluations, finding)
+    finding = replace(finding, remarks=remarks, seconds=spent, evaluations=evaluations, versions=_versions())
+    yield Progress(1.0, "done", evaluations, finding)
 
 
 def _without_copies(

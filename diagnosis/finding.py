@@ -10,8 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal
 
-import numpy as np
-import numpy.typing as npt
+from wingfit.records.array_types import Array, Float
 
 Verdict = Literal["adequate", "named", "ambiguous", "unnamed", "measurement fault"]
 VERDICTS: tuple[Verdict, ...] = ("adequate", "named", "ambiguous", "unnamed", "measurement fault")
@@ -319,6 +318,11 @@ class Finding:
     versions: dict[str, str] = field(default_factory=dict)
 
 
-def table(values: npt.NDArray[np.float64]) -> tuple[tuple[float, ...], ...]:
+def in_milli(value: float, unit: str) -> str:
+    """``value`` in ``unit`` ("m" or "N") as text in mm or mN."""
+    return f"{1e3 * value:.3g} m{unit}"
+
+
+def table(values: Float[Array, "N M"]) -> Table:
     """``values`` [N, M] as nested tuples, the form in which a finding stores them."""
     return tuple(tuple(row) for row in values.tolist())

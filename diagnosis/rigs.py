@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise, product
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.calibration.effects import sizes
 from wingfit.calibration.preparation import fitted_through
 from wingfit.calibration.spec import CalibrationSpec, model_for
 from wingfit.diagnosis.subject import ChannelLocation, Subject, Suspect
 from wingfit.records import Condition, Dataset, Recording, Vehicle, Wing
+from wingfit.records.array_types import Array, Float
 from wingfit.records.dataset import ForceAxis
 from wingfit.sim.effects.contract import Effect
 from wingfit.sim.effects.probe import Probe
@@ -28,8 +28,6 @@ from wingfit.sim.wing.division import Division
 from wingfit.sim.wing.flexible_wing import FlexibleWing
 from wingfit.sim.wing.planform import Planform
 from wingfit.sim.wing.probing import Probed, probed
-
-Array = npt.NDArray[np.float64]
 
 MAX_BODIES = 64  # of a finer wing; one individual of 80 bodies takes ten times as long as one of 24
 MAX_ELEMENTS = 640
@@ -52,10 +50,45 @@ def subject_of(dataset: Dataset, spec: CalibrationSpec) -> Subject:
 
 
 @dataclass(frozen=True, eq=False)
-class WingSubject:
-    """A flexible wing, recorded as marker tracks."""
+class _Rig:
+    """What both rigs have in common."""
 
     dataset: Dataset
+    model: FlexibleWing | BladeElementWing
+
+    def extended(self, names: Sequence[str]) -> Model:
+        """The nominal model with suspects added, switched off."""
+        return self.model.with_effects(*names)
+
+    def candidate_conditions(self) -> tuple[Condition, ...]:
+        """Conditions that the rigs of the dataset can run and did not, at most MAX_CONDITIONS, far from each other.
+
+        All combinations of the frequencies and lags of a rig, and their midpoints, with every stream (pressure,
+        airspeed, incidence). None in free flight, where the vehicle and not the experimenter chooses the combinations.
+        """
+        recordings, candidates = self.dataset.recordings, list[Condition]()
+        for rig in dict.fromkeys(r.rig for r in recordings if r.rig != "free_flight"):
+            candidates += _combinations([r.condition for r in recordings if r.rig == rig])
+        return tuple(_farthest_first(candidates, [r.condition for r in recordings], MAX_CONDITIONS))
+
+    def simulated_recording(self, model: Model, genome: Float[Array, " G"], condition: Condition) -> Recording | None:
+        """What the rig would record, at the phases of the recording of the most similar condition; None if that fails.
+
+        Tracks of all markers, or forces along both axes, low-passed as they would be fitted.
+        """
+        blank = self._blank(condition)
+        seen = model.observe(genome[None], blank)
+        return None if seen.reasons[0] is not None else replace(blank, values=seen.channels[0])
+
+    def _blank(self, condition: Condition) -> Recording:
+        """A recording under ``condition`` without data."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True, eq=False)
+class WingSubject(_Rig):
+    """A flexible wing, recorded as marker tracks."""
+
     model: FlexibleWing
 
     @cached_property
@@ -79,11 +112,7 @@ class WingSubject:
         words = f"flexible wing of {sum(bodies)} bodies in {len(bodies)} strips ({along})"
         return words + _effects_text(self.model.effects)
 
-    def extended(self, names: Sequence[str]) -> FlexibleWing:
-        """The nominal model with suspects added, switched off."""
-        return self.model.with_effects(*names)
-
-    def with_initial_motion(self, model: Model, genome: Array) -> Model:
+    def with_initial_motion(self, model: Model, genome: Float[Array, " G"]) -> Model:
         """The wing's search for the periodic motion starts from that of ``genome``, without its effects."""
         return model.beside(genome) if isinstance(model, FlexibleWing) else model
 
@@ -117,31 +146,22 @@ class WingSubject:
         """Phase (rad) at which the reference markers rise through the height of the hinge."""
         return recorded_crossing(self.model.wing, recording)
 
-    def simulated_recording(self, model: Model, genome: Array, condition: Condition) -> Recording | None:
-        """Tracks of all markers under ``condition``, at the phases of the recording of the most similar condition."""
-        blank = _empty_recording(
-            self.dataset, condition, markers=tuple(marker.name for marker in self.model.wing.markers)
-        )
-        seen = model.observe(genome[None], blank)
-        return None if seen.reasons[0] is not None else replace(blank, values=seen.channels[0])
+    def _blank(self, condition: Condition) -> Recording:
+        markers = tuple(marker.name for marker in self.model.wing.markers)
+        return _empty_recording(self.dataset, condition, markers=markers)
 
-    def probe_responses(self, genome: Array, recording: Recording, probe: Probe) -> Probed | None:
+    def probe_responses(self, genome: Float[Array, " G"], recording: Recording, probe: Probe) -> Probed | None:
         """Responses of the tracks to unit loads; None where the wing cannot be simulated with them."""
         try:
             return probed(self.model, genome, recording, probe)
         except ValueError:
             return None
 
-    def candidate_conditions(self) -> tuple[Condition, ...]:
-        """Conditions that the rig can run and that could be recorded next."""
-        return _candidate_conditions(self.dataset)
-
 
 @dataclass(frozen=True, eq=False)
-class VehicleSubject:
+class VehicleSubject(_Rig):
     """A flapping vehicle, recorded as forces, which are filtered for the fit according to ``spec``."""
 
-    dataset: Dataset
     model: BladeElementWing
     spec: CalibrationSpec
 
@@ -167,11 +187,7 @@ class VehicleSubject:
         words = f"quasi-steady blade elements, model {preset.name!r} ({preset.description})"
         return words + "".join(f", {one}" for one in changed) + _effects_text(self.model.effects)
 
-    def extended(self, names: Sequence[str]) -> BladeElementWing:
-        """The nominal model with suspects added, switched off."""
-        return self.model.with_effects(*names)
-
-    def with_initial_motion(self, model: Model, genome: Array) -> Model:  # noqa: ARG002  # part of the protocol
+    def with_initial_motion(self, model: Model, genome: Float[Array, " G"]) -> Model:  # noqa: ARG002  # part of the protocol
         """Return ``model``: its motion is prescribed."""
         return model
 
@@ -202,22 +218,12 @@ class VehicleSubject:
         """Zero: times of forces count from the start of a beat."""
         return 0.0
 
-    def simulated_recording(self, model: Model, genome: Array, condition: Condition) -> Recording | None:
-        """Forces along both axes under ``condition``, at the phases of the recording of the most similar condition.
-
-        Low-passed as they would be fitted.
-        """
+    def _blank(self, condition: Condition) -> Recording:
         blank = _empty_recording(self.dataset, condition, forces=("x", "z"))
-        blank = replace(blank, low_pass=fitted_through(self.spec, blank))
-        seen = model.observe(genome[None], blank)
-        return None if seen.reasons[0] is not None else replace(blank, values=seen.channels[0])
+        return replace(blank, low_pass=fitted_through(self.spec, blank))
 
-    def probe_responses(self, genome: Array, recording: Recording, probe: Probe) -> None:
+    def probe_responses(self, genome: Float[Array, " G"], recording: Recording, probe: Probe) -> None:
         """None: recordings of forces show the missing force directly."""
-
-    def candidate_conditions(self) -> tuple[Condition, ...]:
-        """Conditions that the rig can run and that could be recorded next."""
-        return _candidate_conditions(self.dataset)
 
 
 # -- suspects --------------------------------------------------------------------------------------------------
@@ -230,11 +236,9 @@ def _suspects(rig: Wing | Vehicle, known: Collection[str]) -> tuple[Suspect, ...
 
 
 def _suspect(effect: Effect, rig: Wing | Vehicle) -> Suspect:
-    location_genes = {
-        _LOCATION_GENES[p.name]: f"{effect.name}.{p.name}"
-        for p in effect.parameters
-        if p.place and p.name in _LOCATION_GENES
-    }
+    places = [p.name for p in effect.parameters if p.place and p.name in _LOCATION_GENES]
+    location_genes = {_LOCATION_GENES[name]: f"{effect.name}.{name}" for name in places}
+    shapes = _marker_shapes(rig) if location_genes and effect.port == "observation" and isinstance(rig, Wing) else ()
     return Suspect(
         name=effect.name,
         title=effect.title,
@@ -246,17 +250,15 @@ def _suspect(effect: Effect, rig: Wing | Vehicle) -> Suspect:
         signature=effect.signature,
         location_genes=location_genes,
         confused_with=effect.confused_with,
-        candidate_shapes=_marker_shapes(rig)
-        if location_genes and effect.port == "observation" and isinstance(rig, Wing)
-        else (),
+        candidate_shapes=shapes,
     )
 
 
 def _marker_shapes(wing: Wing) -> tuple[tuple[float, float], ...]:
     """Station and chord of at most MAX_MARKERS_TRIED markers, the candidates for the fault of a marker."""
     planform, every = Planform(wing), -(-len(wing.markers) // MAX_MARKERS_TRIED)
-    found = ((marker.position[:2], _station(wing, marker.position[1])) for marker in wing.markers[::every])
-    return tuple((station, float(np.clip(planform.fraction(x, y), 0.0, 1.0))) for (x, y), station in found)
+    places = (marker.position[:2] for marker in wing.markers[::every])
+    return tuple((_station(wing, y), float(np.clip(planform.fraction(x, y), 0.0, 1.0))) for x, y in places)
 
 
 def _station(wing: Wing, y: float) -> float:
@@ -308,18 +310,6 @@ def _dissimilarity(dataset: Dataset, one: Condition, other: Condition) -> tuple[
     return (one.airspeed > 0) != (other.airspeed > 0), float(np.linalg.norm(positions[0] - positions[1]))
 
 
-def _candidate_conditions(dataset: Dataset) -> tuple[Condition, ...]:
-    """Conditions that the rigs of ``dataset`` can run and did not, at most MAX_CONDITIONS, far from each other.
-
-    All combinations of the frequencies and lags of a rig, and their midpoints, with every stream (pressure, airspeed,
-    incidence). None in free flight, where the vehicle and not the experimenter chooses the combinations.
-    """
-    recorded, candidates = [recording.condition for recording in dataset.recordings], list[Condition]()
-    for rig in dict.fromkeys(r.rig for r in dataset.recordings if r.rig != "free_flight"):
-        candidates += _combinations([r.condition for r in dataset.recordings if r.rig == rig])
-    return tuple(_farthest_first(candidates, recorded, MAX_CONDITIONS))
-
-
 def _combinations(ran: Sequence[Condition]) -> Iterator[Condition]:
     """All combinations of the settings of one rig."""
     frequencies, lags = (_levels([getattr(c, name) for c in ran]) for name in ("flap_frequency", "phase_lag"))
@@ -330,7 +320,8 @@ def _combinations(ran: Sequence[Condition]) -> Iterator[Condition]:
 def _streams(ran: Sequence[Condition]) -> list[Condition]:
     """Conditions with different streams, and midpoints between neighbours (geometric for the pressure)."""
     names = ("pressure", "airspeed", "angle_of_attack")
-    levels = {name: _levels([getattr(c, name) for c in ran], logarithm=name == "pressure") for name in names}
+    scales = dict.fromkeys(names, float) | {"pressure": _logarithm}
+    levels = {name: _levels([getattr(c, name) for c in ran], scales[name]) for name in names}
     snapped = {tuple(_nearest(levels[name], getattr(c, name)) for name in names): c for c in ran}
     streams = [replace(c, **dict(zip(names, key, strict=True))) for key, c in sorted(snapped.items())]
     streams.sort(key=lambda c: (c.airspeed, c.pressure))
@@ -340,16 +331,18 @@ def _streams(ran: Sequence[Condition]) -> list[Condition]:
     return streams
 
 
-def _levels(values: Sequence[float], *, logarithm: bool = False) -> list[float]:
-    """Distinct settings: values within LEVEL_TOLERANCE of their range, or of half the largest value, count as one."""
+def _levels(values: Sequence[float], scale: Callable[[float], float] = float) -> list[float]:
+    """Distinct settings: values within LEVEL_TOLERANCE of their range, or of half the largest value, count as one.
+
+    Values are compared on ``scale``.
+    """
     ordered = sorted(values)
-    scaled = [_logarithm(value) for value in ordered] if logarithm else ordered
-    apart = LEVEL_TOLERANCE * max(scaled[-1] - scaled[0], 0.5 * abs(scaled[-1]))
-    groups, first = [[ordered[0]]], scaled[0]
-    for value, at in zip(ordered[1:], scaled[1:], strict=True):
-        if at - first > apart:
+    low, high = scale(ordered[0]), scale(ordered[-1])
+    apart = LEVEL_TOLERANCE * max(high - low, 0.5 * abs(high))
+    groups = [[ordered[0]]]
+    for value in ordered[1:]:
+        if scale(value) - scale(groups[-1][0]) > apart:
             groups.append([])
-            first = at
         groups[-1].append(value)
     return [group[len(group) // 2] for group in groups]
 

@@ -8,8 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from wingfit.calibration.evaluator import Evaluator
 from wingfit.diagnosis.evidence.competing_fits import StartPoint, fit_from_estimates, start_points
+from wingfit.diagnosis.evidence.context import FitContext
 from wingfit.diagnosis.evidence.fit import FIT_ERRORS, Fit
 from wingfit.diagnosis.evidence.nominal import (
     Nominal,
@@ -28,7 +28,6 @@ from wingfit.diagnosis.evidence.refit import (
     partner_trials,
     refit_at,
     refit_with,
-    restart_fit,
     strongest_trials,
     substitute_trials,
     suspect_pairs,
@@ -50,63 +49,65 @@ MAX_RIVALS = 3  # hypotheses for which a second effect is tried
 MAX_SUBSTITUTES = 2  # effects that are tried in place of each effect of a combined hypothesis
 
 
-def run_search(state: SearchState, spec: DiagnosisSpec, free: tuple[str, ...], evaluator: Evaluator) -> Steps:
-    """Fill ``state``; yields the fraction of the work done and the next stage."""
-    data, fixed = state.data, spec.calibration.fixed
+def run_search(state: SearchState, free: tuple[str, ...]) -> Steps:
+    """Fill ``state``, fitting the nominal genes ``free``; yields the fraction of the work done and the next stage."""
+    spec = state.spec
     yield 0.0, "fitting the nominal model"
     if spec.start:
         with suppress(*FIT_ERRORS):
-            state.initial_fit = state.subject, next(fit_nominal(state.subject, data, evaluator, free, {}, fixed))
-    for k, fit in enumerate(fit_nominal(state.subject, data, evaluator, free, spec.start, fixed)):
-        state.initial_fit = state.initial_fit or (state.subject, fit)
+            state.initial_fit = state.context, next(fit_nominal(state.context, free, spec.calibration.fixed))
+    for k, fit in enumerate(fit_nominal(state.context, free, {**spec.start, **spec.calibration.fixed})):
+        state.initial_fit = state.initial_fit or (state.context, fit)
         yield 0.25 * (1.0 - 0.85 ** (k + 1)), "fitting the nominal model"
     yield 0.25, "comparing with a finer discretisation"
     suspects = select_suspects(state.subject, spec)
-    for fraction, stage in _search_coarse_first(state, spec, fit, suspects, evaluator):
+    for fraction, stage in _search_coarse_first(state, fit, suspects):
         yield 0.3 + 0.55 * fraction, stage
     yield 0.85, "fitting the nominal model again"
-    better = _nominal_from_best(state, evaluator)
+    better = _nominal_from_best(state)
     if better is not None:
         state.restart_from(replace(state.fitted_nominal, refit=better))
-        for fraction, stage in _try_suspects(state, spec, suspects, evaluator):
+        for fraction, stage in _try_suspects(state, suspects):
             yield 0.85 + 0.07 * fraction, stage
     yield 0.92, "comparing with a finer discretisation"
-    for stage in _refine_and_extend(state, spec, evaluator):
+    for stage in _refine_and_extend(state):
         yield 0.93, stage
     yield 0.94, "continuing the best refits"
     if state.refits:
-        _continue_best(state, state.fitted_nominal, evaluator)
+        _continue_best(state)
     floor = 0.0 if spec.refine else state.fitted_nominal.discretisation_error or 0.0
-    yield from ((0.95, stage) for stage in _final_fits(state, evaluator, floor, len(suspects)))
+    yield from ((0.95, stage) for stage in _final_fits(state, floor, len(suspects)))
 
 
-def _search_coarse_first(
-    state: SearchState, spec: DiagnosisSpec, fit: Fit, suspects: Sequence[Suspect], evaluator: Evaluator
-) -> Steps:
+def _search_coarse_first(state: SearchState, fit: Fit, suspects: Sequence[Suspect]) -> Steps:
     """Test suspects with the nominal ``fit``, or with a finer discretisation if that fits better than all suspects."""
-    nominal = choose_discretisation(state.subject, state.data, evaluator, fit, refine=spec.refine)
+    nominal = choose_discretisation(state.context, fit, refine=state.spec.refine)
     if nominal.subject is not state.subject and not nominal_suffices(state.data, nominal.refit, len(suspects)):
-        state.restart_from(choose_discretisation(state.subject, state.data, evaluator, fit, refine=False))
-        for fraction, stage in _try_suspects(state, spec, suspects, evaluator, at_least=nominal.refit):
+        state.restart_from(choose_discretisation(state.context, fit, refine=False))
+        for fraction, stage in _try_suspects(state, suspects, at_least=nominal.refit):
             yield 0.3 * fraction, stage
     if not any(improves(state.data, one, nominal.refit) for one in state.refits):
         state.restart_from(nominal)
-        for fraction, stage in _try_suspects(state, spec, suspects, evaluator):
+        for fraction, stage in _try_suspects(state, suspects):
             yield 0.3 + 0.7 * fraction, stage
 
 
-def _final_fits(state: SearchState, evaluator: Evaluator, floor: float, suspects: int) -> Iterator[str]:
+def _final_fits(state: SearchState, floor: float, suspects: int) -> Iterator[str]:
     """Weigh the hypotheses, with the best one and those indistinguishable from it fitted until they converge."""
-    known = weigh(state.data, state.fitted_nominal.refit, state.refits, floor, suspects)
-    yield from _compete(state, evaluator, _indistinguishable(known) or _look_alikes(state, decide(known).best))
+
+    def weighed() -> HypothesisWeights:
+        return weigh(state.data, state.fitted_nominal.refit, state.refits, floor, suspects)
+
+    known = weighed()
+    yield from _compete(state, _indistinguishable(known) or _look_alikes(state, decide(known).best))
     yield "fitting the best hypothesis until it converges"
+    state.weights = weighed()
     for _ in range(MAX_CONTINUED):
-        state.weights = weigh(state.data, state.fitted_nominal.refit, state.refits, floor, suspects)
         unconverged = _unconverged(state.weights)
         if unconverged is None:
             return
-        state.add(continue_fit(state.subject, state.data, evaluator, unconverged, FINAL_STEPS))
-    state.weights = weigh(state.data, state.fitted_nominal.refit, state.refits, floor, suspects)
+        state.add(continue_fit(state.context, unconverged, FINAL_STEPS))
+        state.weights = weighed()
 
 
 def _indistinguishable(weights: HypothesisWeights) -> list[StartPoint]:
@@ -148,90 +149,83 @@ def _unconverged(weights: HypothesisWeights) -> Refit | None:
     return None
 
 
-def _refine_with_effects(state: SearchState, nominal: Nominal, evaluator: Evaluator) -> None:
+def _refine_with_effects(state: SearchState) -> None:
     """Take a finer discretisation for all hypotheses where the best hypothesis fits better with it.
 
     The error of a discretisation may become visible only after a large effect is in the model.
     """
-    data = state.data
+    data, nominal = state.data, state.fitted_nominal
     best = min((nominal.refit, *state.refits), key=lambda one: one.excess)
     if best is nominal.refit:
         return
     tried_finer = nominal.tried_finer
     limit = data.policy.rivalry * best.excess + tolerated_excess(data, 0.0, 0.0)
-    leading = sorted((one for one in state.refits if one.excess <= limit), key=lambda one: one.excess)[:MAX_CONTINUED]
-    for finer in nominal.subject.finer_subjects():
-        tried = [(one, _fit_at_finer(finer, data, evaluator, one)) for one in leading]
-        if any(found is not None and found is not one for one, found in tried):
-            tried_finer = finer.description
+    leading = [one for one in state.by_excess if one.excess <= limit][:MAX_CONTINUED]
+    for finer in state.context.finer():
+        tried = [(one, _fit_at_finer(finer, one)) for one in leading]
         known = [found for one, found in tried if found is not None and found is not one]
+        tried_finer = finer.subject.description if known else tried_finer
         better = min(known, key=lambda one: one.excess, default=best)
-        if improves(state.data, better, best):
+        if improves(data, better, best):
             break
     else:
         state.nominal = replace(nominal, tried_finer=tried_finer)
         return
-    first = refit_at(finer, data, evaluator, nominal.refit)
+    first = refit_at(finer, nominal.refit)
     if first is None:
         return
-    first = fit_to_convergence(finer, data, evaluator, first)
+    first = fit_to_convergence(finer, first)
     limit = data.policy.rivalry * better.excess + tolerated_excess(data, 0.0, 0.0)
     near = [one for one in state.refits if one.excess <= limit or set(one.names) < set(better.names)]
     others = [one for one in near if one.names not in {found.names for found in known}]
-    followed = [_follow(finer, data, evaluator, one, better) for one in others]
-    before = state.subject.description
-    remark = f"with the effect added, the discretisation limits the model: {finer.description} replaces {before}"
+    followed = [_follow(finer, one, better) for one in others]
+    descriptions = f"{finer.subject.description} replaces {state.subject.description}"
+    remark = f"with the effect added, the discretisation limits the model: {descriptions}"
     remarks = (*nominal.remarks, remark)  # the error of the finer discretisation itself is not known
-    state.nominal = Nominal(finer, first, None, "", remarks)
-    state.subject, state.refits = finer, [one for one in (*known, *followed) if one is not None]
+    state.nominal = Nominal(finer.subject, first, None, "", remarks)
+    state.context, state.refits = finer, [one for one in (*known, *followed) if one is not None]
 
 
-def _fit_at_finer(finer: Subject, data: WhitenedData, evaluator: Evaluator, refit: Refit) -> Refit | None:
+def _fit_at_finer(finer: FitContext, refit: Refit) -> Refit | None:
     """``refit`` with a finer discretisation, fitted if that is promising; None where it cannot be simulated."""
-    changes, gain = finer_change(finer, data, evaluator, refit)
+    changes, gain = finer_change(finer, refit)
     if not changes:
         return None
-    if not finer_is_promising(data, changes, gain, refit):
+    if not finer_is_promising(finer.data, changes, gain, refit):
         return refit
-    found = refit_at(finer, data, evaluator, refit)
-    if found is None or found.fit.converged or improves(data, found, refit) or found.excess >= refit.excess:
+    found = refit_at(finer, refit)
+    if found is None or found.fit.converged or improves(finer.data, found, refit) or found.excess >= refit.excess:
         return found
-    return continue_fit(finer, data, evaluator, found)
+    return continue_fit(finer, found)
 
 
-def _follow(finer: Subject, data: WhitenedData, evaluator: Evaluator, refit: Refit, best: Refit) -> Refit | None:
+def _follow(finer: FitContext, refit: Refit, best: Refit) -> Refit | None:
     """``refit`` with a finer discretisation; fitted to convergence if its effects are a subset of those of ``best``."""
-    found = refit_at(finer, data, evaluator, refit)
+    found = refit_at(finer, refit)
     if found is None or found.fit.converged or not set(refit.names) < set(best.names):
         return found
-    return continue_fit(finer, data, evaluator, found)
+    return continue_fit(finer, found)
 
 
-def _try_suspects(
-    state: SearchState,
-    spec: DiagnosisSpec,
-    suspects: Sequence[Suspect],
-    evaluator: Evaluator,
-    at_least: Refit | None = None,
-) -> Steps:
+def _try_suspects(state: SearchState, suspects: Sequence[Suspect], at_least: Refit | None = None) -> Steps:
     """Score tests with the nominal fit, then refits; yields the fraction done and the stage.
 
     There are few or no refits where none is, or is predicted to be, better than ``at_least``, the nominal model with a
     finer discretisation: an effect and a discretisation error may each absorb the other's residual.
     """
-    nominal = state.fitted_nominal
-    tests = score_tests(state.subject, state.data, nominal.refit.fit, evaluator, suspects)
+    nominal = state.fitted_nominal.refit
+    tests = score_tests(state.context, nominal.fit, suspects)
     for k, (suspect, trials) in enumerate(tests):
         state.trials.append(trials)
         yield 0.6 * (k + 1) / len(suspects), f"score test of {suspect.name}"
-    if nominal_suffices(state.data, nominal.refit, len(suspects)):
+    if nominal_suffices(state.data, nominal, len(suspects)):
         return
     least = min((trial.remaining_chi_squared for trials in state.trials for trial in trials), default=np.inf)
     if at_least is None or least < state.data.chi_squared(at_least.fit.coefficients):
-        yield from _refits(state, nominal, spec, evaluator, at_least)
+        yield from _refits(state, at_least)
 
 
-def _nominal_from_best(state: SearchState, evaluator: Evaluator) -> Refit | None:
+def _nominal_from_best(state: SearchState) -> Refit | None:
     """The nominal model fitted from the genes of the best hypothesis, if that is clearly better; else None.
 
     Then the earlier nominal fit was in a local minimum, and the hypothesis is not the cause.
@@ -240,53 +234,50 @@ def _nominal_from_best(state: SearchState, evaluator: Evaluator) -> Refit | None
     best = min(state.refits, key=lambda one: one.excess, default=nominal)
     if best is nominal or not improves(state.data, best, nominal):
         return None
-    found = restart_fit(state.subject, state.data, evaluator, nominal, best.fit.unit[: len(nominal.fit.unit)])
+    found = refit_at(state.context, nominal, best.fit.unit[: len(nominal.fit.unit)])
     return found if found is not None and improves(state.data, found, nominal) else None
 
 
-def _refits(
-    state: SearchState, nominal: Nominal, spec: DiagnosisSpec, evaluator: Evaluator, at_least: Refit | None
-) -> Steps:
+def _refits(state: SearchState, at_least: Refit | None) -> Steps:
     """Refit single suspects, then some from the estimates and several together while the residual is not explained."""
-    yield from _single_refits(state, nominal, spec, evaluator)
+    yield from _single_refits(state)
     yield 0.72, "continuing the best refits"
-    if _continue_best(state, nominal, evaluator):
+    if _continue_best(state):
         return
     if at_least is not None and not any(improves(state.data, one, at_least) for one in state.refits):
         return
     if not state.beats_unknown_law:
-        yield from _refits_from_estimates(state, spec, evaluator)
+        yield from _refits_from_estimates(state)
     if not state.beats_unknown_law:
-        yield from ((0.82, stage) for stage in _combined_refits(state, nominal, evaluator))
+        yield from ((0.82, stage) for stage in _combined_refits(state))
         yield 0.97, "continuing the best refits"
-        _continue_best(state, nominal, evaluator)
+        _continue_best(state)
 
 
-def _single_refits(state: SearchState, nominal: Nominal, spec: DiagnosisSpec, evaluator: Evaluator) -> Steps:
+def _single_refits(state: SearchState) -> Steps:
     """Refit the suspects with the strongest score tests one at a time."""
-    data, fit = state.data, nominal.refit.fit
-    chosen = strongest_trials(state.data, state.trials, spec.refits)
+    chosen = strongest_trials(state.data, state.trials, state.spec.refits)
     for k, trial in enumerate(chosen):
-        if _is_outperformed(state, nominal, trial, chosen[0]):
+        if _is_outperformed(state, trial, chosen[0]):
             continue
         yield 0.6 + 0.12 * k / len(chosen), f"refit with {trial.suspect.name}"
-        state.add(refit_with(state.subject, data, fit, evaluator, [trial]))
+        state.add(refit_with(state.context, state.fitted_nominal.refit.fit, [trial]))
 
 
-def _refits_from_estimates(state: SearchState, spec: DiagnosisSpec, evaluator: Evaluator) -> Steps:
+def _refits_from_estimates(state: SearchState) -> Steps:
     """Refit suspects from the genes' estimates, those whose score tests are strongest there.
 
     At the nominal fit a score test cannot see what the nominal genes have absorbed, such as a heavy mass.
     """
     if state.initial_fit is None:
         raise ValueError("the nominal model has not been fitted")
-    subject, initial = state.initial_fit
+    context, initial = state.initial_fit
     found = []
-    for suspect, trials in score_tests(subject, state.data, initial, evaluator, select_suspects(subject, spec)):
+    for suspect, trials in score_tests(context, initial, select_suspects(context.subject, state.spec)):
         found.append(trials)
         yield 0.74, f"score test of {suspect.name} at the estimates"
     starts = [entry for trial in _restart_trials(state.data, found) for entry in start_points(trial)]
-    yield from ((0.77, stage) for stage in _compete(state, evaluator, starts))
+    yield from ((0.77, stage) for stage in _compete(state, starts))
 
 
 def _restart_trials(data: WhitenedData, found: Sequence[list[Trial]]) -> list[Trial]:
@@ -296,99 +287,97 @@ def _restart_trials(data: WhitenedData, found: Sequence[list[Trial]]) -> list[Tr
     return strongest + [one for one in others if one.suspect.location_genes and not one.suspect.candidate_shapes]
 
 
-def _compete(state: SearchState, evaluator: Evaluator, starts: Sequence[StartPoint]) -> Iterator[str]:
+def _compete(state: SearchState, starts: Sequence[StartPoint]) -> Iterator[str]:
     """Fit all start points in competition and store the best."""
     if not starts or state.initial_fit is None:
         return
     policy, nominal = state.data.policy, state.fitted_nominal.refit.excess
-    best = min(one.excess for one in state.refits)
+    best = state.by_excess[0].excess
     by_noise = tolerated_excess(state.data, 0.0, 0.0)
     limit = max(min(policy.worth_continuing * nominal, policy.rivalry * best), by_noise)
     target = max(policy.unknown_residual**2 * nominal, by_noise)
     rivals: list[tuple[StartPoint, Fit]] = []
-    for rivals in fit_from_estimates(state.subject, state.data, evaluator, state.initial_fit[1], starts, limit, target):
+    for rivals in fit_from_estimates(state.context, state.initial_fit[1], starts, limit, target):
         yield f"refit with {' and '.join(rivals[0][0].names)} from the estimates"
     for entry, fit in rivals:
         state.add(make_refit(state.data, fit, entry.trials))
 
 
-def _refine_and_extend(state: SearchState, spec: DiagnosisSpec, evaluator: Evaluator) -> Iterator[str]:
+def _refine_and_extend(state: SearchState) -> Iterator[str]:
     """Refine the discretisation, whose error may look like a second effect, then try second effects."""
     coarse = state.subject
-    if spec.refine:
-        _refine_with_effects(state, state.fitted_nominal, evaluator)
-    if state.beats_unknown_law and not state.is_explained(state.fitted_nominal):
-        yield from _second_effects(state, spec, evaluator)
-        if state.subject is coarse and not state.is_explained(state.fitted_nominal):
-            yield from _combined_refits(state, state.fitted_nominal, evaluator)
+    if state.spec.refine:
+        _refine_with_effects(state)
+    if state.beats_unknown_law and not state.is_explained:
+        yield from _second_effects(state)
+        if state.subject is coarse and not state.is_explained:
+            yield from _combined_refits(state)
 
 
-def _second_effects(state: SearchState, spec: DiagnosisSpec, evaluator: Evaluator) -> Iterator[str]:
+def _second_effects(state: SearchState) -> Iterator[str]:
     """Refit the best hypothesis with second effects chosen by score tests at its fit."""
-    best, data = min(state.refits, key=lambda one: one.excess), state.data
-    others, found = [one for one in select_suspects(state.subject, spec) if one.name not in best.names], []
-    for suspect, trials in score_tests(state.subject, data, best.fit, evaluator, others, best.names):
+    best = state.by_excess[0]
+    others, found = [one for one in select_suspects(state.subject, state.spec) if one.name not in best.names], []
+    for suspect, trials in score_tests(state.context, best.fit, others, best.names):
         found.append(trials)
         yield f"score test of {suspect.name} together with {' and '.join(best.names)}"
-    for trial in partner_trials(data, best, found)[:MAX_PARTNERS]:
+    for trial in partner_trials(state.data, best, found)[:MAX_PARTNERS]:
         yield f"refit with {' and '.join((*best.names, trial.suspect.name))}"
-        state.add(refit_with(state.subject, data, best.fit, evaluator, [*best.trials, trial], best.fit))
+        state.add(refit_with(state.context, best.fit, [*best.trials, trial], best.fit))
 
 
-def _combined_refits(state: SearchState, nominal: Nominal, evaluator: Evaluator) -> Iterator[str]:
+def _combined_refits(state: SearchState) -> Iterator[str]:
     """Refit combinations: the best hypotheses with a second effect, pairs of weak effects, and substitutes."""
-    data, fit = state.data, nominal.refit.fit
-    tried = {frozenset(one.names) for one in state.refits}
-    best = sorted(state.refits, key=lambda one: one.excess)[:MAX_RIVALS]
-    for k, one in enumerate(best):
+    data, tried = state.data, {frozenset(one.names) for one in state.refits}
+    for k, one in enumerate(state.by_excess[:MAX_RIVALS]):
         for trial in partner_trials(data, one, state.trials)[: MAX_PARTNERS if k == 0 else 1]:
-            names = frozenset((*one.names, trial.suspect.name))
-            if names not in tried:
-                tried.add(names)
-                yield f"refit with {' and '.join(sorted(names))}"
-                state.add(refit_with(state.subject, data, fit, evaluator, [*one.trials, trial], one.fit))
+            yield from _refit_untried(state, tried, [*one.trials, trial], one.fit)
     least = min(data.chi_squared(one.fit.coefficients) for one in state.refits)
-    for two in suspect_pairs(data, fit, state.trials, least, 2):
-        names = frozenset(trial.suspect.name for trial in two)
-        if names not in tried:
-            tried.add(names)
-            yield f"refit with {' and '.join(sorted(names))}"
-            state.add(refit_with(state.subject, data, fit, evaluator, two))
-    yield from _substituted_refits(state, nominal, evaluator)
+    for two in suspect_pairs(data, state.fitted_nominal.refit.fit, state.trials, least, 2):
+        yield from _refit_untried(state, tried, two)
+    yield from _substituted_refits(state)
 
 
-def _substituted_refits(state: SearchState, nominal: Nominal, evaluator: Evaluator) -> Iterator[str]:
+def _refit_untried(
+    state: SearchState, tried: set[frozenset[str]], trials: Sequence[Trial], base: Fit | None = None
+) -> Iterator[str]:
+    """Refit with the suspects of ``trials`` unless their names are in ``tried``; then they are added to it."""
+    names = frozenset(trial.suspect.name for trial in trials)
+    if names not in tried:
+        tried.add(names)
+        yield f"refit with {' and '.join(sorted(names))}"
+        state.add(refit_with(state.context, state.fitted_nominal.refit.fit, trials, base))
+
+
+def _substituted_refits(state: SearchState) -> Iterator[str]:
     """Replace each effect of the best combination by effects that can reproduce its contribution."""
-    best = min(state.refits, key=lambda one: one.excess)
+    best = state.by_excess[0]
     if len(best.trials) < 2:
         return
     tried = {frozenset(one.names) for one in state.refits}
     for part in best.trials:
         others = [trial for trial in best.trials if trial is not part]
-        for trial in substitute_trials(state.data, evaluator, best, part, state.trials, MAX_SUBSTITUTES):
-            names = frozenset(one.suspect.name for one in (*others, trial))
-            if names not in tried:
-                yield f"refit with {' and '.join(sorted(names))}"
-                state.add(refit_with(state.subject, state.data, nominal.refit.fit, evaluator, [*others, trial]))
+        for trial in substitute_trials(state.context, best, part, state.trials, MAX_SUBSTITUTES):
+            yield from _refit_untried(state, tried, [*others, trial])
 
 
-def _continue_best(state: SearchState, nominal: Nominal, evaluator: Evaluator) -> bool:
+def _continue_best(state: SearchState) -> bool:
     """Continue the best refits until one needs no second effect; return whether one does not."""
-    enough = state.partner_threshold(nominal)
+    enough, limit = state.partner_threshold, state.data.policy.worth_continuing * state.fitted_nominal.refit.excess
     for k in np.argsort([one.excess for one in state.refits])[:MAX_CONTINUED]:
         one = state.refits[k]
-        if not one.fit.converged and enough < one.excess < state.data.policy.worth_continuing * nominal.refit.excess:
-            state.refits[k] = continue_fit(state.subject, state.data, evaluator, one)
-    return state.is_explained(nominal)
+        if not one.fit.converged and enough < one.excess < limit:
+            state.refits[k] = continue_fit(state.context, one)
+    return state.is_explained
 
 
-def _is_outperformed(state: SearchState, nominal: Nominal, trial: Trial, best: Trial) -> bool:
+def _is_outperformed(state: SearchState, trial: Trial, best: Trial) -> bool:
     """Whether ``trial`` is too weak to compete with a refit that has already explained the residual."""
-    policy = state.data.policy
+    policy, nominal = state.data.policy, state.fitted_nominal.refit
     if not state.refits or trial.gain > policy.weak_after_success * best.gain:
         return False
-    least = min(one.excess for one in state.refits)
-    return least <= max(policy.explained_excess * nominal.refit.excess, tolerated_excess(state.data, 0.0, 0.0))
+    explained = max(policy.explained_excess * nominal.excess, tolerated_excess(state.data, 0.0, 0.0))
+    return state.by_excess[0].excess <= explained
 
 
 def select_suspects(subject: Subject, spec: DiagnosisSpec) -> list[Suspect]:

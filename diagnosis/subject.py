@@ -10,15 +10,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, NamedTuple, Protocol
 
-import numpy as np
-import numpy.typing as npt
-
 from wingfit.records import Condition, Gene, Recording
+from wingfit.records.array_types import Array
 from wingfit.sim.effects.probe import Probe
 from wingfit.sim.model import Model
 from wingfit.sim.wing.probing import Probed
 
-Array = npt.NDArray[np.float64]
 Family = Literal["structure", "inertia", "actuation", "aerodynamics", "measurement"]
 
 

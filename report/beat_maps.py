@@ -7,10 +7,10 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.diagnosis.evidence.intervals import standard_errors
 from wingfit.diagnosis.finding import Finding, MissingLoad, PhaseMap, Table
+from wingfit.records.array_types import Array, ArrayLike
 from wingfit.report import svg
 from wingfit.report.layout import figure, folded, panels
 from wingfit.report.markup import Markup, joined, tag
@@ -198,7 +198,7 @@ def _grid(title: str, bands: Sequence[float], classes: Classes, over: Classes | 
     )
 
 
-def _largest(table: npt.ArrayLike) -> tuple[int, int]:
+def _largest(table: ArrayLike) -> tuple[int, int]:
     """Row and column of the largest value."""
     i, j = np.unravel_index(np.argmax(table), np.shape(table))
     return int(i), int(j)
@@ -212,7 +212,7 @@ def _peak(load: MissingLoad) -> tuple[int, int, float]:
     return i, j, float(ratios[i, j])
 
 
-def _pooled(values: npt.ArrayLike, pool: Callable[..., Any] = np.mean) -> list[Any]:
+def _pooled(values: ArrayLike, pool: Callable[..., Any] = np.mean) -> list[Any]:
     """``values`` with at most MOST_ROWS rows and MOST_COLUMNS columns: neighbours are pooled."""
     pooled = np.asarray(values, dtype=np.float64)
     for k, most in zip(range(pooled.ndim), (MOST_ROWS, MOST_COLUMNS), strict=False):
@@ -223,5 +223,5 @@ def _pooled(values: npt.ArrayLike, pool: Callable[..., Any] = np.mean) -> list[A
     return list(pooled.tolist())
 
 
-def _rms(values: npt.NDArray[np.float64], axis: int) -> Any:
+def _rms(values: Array, axis: int) -> Any:
     return np.sqrt(np.mean(values**2, axis=axis))

@@ -5,16 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import groupby
 
-import numpy as np
-import numpy.typing as npt
-
+from wingfit.records.array_types import Array
 from wingfit.report.layout import figure, panels, render
 from wingfit.report.markup import Markup, tag
 from wingfit.report.svg import SERIES, Axis, axis, band, curve, dots, drawing, legend, x_axis, y_axis
 
 WIDTH, LEFT, RIGHT, TOP, BOTTOM = 480.0, 62.0, 470.0, 10.0, 210.0
-Values = Sequence[float] | npt.NDArray[np.float64]
+Values = Sequence[float] | Array
 DECADES = 8  # shown of a logarithmic axis: smaller values are rounding errors
 
 
@@ -76,13 +75,9 @@ def _drawn(one: Curve, kind: str, across: Axis, up: Axis) -> list[Markup | None]
         return [band(low, high)]
     if one.dots:
         return [dots([(across.at(x), up.at(y)) for x, y in _finite(one)], "points")]
-    pieces: list[list[tuple[float, float]]] = [[]]
-    for x, y in zip(one.x, one.y, strict=True):
-        if math.isfinite(y):
-            pieces[-1].append((across.at(x), up.at(y)))
-        elif pieces[-1]:
-            pieces.append([])  # a gap in the data is a gap in the curve
-    return [curve(piece, f"curve {kind}") for piece in pieces]
+    runs = groupby(zip(one.x, one.y, strict=True), key=lambda point: math.isfinite(point[1]))
+    pieces = [[(across.at(x), up.at(y)) for x, y in run] for seen, run in runs if seen]
+    return [curve(piece, f"curve {kind}") for piece in pieces]  # a gap in the data is a gap in the curve
 
 
 def _y_axis(chart: Chart) -> Axis:

@@ -10,7 +10,7 @@ from jaxtyping import install_import_hook
 from tests import shapes
 
 # Packages whose annotations are checked at every call (docs/decisions/0017-array-shapes.md).
-install_import_hook(["wingfit.records", "wingfit.inference"], f"{shapes.__name__}.checked")
+install_import_hook(["wingfit.records", "wingfit.inference", "wingfit.diagnosis"], f"{shapes.__name__}.checked")
 
 # Continuous integration draws the same examples every time; elsewhere new ones are looked for.
 settings.register_profile("ci", derandomize=True)

@@ -12,7 +12,6 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.calibration.effects import is_size
 from wingfit.calibration.estimates.linearised import (
@@ -31,9 +30,8 @@ from wingfit.calibration.problem import Problem
 from wingfit.inference.gauss_newton import Quadratic, Trials
 from wingfit.inference.noise.white import Noise, whitened_sensitivity
 from wingfit.records import Gene
+from wingfit.records.array_types import Array
 from wingfit.records.blas_threads import one_blas_thread
-
-Array = npt.NDArray[np.float64]
 
 # Dampings tried at once, times the last good one: two groups of lanes. Close to it they lie densely, because valleys of
 # stiffnesses that compensate each other bend: a damping three times too small leaves them, one three times too large
@@ -79,17 +77,10 @@ class Step:
 
 @dataclass(frozen=True)
 class Estimate:
-    """A maximum-likelihood estimate: where the iteration ended, and how sure that is.
-
-    ``covariance`` and ``correlation`` [F, F] in the order of ``free``; ``noise`` is R of each recording, [C, C].
-    """
+    """A maximum-likelihood estimate: where the iteration ended, and its uncertainty there."""
 
     free: tuple[str, ...]
     values: dict[str, float]
-    covariance: Array
-    correlation: Array
-    noise: tuple[Array, ...]
-    cost: float
     iterations: int
     evaluations: int
     converged: bool
@@ -159,22 +150,16 @@ def estimate(problem: Problem, evaluator: Evaluator, start: Mapping[str, float])
         evaluations += last.evaluations
     if last is None:
         raise ValueError("an estimate needs at least one iteration")
-    found = Problem(problem.model, problem.recordings, problem.free, problem.base.replace(last.values), problem.axes)
-    known = uncertainty(found, evaluator)
-    said = (
-        () if last.converged else (f"not converged after {last.index + 1} iterations; the last moved {last.step:.2g}",)
-    )
+    known = uncertainty(replace(problem, base=problem.base.replace(last.values)), evaluator)
+    unfinished = f"not converged after {last.index + 1} iterations; the last moved {last.step:.2g}"
+    remarks = *at_bounds(free_genes(problem), last.values), *known.remarks
     return Estimate(
         free=problem.free,
         values=last.values,
-        covariance=known.covariance,
-        correlation=known.correlation,
-        noise=known.noise,
-        cost=known.cost,
         iterations=last.index + 1,
         evaluations=evaluations,
         converged=last.converged,
-        remarks=(*said, *at_bounds(free_genes(problem), last.values), *known.remarks),
+        remarks=remarks if last.converged else (unfinished, *remarks),
         uncertainty=known,
     )
 
@@ -196,7 +181,7 @@ def _iteration(problem: Problem, evaluator: Evaluator, genes: list[Gene], state:
     linear = linearise(problem, evaluator, unit)
     noise = [Noise.of(record, v) for record, v in zip(problem.recordings, linear.residuals, strict=True)]
     quadratic, power = _quadratic(noise, linear)
-    move = _better(problem, evaluator, unit, noise, (quadratic, power), state.damping)
+    move = _better(problem, evaluator, unit, noise, quadratic, power, state.damping)
     stays = move.gain == 0.0
     flat = state.flat + 1 if move.decrease <= COST * 0.5 * power else 0
     converged = stays or (flat > 0 and move.step <= STEP) or flat > 1
@@ -222,12 +207,15 @@ def _better(
     evaluator: Evaluator,
     unit: Array,
     noise: list[Noise],
-    cost: tuple[Quadratic, float],
+    quadratic: Quadratic,
+    power: float,
     damping: float,
 ) -> _Move:
-    """The best genome that any damping leads to; the present one when none is better."""
-    genes, (quadratic, power) = free_genes(problem), cost
-    evaluations, reasons = 0, list[str]()
+    """The best genome that any damping leads to; the present one when none is better.
+
+    ``quadratic``: the cost near ``unit`` [F]; ``power``: sum of v^T R^-1 v there.
+    """
+    genes, evaluations, reasons = free_genes(problem), 0, list[str]()
     while True:
         dampings, scale = damping * DAMPINGS, np.diag(quadratic.curvature) + LEAST_CURVATURE
         steps = np.array([quadratic.step(unit, one * scale) for one in dampings])

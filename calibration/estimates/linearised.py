@@ -9,14 +9,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.problem import Evaluation, Problem
-from wingfit.inference.differences import STEP, Differences, Outputs, differences
+from wingfit.inference.differences import STEP, Outputs, differences
 from wingfit.records import Gene
-
-Array = npt.NDArray[np.float64]
+from wingfit.records.array_types import Array, Mask
 
 AT_BOUND = 1e-6  # in unit coordinates
 SHORTER = 0.125  # of the step, where both neighbours fail
@@ -38,7 +36,7 @@ class Linearised:
 
     residuals: tuple[Array, ...]
     sensitivities: tuple[Array, ...]
-    known: npt.NDArray[np.bool_]
+    known: Mask
     fitness: float
     distance: float
     evaluations: int
@@ -61,7 +59,7 @@ def unit_at(genes: list[Gene], values: Array) -> Array:
     return np.clip([float(gene.to_unit(value)) for gene, value in zip(genes, values, strict=True)], 0.0, 1.0)
 
 
-def stopped(genes: list[Gene], values: Array) -> npt.NDArray[np.bool_]:
+def stopped(genes: list[Gene], values: Array) -> Mask:
     """[F], True where a value lies at a bound of its gene."""
     unit = unit_at(genes, values)
     return np.asarray((unit < AT_BOUND) | (unit > 1 - AT_BOUND))
@@ -81,34 +79,26 @@ def linearise(problem: Problem, evaluator: Evaluator, unit: Array) -> Linearised
     Steps that would leave the box end at its edge, and a neighbour that fails is replaced by the base, so that
     differences may become one-sided. Where both fail, shorter steps are tried once.
     """
-    genes, base = free_genes(problem), list[Evaluation]()
+    genes, evaluations = free_genes(problem), list[Evaluation]()
 
     def simulate(units: Array) -> tuple[Outputs, tuple[str | None, ...]]:
         evaluation = evaluator.evaluate(problem, values_at(genes, units), residuals=True)
-        base.append(evaluation)
+        evaluations.append(evaluation)
         return residuals_of(evaluation), evaluation.reasons
 
     found = differences(simulate, unit, np.arange(len(unit)))
     failed = np.flatnonzero(~found.known)
     if len(failed):
         again = differences(simulate, unit, failed, at=found.outputs, step=STEP * SHORTER)
-        found = _replaced(found, failed, again)
+        found.known[failed] = again.known
+        for slopes, new in zip(found.slopes, again.slopes, strict=True):
+            slopes[..., failed] = new
     return Linearised(
         found.outputs,
         found.slopes,
         found.known,
-        float(base[0].fitness[0]),
-        float(base[0].distance[0]),
-        found.evaluations,
-        found.reasons,
+        float(evaluations[0].fitness[0]),
+        float(evaluations[0].distance[0]),
+        sum(len(evaluation.fitness) for evaluation in evaluations),
+        tuple(reason for evaluation in evaluations for reason in evaluation.reasons if reason),
     )
-
-
-def _replaced(first: Differences, columns: npt.NDArray[np.int64], again: Differences) -> Differences:
-    """``first`` with the ``columns`` that were differentiated again."""
-    known = first.known.copy()
-    known[columns] = again.known
-    for slopes, new in zip(first.slopes, again.slopes, strict=True):
-        slopes[..., columns] = new
-    reasons = (*first.reasons, *again.reasons)
-    return Differences(first.outputs, first.slopes, known, first.evaluations + again.evaluations, reasons)

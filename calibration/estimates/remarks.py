@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.records import Gene
-
-Array = npt.NDArray[np.float64]
+from wingfit.records.array_types import Array, Mask
 
 MEMBER = 0.3  # of the largest component of a direction: a gene with less has no part in it
 ALIKE = 0.25  # components that differ by less count as equal
@@ -15,7 +13,7 @@ HELPED = 0.5  # an error that knowing the others reduces to less than this part 
 ROUND_OFF = 1e-9  # of the largest variance, so that a covariance can be inverted
 
 
-def remarks(genes: list[Gene], relative: Array, known: npt.NDArray[np.bool_], largest: float) -> tuple[str, ...]:
+def remarks(genes: list[Gene], relative: Array, known: Mask, largest: float) -> tuple[str, ...]:
     """Name the genes whose relative standard error is larger than ``largest``.
 
     ``relative`` [F, F] is the covariance of relative changes. Its eigenvectors with large eigenvalues are the

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.calibration.estimates.linearised import Linearised, free_genes, linearise, stopped, unit_at
 from wingfit.calibration.estimates.remarks import remarks
@@ -22,9 +21,8 @@ from wingfit.inference.noise.between_beats import (
 from wingfit.inference.noise.coloured import Block, score_covariances
 from wingfit.inference.noise.white import Noise, whitened_sensitivity
 from wingfit.records import Gene, Genome, Recording
+from wingfit.records.array_types import Array, Mask
 from wingfit.records.blas_threads import one_blas_thread
-
-Array = npt.NDArray[np.float64]
 
 IDENTIFIABLE = 0.075  # relative standard error: a 95 % interval within 15 %
 PRIOR = 0.5  # standard deviation of the box as a prior, in unit coordinates: its half width
@@ -63,7 +61,7 @@ class Uncertainty:
     values: Array
     covariance: Array
     relative: Array
-    known: npt.NDArray[np.bool_]
+    known: Mask
     noise: tuple[Array, ...]
     cost: float
     remarks: tuple[str, ...]
@@ -116,6 +114,8 @@ def uncertainty(problem: Problem, evaluator: Evaluator) -> Uncertainty:
     per_value, per_cent = _slopes(genes, values)
     to_shares = _share_map(genes, problem.base) * per_cent
     relative = to_shares @ unit @ to_shares.T
+    (inside,) = np.nonzero(free)
+    own = remarks([genes[k] for k in inside], relative[np.ix_(inside, inside)], linear.known[inside], IDENTIFIABLE)
     return Uncertainty(
         free=problem.free,
         values=values,
@@ -124,7 +124,7 @@ def uncertainty(problem: Problem, evaluator: Evaluator) -> Uncertainty:
         known=linear.known,
         noise=tuple(n.covariance for n in noise),
         cost=float(sum(n.cost(v) for n, v in zip(noise, linear.residuals, strict=True))),
-        remarks=(*doubts, *_remarks(genes, relative, linear.known, free)),
+        remarks=(*doubts, *own),
     )
 
 
@@ -166,7 +166,7 @@ class _Part:
     record: Recording
     white: Array
     sensitivity: Array
-    seen: npt.NDArray[np.bool_]
+    seen: Mask
     scores: Array
     used: float
 
@@ -210,14 +210,6 @@ def _from_samples(parts: list[_Part], bread: Array) -> Array:
             larger = np.sqrt(np.maximum(beats / np.maximum(np.diag(meat), 1e-300), 1.0))
         total += meat * larger * larger[:, None]
     return total
-
-
-def _remarks(
-    genes: list[Gene], relative: Array, known: npt.NDArray[np.bool_], free: npt.NDArray[np.bool_]
-) -> tuple[str, ...]:
-    """Remarks on the genes that are not at a bound."""
-    (kept,) = np.nonzero(free)
-    return remarks([genes[k] for k in kept], relative[np.ix_(kept, kept)], known[kept], IDENTIFIABLE)
 
 
 def _slopes(genes: list[Gene], values: Array) -> tuple[Array, Array]:

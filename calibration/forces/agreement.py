@@ -10,7 +10,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy.interpolate import CubicSpline
 from scipy.signal import periodogram
 
@@ -20,10 +19,9 @@ from wingfit.calibration.forces.result import Agreement, ForceComparison, Quanti
 from wingfit.calibration.forces.split_beats import Cut, pieces
 from wingfit.calibration.problem import Problem
 from wingfit.records import Recording
+from wingfit.records.array_types import Array
 from wingfit.records.blas_threads import one_blas_thread
 from wingfit.sim.vehicle.lift_drag import lift_drag
-
-Array = npt.NDArray[np.float64]
 
 POINTS = 200  # of a mean beat
 SEGMENT_BEATS = 4  # per piece of a spectrum: the harmonics of the beat fall on every fourth line

@@ -7,12 +7,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.calibration.effects import absent, is_measured
 from wingfit.calibration.estimates.likelihood import STEP, at_bounds, iterate
 from wingfit.calibration.estimates.linearised import free_genes
-from wingfit.calibration.estimates.uncertainty import Uncertainty, uncertainty
+from wingfit.calibration.estimates.uncertainty import Standing, Uncertainty, uncertainty
 from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.forces.agreement import POINTS, agreements, comparison, quantities
 from wingfit.calibration.forces.global_model import at, average, fit_global
@@ -33,10 +32,9 @@ from wingfit.calibration.search import found as found_by_stage
 from wingfit.calibration.spec import CalibrationSpec, resolved, vehicle_model
 from wingfit.inference.noise.between_beats import FEWEST_MEAN, without_mean_beat
 from wingfit.records import Condition, Dataset, Genome, Recording
+from wingfit.records.array_types import Array, Mask
 from wingfit.records.blas_threads import one_blas_thread
 from wingfit.sim.vehicle.blade_element_wing import BladeElementWing
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -258,7 +256,7 @@ def _compare(
     return _Compared(recording, found, rms, int(fitted.sum()), _scatter(recording, fitted))
 
 
-def _scatter(recording: Recording, fitted: npt.NDArray[np.bool_]) -> float | None:
+def _scatter(recording: Recording, fitted: Mask) -> float | None:
     beats = len(Cut.of(recording).gapless)
     if beats < FEWEST_MEAN or not fitted.any():
         return None
@@ -336,20 +334,11 @@ def _genes(model: BladeElementWing, nominal: Genome, judged: list[_Judged], adeq
     results = []
     for gene in model.genes:
         standings = [one.known.standing[gene.name] for one in judged if gene.name in one.known.standing]
-        free = [0.0 < float(gene.to_unit(one.genome[gene.name])) < 1.0 for one in judged]
-        results.append(
-            GeneResult(
-                gene.name,
-                gene.unit,
-                gene.description,
-                nominal[gene.name],
-                best[gene.name],
-                gene.lower,
-                gene.upper,
-                bool(standings),
-                max(s.standard_error for s in standings) if standings else None,
-                adequate and all(s.identifiable for s in standings) and all(free) if standings else None,
-                max(s.absolute for s in standings) if standings else None,
-            )
-        )
+        inside = all(0.0 < float(gene.to_unit(one.genome[gene.name])) < 1.0 for one in judged)
+        worst = None
+        if standings:
+            identifiable = adequate and all(s.identifiable for s in standings) and inside
+            largest, absolute = max(s.standard_error for s in standings), max(s.absolute for s in standings)
+            worst = Standing(largest, identifiable, absolute)
+        results.append(GeneResult.of(gene, nominal[gene.name], best[gene.name], worst))
     return tuple(results)

@@ -11,15 +11,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy.optimize import brentq
 
 from wingfit.calibration.forces.result import GlobalGene, GlobalModel, LocalEstimate
 from wingfit.records import Condition
+from wingfit.records.array_types import Array, Mask
 from wingfit.records.blas_threads import one_blas_thread
 from wingfit.sim.atmosphere import density
-
-Array = npt.NDArray[np.float64]
 
 AFFINE = ("C_l", "C_F")
 FEWEST = 4  # conditions: three coefficients of the law, and one more to contradict it
@@ -35,12 +33,6 @@ class GlobalValues:
 
     values: dict[str, float]
     remarks: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class _Fit:
-    coefficients: Array
-    scatter: float | None
 
 
 @one_blas_thread
@@ -133,9 +125,9 @@ def _gene(name: str, estimates: Sequence[LocalEstimate], design: Array, weighted
     identified = np.isfinite(errors)
     if identified.sum() < design.shape[1]:  # not identified: keep the assumed value
         identified = np.ones_like(identified)
-    fit = _fit(design[identified], local[identified], errors[identified], weighted)
-    off = np.abs(design @ fit.coefficients - local) / _sizes(local)
-    constant, per_hz, per_rad = (*fit.coefficients.tolist(), 0.0, 0.0)[:3]
+    coefficients, scatter = _fit(design[identified], local[identified], errors[identified], weighted)
+    off = np.abs(design @ coefficients - local) / _sizes(local)
+    constant, per_hz, per_rad = (*coefficients.tolist(), 0.0, 0.0)[:3]
     left_out = [_left_out(int(k), design, local, errors, identified, weighted) for k in np.flatnonzero(identified)]
     seen = [error for error in left_out if error is not None]
     return GlobalGene(
@@ -143,18 +135,19 @@ def _gene(name: str, estimates: Sequence[LocalEstimate], design: Array, weighted
         constant,
         per_hz,
         per_rad,
-        fit.scatter,
+        scatter,
         float(off[identified].max()),
         max(seen) if len(seen) == len(left_out) else None,
     )
 
 
-def _fit(design: Array, local: Array, errors: Array, weighted: bool) -> _Fit:
+def _fit(design: Array, local: Array, errors: Array, weighted: bool) -> tuple[Array, float | None]:
+    """Coefficients of the law, and its scatter where that can be estimated."""
     conditions, coefficients = design.shape
     if not weighted or conditions - coefficients < FREE_FOR_SCATTER or not np.isfinite(errors).all():
-        return _Fit(_weighted(design, local, np.ones(conditions)), None)
+        return _weighted(design, local, np.ones(conditions)), None
     scatter2 = _scatter2(design, local, errors**2)
-    return _Fit(_weighted(design, local, errors**2 + scatter2), float(np.sqrt(scatter2)))
+    return _weighted(design, local, errors**2 + scatter2), float(np.sqrt(scatter2))
 
 
 def _weighted(design: Array, local: Array, variance: Array) -> Array:
@@ -178,15 +171,13 @@ def _scatter2(design: Array, local: Array, variance: Array) -> float:
     return float(brentq(surplus, 0.0, above, xtol=1e-12 * above))
 
 
-def _left_out(
-    k: int, design: Array, local: Array, errors: Array, identified: npt.NDArray[np.bool_], weighted: bool
-) -> float | None:
+def _left_out(k: int, design: Array, local: Array, errors: Array, identified: Mask, weighted: bool) -> float | None:
     """Relative error at condition ``k`` of the law fitted without it; None where the rest determines no law."""
     rest = identified.copy()
     rest[k] = False
     if rest.sum() < design.shape[1] or not _independent(design[rest]):
         return None
-    found = _fit(design[rest], local[rest], errors[rest], weighted).coefficients
+    found, _ = _fit(design[rest], local[rest], errors[rest], weighted)
     return float(abs(design[k] @ found - local[k]) / _sizes(local)[k])
 
 

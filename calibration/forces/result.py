@@ -10,14 +10,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-import numpy as np
-import numpy.typing as npt
-
 from wingfit.calibration.result import GeneResult
 from wingfit.records import Condition
+from wingfit.records.array_types import Array
 from wingfit.sim.atmosphere import density
 
-Array = npt.NDArray[np.float64]
 Source = Literal["nominal", "local", "joint", "global", "average"]
 Quantity = Literal["lift", "drag", "x", "z"]
 

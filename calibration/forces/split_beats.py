@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.records import Recording
-
-Array = npt.NDArray[np.float64]
+from wingfit.records.array_types import Array, Index
 
 EDGE = 1e-6  # beats by which a sample may miss the start of a beat and still be its first
 
@@ -43,13 +41,14 @@ class Cut:
         return cls(beat, gapless)
 
 
-def pieces(recording: Recording, beats: int) -> npt.NDArray[np.int64]:
+def pieces(recording: Recording, beats: int) -> Index:
     """Sample indices [pieces, length] of consecutive pieces of ``beats`` beats without gaps.
 
     Pieces are shorter if no stretch without gaps is that long, and [0, 0] if none holds a beat. A piece may begin at
     any phase, which does not change the spectrum of a periodic force.
     """
-    runs = _runs(np.flatnonzero(recording.valid.all(axis=1)))
+    rows = np.flatnonzero(recording.valid.all(axis=1))
+    runs = np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1)
     longest = max((len(run) for run in runs), default=0)
     step = float(np.median(np.diff(recording.times)))
     per_beat = 1.0 / (recording.condition.flap_frequency * step)
@@ -59,8 +58,3 @@ def pieces(recording: Recording, beats: int) -> npt.NDArray[np.int64]:
         return np.empty((0, 0), np.int64)
     found = [run[: len(run) // length * length].reshape(-1, length) for run in runs]
     return np.concatenate(found)
-
-
-def _runs(rows: npt.NDArray[np.int64]) -> list[npt.NDArray[np.int64]]:
-    """``rows`` [n], increasing, in runs without a step beyond one."""
-    return [run for run in np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1) if len(run)]

@@ -6,19 +6,15 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-import numpy.typing as npt
 
-from wingfit.calibration.estimates.linearised import unit_at
-from wingfit.calibration.evaluator import Evaluator
-from wingfit.calibration.problem import Problem, base_genome
+from wingfit.calibration.problem import base_genome
+from wingfit.diagnosis.evidence.context import FitContext
 from wingfit.diagnosis.evidence.fit import FIT_ERRORS, SLOW_FACTOR, Fit, gauss_newton_fit, small_gain
 from wingfit.diagnosis.evidence.refit import Refit
-from wingfit.diagnosis.evidence.screen import Trial, size_columns
+from wingfit.diagnosis.evidence.screen import Trial, size_columns, typical_units
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
-from wingfit.diagnosis.subject import Subject
 from wingfit.diagnosis.verdict.weigh_hypotheses import tolerated_excess
-
-Array = npt.NDArray[np.float64]
+from wingfit.records.array_types import Array, Float
 
 MAX_STEPS = 14  # of a fit
 FIRST_STEPS = 5  # of each fit, its start included, before only the best continue
@@ -30,7 +26,7 @@ class StartPoint:
     """The nominal model with the suspects of ``trials``, their genes at ``unit`` [E] in unit coordinates."""
 
     trials: tuple[Trial, ...]
-    unit: Array
+    unit: Float[Array, " E"]
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -44,8 +40,7 @@ def start_points(trial: Trial, others: Sequence[Trial] = (), refit: Refit | None
     It is combined with the suspects ``others`` of ``refit``, which keep their fitted genes.
     """
     suspect = trial.suspect
-    typical = unit_at(list(suspect.genes), np.array([suspect.typical[gene.name] for gene in suspect.genes]))
-    size = size_columns(suspect)
+    typical, size = typical_units(suspect), size_columns(suspect)
     own = trial.unit[0].copy()
     own[size] = typical[size]
     starts = [own, typical] if suspect.location_genes and not np.allclose(own, typical) else [own]
@@ -55,13 +50,7 @@ def start_points(trial: Trial, others: Sequence[Trial] = (), refit: Refit | None
 
 
 def fit_from_estimates(
-    subject: Subject,
-    data: WhitenedData,
-    evaluator: Evaluator,
-    initial: Fit,
-    starts: Sequence[StartPoint],
-    limit: float,
-    target: float = np.inf,
+    context: FitContext, initial: Fit, starts: Sequence[StartPoint], limit: float, target: float = np.inf
 ) -> Iterator[list[tuple[StartPoint, Fit]]]:
     """Fit all ``starts`` from the estimates, the genes of ``initial``; yields the rivals of the best after every step.
 
@@ -76,9 +65,9 @@ def fit_from_estimates(
 
     Yields nothing where none can be simulated.
     """
-    fits = _CompetingFits(data, limit, target)
+    fits = _CompetingFits(context.data, limit, target)
     for start in starts:
-        fits.add(start, _from_estimates(subject, data, evaluator, initial, start))
+        fits.add(start, _from_estimates(context, initial, start))
         yield from fits.run(FIRST_STEPS)
     yield from fits.run(MAX_STEPS + 1)  # the last is where it ended, with its slopes
 
@@ -162,12 +151,10 @@ class _CompetingFit:
         return True
 
 
-def _from_estimates(
-    subject: Subject, data: WhitenedData, evaluator: Evaluator, initial: Fit, start: StartPoint
-) -> Iterator[Fit]:
+def _from_estimates(context: FitContext, initial: Fit, start: StartPoint) -> Iterator[Fit]:
     """Fits of the nominal model with the suspects of ``start``; InitialSimulationError where it cannot be simulated."""
     suspects = [trial.suspect for trial in start.trials]
-    model = subject.extended([suspect.name for suspect in suspects])
+    model = context.subject.extended([suspect.name for suspect in suspects])
     free = (*initial.problem.free, *(gene.name for suspect in suspects for gene in suspect.genes))
-    problem = Problem(model, data.recordings, free, base_genome(model, initial.problem.base.as_dict()), data.axes)
-    return gauss_newton_fit(subject, data, problem, evaluator, np.concatenate([initial.unit, start.unit]), MAX_STEPS)
+    problem = context.problem(model, free, base_genome(model, initial.problem.base.as_dict()))
+    return gauss_newton_fit(context, problem, np.concatenate([initial.unit, start.unit]), MAX_STEPS)

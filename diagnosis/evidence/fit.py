@@ -9,20 +9,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.calibration.estimates.linearised import free_genes, values_at
-from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.problem import Problem
+from wingfit.diagnosis.evidence.context import FitContext
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
-from wingfit.diagnosis.subject import Subject
 from wingfit.inference.differences import Outputs, differences
 from wingfit.inference.gauss_newton import Quadratic, Trials
-
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
+from wingfit.records.array_types import Array, Bool, Float, Mask
 
 PRIOR_SD = 0.5  # standard deviation of a gene's prior, unit coordinates
 # Dampings tried at once, a group of lanes. Relative to each gene's own curvature (Marquardt 1963), about the last good
@@ -65,32 +62,39 @@ class Fit:
     """
 
     problem: Problem
-    unit: Array
-    coefficients: Array
-    jacobian: Array
+    unit: Float[Array, " F"]
+    coefficients: Float[Array, " D"]
+    jacobian: Float[Array, "D F"]
     residuals: tuple[Array, ...]
     cost: float
-    motion_genes: Array
+    motion_genes: Float[Array, " F"]
     damping: float = FIRST_DAMPING
     jacobian_measured: bool = False
     converged: bool = False
 
     @property
+    def individual(self) -> Float[Array, "1 F"]:
+        """Values [1, F] of the free genes, a batch of one individual."""
+        return values_at(free_genes(self.problem), self.unit[None])
+
+    @property
     def values(self) -> dict[str, float]:
         """Values of the free genes by name."""
-        found = values_at(free_genes(self.problem), self.unit[None])[0]
-        return dict(zip(self.problem.free, found.tolist(), strict=True))
+        return dict(zip(self.problem.free, self.individual[0].tolist(), strict=True))
+
+    @property
+    def genome(self) -> Float[Array, " G"]:
+        """Values [G] of all genes of the model."""
+        return np.asarray(self.problem.genomes(self.individual)[0])
 
 
 def broyden_fit(
-    subject: Subject,
-    data: WhitenedData,
+    context: FitContext,
     problem: Problem,
-    evaluator: Evaluator,
-    start: Array,
-    jacobian: Array | None = None,
+    start: Float[Array, " F"],
+    jacobian: Float[Array, "D F"] | None = None,
     *,
-    known: Flags | None = None,
+    known: Bool[Mask, " F"] | None = None,
     steps: int = 8,
 ) -> Fit:
     """Fit the free genes from ``start`` [F] with Broyden updates; InitialSimulationError where it cannot be simulated.
@@ -98,7 +102,7 @@ def broyden_fit(
     ``jacobian`` [D, F] is used in the columns ``known`` [F]; the others are measured first, and again where a step
     gains much less than predicted. If that does not help, all columns are measured, once.
     """
-    simulator = _Simulator(subject, data, problem, evaluator)
+    simulator = _Simulator(context, problem)
     first = _initial_fit(simulator, start)
     columns = np.zeros(len(start), bool) if known is None or jacobian is None else known
     own = np.zeros((len(first.coefficients), len(start))) if jacobian is None else jacobian
@@ -114,7 +118,7 @@ def broyden_fit(
                 return replace(now, converged=now.jacobian_measured)
             now = _measure_columns(simulator, now, pending.pop())
             continue
-        ends, now = _converges(data, now, better, gain), better
+        ends, now = _converges(context.data, now, better, gain), better
         if ends:
             return replace(now, converged=True)
         if gain < GOOD_STEP_RATIO and pending:
@@ -122,36 +126,34 @@ def broyden_fit(
     return now
 
 
-def gauss_newton_fit(
-    subject: Subject, data: WhitenedData, problem: Problem, evaluator: Evaluator, start: Array, steps: int
-) -> Iterator[Fit]:
+def gauss_newton_fit(context: FitContext, problem: Problem, start: Float[Array, " F"], steps: int) -> Iterator[Fit]:
     """Fit with the Jacobian measured at every step and at the end; yields every step, the final fit last.
 
     Differences are one-sided until steps gain little. Then they are central, and steps include geodesic acceleration
     (Transtrum and Sethna 2012, Sec. 3), which follows a curved valley.
     """
-    simulator, every, accelerated = _Simulator(subject, data, problem, evaluator), np.ones(len(start), bool), False
+    simulator, every, accelerated = _Simulator(context, problem), np.ones(len(start), bool), False
     now = _measure_columns(simulator, _initial_fit(simulator, start), every, 1)
     for _ in range(steps):
         yield now
         better, gain = _step(simulator, now, accelerated=accelerated)
-        ends = better is None or _converges(data, now, better, 1.0 if accelerated else gain)
+        ends = better is None or _converges(context.data, now, better, 1.0 if accelerated else gain)
         if ends and accelerated:
             yield replace(_measure_columns(simulator, better, every) if better else now, converged=True)
             return
-        accelerated = accelerated or better is None or small_gain(data, now, better, SLOW_FACTOR)
+        accelerated = accelerated or better is None or small_gain(context.data, now, better, SLOW_FACTOR)
         now = _measure_columns(simulator, better or now, every, 2 if accelerated else 1)
     yield now if accelerated else _measure_columns(simulator, now, every)
 
 
-def with_measured_jacobian(subject: Subject, data: WhitenedData, evaluator: Evaluator, fit: Fit) -> Fit:
+def with_measured_jacobian(context: FitContext, fit: Fit) -> Fit:
     """``fit`` with all columns of its Jacobian measured.
 
     Broyden-updated columns are good enough for stepping, but not for confidence intervals.
     """
     if fit.jacobian_measured:
         return fit
-    return _measure_columns(_Simulator(subject, data, fit.problem, evaluator), fit, np.ones(len(fit.unit), bool))
+    return _measure_columns(_Simulator(context, fit.problem), fit, np.ones(len(fit.unit), bool))
 
 
 def _converges(data: WhitenedData, before: Fit, after: Fit, gain: float) -> bool:
@@ -173,46 +175,42 @@ def _cost(data: WhitenedData, coefficients: Array, unit: Array) -> Array:
 class _Simulator:
     """Simulates individuals of a fit's problem."""
 
-    subject: Subject
-    data: WhitenedData
+    context: FitContext
     problem: Problem
-    evaluator: Evaluator
 
     def at(self, units: Array, motion_genes: Array) -> tuple[Array, tuple[str | None, ...], list[Array]]:
         """Evaluate ``units`` [B, F], starting from the motion of ``motion_genes`` [F]; as WhitenedData.evaluate."""
         problem, genes = self.problem, free_genes(self.problem)
         genome = problem.genomes(values_at(genes, motion_genes[None]))[0]
-        model = self.subject.with_initial_motion(problem.model, genome)
-        here = Problem(model, problem.recordings, problem.free, problem.base, problem.axes)
-        return self.data.evaluate(here, self.evaluator, values_at(genes, units))
+        model = self.context.subject.with_initial_motion(problem.model, genome)
+        return self.context.evaluate(replace(problem, model=model), values_at(genes, units))
+
+    def outputs(self, motion_genes: Array, units: Array) -> tuple[Outputs, tuple[str | None, ...]]:
+        """Coefficients as the only output, and the reasons of failures, for :func:`differences`."""
+        found, reasons, _ = self.at(units, motion_genes)
+        return [found], reasons
 
 
 def _initial_fit(simulator: _Simulator, unit: Array) -> Fit:
     found, reasons, residuals = simulator.at(unit[None], unit)
     if reasons[0] is not None:
-        values = values_at(free_genes(simulator.problem), unit[None])[0]
-        values_text = ", ".join(
-            f"{name} = {value:.4g}" for name, value in zip(simulator.problem.free, values, strict=True)
-        )
+        values = zip(free_genes(simulator.problem), unit, strict=True)
+        values_text = ", ".join(f"{gene.name} = {float(gene.from_unit(one)):.4g}" for gene, one in values)
         raise InitialSimulationError(
             f"the model cannot be simulated at the start of the fit ({values_text}): {reasons[0]}; "
             "start from other genes, or check the rig's estimates"
         )
-    cost = float(_cost(simulator.data, found[0], unit))
+    cost = float(_cost(simulator.context.data, found[0], unit))
     none = np.zeros((found.shape[1], len(unit)))
     return Fit(simulator.problem, unit, found[0], none, tuple(r[0] for r in residuals), cost, unit)
 
 
-def _measure_columns(simulator: _Simulator, fit: Fit, which: Flags, sides: int = 2) -> Fit:
+def _measure_columns(simulator: _Simulator, fit: Fit, which: Mask, sides: int = 2) -> Fit:
     """``fit`` with the columns ``which`` of its Jacobian measured by one-sided or central differences in the box."""
     (columns,) = np.nonzero(which)
     if not len(columns):
         return fit
-
-    def simulate(units: Array) -> tuple[Outputs, tuple[str | None, ...]]:
-        found, reasons, _ = simulator.at(units, fit.motion_genes)
-        return [found], reasons
-
+    simulate = partial(simulator.outputs, fit.motion_genes)
     found = differences(simulate, fit.unit, columns, at=[fit.coefficients], sides=sides)
     jacobian = fit.jacobian.copy()
     jacobian[:, columns] = found.slopes[0]
@@ -224,7 +222,8 @@ def _step(simulator: _Simulator, fit: Fit, *, accelerated: bool = False) -> tupl
 
     ``accelerated``: try steps with geodesic acceleration as well. (None, 0) where no step decreases the cost.
     """
-    damped = _DampedSteps(simulator.data, fit)
+    data = simulator.context.data
+    damped = _DampedSteps(data, fit)
     moves = np.array([damped.move(d) for d in damped.dampings])
     accelerations = np.zeros((len(moves), len(fit.coefficients)))
     if accelerated:
@@ -232,12 +231,12 @@ def _step(simulator: _Simulator, fit: Fit, *, accelerated: bool = False) -> tupl
         moves = np.concatenate([moves, [damped.move(*pair) for pair in zip(damped.dampings[::2], added, strict=True)]])
         accelerations = np.concatenate([accelerations, added])
     units = np.clip(fit.unit + moves, 0.0, 1.0)
-    predicted = fit.cost - _cost(simulator.data, fit.coefficients + moves @ fit.jacobian.T + accelerations, units)
+    predicted = fit.cost - _cost(data, fit.coefficients + moves @ fit.jacobian.T + accelerations, units)
     if predicted.max() <= 1e-9 * fit.cost:
         return None, 0.0
     found, reasons, residuals = simulator.at(units, fit.motion_genes)
     bad = np.array([reason is not None for reason in reasons])
-    after = _cost(simulator.data, np.where(bad[:, None], FAILED_COEFFICIENT, found), units)
+    after = _cost(data, np.where(bad[:, None], FAILED_COEFFICIENT, found), units)
     trials = Trials.of(units, predicted, fit.cost, after, reasons)
     k = trials.best()
     if k is None:

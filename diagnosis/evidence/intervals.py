@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
-import numpy.typing as npt
 from scipy.stats import t as student
 
 from wingfit.calibration.estimates.linearised import free_genes
 from wingfit.diagnosis.evidence.fit import PRIOR_SD, Fit
+from wingfit.diagnosis.evidence.refit import Refit
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.finding import GeneValue, Interval
-
-Array = npt.NDArray[np.float64]
+from wingfit.records.array_types import Array, Float
 
 CONFIDENCE = 0.9
 
@@ -23,19 +20,16 @@ def standard_errors(freedom: float = np.inf) -> float:
     return float(student.ppf(0.5 + CONFIDENCE / 2, freedom))
 
 
-def covariance(data: WhitenedData, fit: Fit) -> Array:
+def covariance(data: WhitenedData, fit: Fit) -> Float[Array, "F F"]:
     """Covariance [F, F] of the genes in unit coordinates.
 
     It includes noise; the model error as a few independent samples (:meth:`WhitenedData.likelihood_weight`), no smaller
     than the tolerance; and the prior. For forces it adds the scatter of the recordings' scores (a sandwich with
-    recordings
-    as clusters: Liang and Zeger 1986).
+    recordings as clusters: Liang and Zeger 1986).
     """
     white, slopes = fit.coefficients / data.scale, fit.jacobian / data.scale[:, None]
-    weight, recordings = (
-        min(data.likelihood_weight(fit.coefficients), data.max_likelihood_weight),
-        len(data.recordings),
-    )
+    weight, recordings = data.likelihood_weight(fit.coefficients), len(data.recordings)
+    weight = min(weight, data.max_likelihood_weight)
     prior = np.eye(len(fit.unit)) / PRIOR_SD**2
     meat = weight * slopes.T @ slopes + prior
     bread = np.linalg.inv(meat)
@@ -51,12 +45,12 @@ def _clustered(data: WhitenedData) -> bool:
     return any(recording.kind == "forces" for recording in data.recordings)
 
 
-def gene_values(data: WhitenedData, fit: Fit, sizes: Mapping[str, float] | None = None) -> tuple[GeneValue, ...]:
-    """Values and 90 % intervals of the free genes; ``sizes`` maps size genes to the value that is off."""
-    errors = np.sqrt(np.diag(covariance(data, fit)))
+def gene_values(data: WhitenedData, refit: Refit) -> tuple[GeneValue, ...]:
+    """Values and 90 % intervals of all free genes; a size of zero switches its suspect off."""
+    fit, errors = refit.fit, np.sqrt(np.diag(covariance(data, refit.fit)))
     freedom = max(len(data.recordings) - 1, 1) if _clustered(data) else np.inf
     wide = standard_errors(freedom)
-    off = sizes or {}
+    off = {name: 0.0 for trial in refit.trials for name in trial.suspect.size_genes}
     found = []
     for gene, unit, error in zip(free_genes(fit.problem), fit.unit, errors, strict=True):
         low, high = unit - wide * error, unit + wide * error

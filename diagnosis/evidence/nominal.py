@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.calibration.estimates.linearised import free_genes, unit_at
-from wingfit.calibration.evaluator import Evaluator
-from wingfit.calibration.problem import Problem, base_genome
+from wingfit.calibration.problem import base_genome
+from wingfit.diagnosis.evidence.context import FitContext
 from wingfit.diagnosis.evidence.fit import Fit, gauss_newton_fit
 from wingfit.diagnosis.evidence.refit import Refit, fit_to_convergence, make_refit, refit_at
 from wingfit.diagnosis.evidence.screen import Nuisance
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.subject import Subject
-
-Array = npt.NDArray[np.float64]
 
 NOMINAL_STEPS = 20
 MAX_REFINEMENTS = 3  # successive finer discretisations
@@ -45,48 +42,42 @@ class Nominal:
     tried_finer: str = ""
 
 
-def fit_nominal(
-    subject: Subject,
-    data: WhitenedData,
-    evaluator: Evaluator,
-    free: tuple[str, ...],
-    values: Mapping[str, float],
-    fixed: Mapping[str, float],
-) -> Iterator[Fit]:
-    """Fit the ``free`` genes from ``values``; yields every step. ValueError where that cannot be simulated."""
-    base = base_genome(subject.model, {**values, **fixed})
-    problem = Problem(subject.model, data.recordings, free, base, data.axes)
-    genes = free_genes(problem)
-    start = unit_at(genes, np.array([base[gene.name] for gene in genes]))
-    return gauss_newton_fit(subject, data, problem, evaluator, start, NOMINAL_STEPS)
+def fit_nominal(context: FitContext, free: tuple[str, ...], values: Mapping[str, float]) -> Iterator[Fit]:
+    """Fit the genes ``free``, all genes at ``values`` first; yields every step.
+
+    ValueError where the model cannot be simulated at ``values``.
+    """
+    model = context.subject.model
+    base = base_genome(model, values)
+    problem = context.problem(model, free, base)
+    start = unit_at(free_genes(problem), np.array([base[name] for name in free]))
+    return gauss_newton_fit(context, problem, start, NOMINAL_STEPS)
 
 
-def choose_discretisation(
-    subject: Subject, data: WhitenedData, evaluator: Evaluator, fit: Fit, *, refine: bool
-) -> Nominal:
+def choose_discretisation(context: FitContext, fit: Fit, *, refine: bool) -> Nominal:
     """Take finer discretisations while these fit much better; return the last one with its discretisation error."""
-    current, remarks = make_refit(data, fit), list[str]()
+    data, current, remarks = context.data, make_refit(context.data, fit), list[str]()
     for _ in range(MAX_REFINEMENTS):
         error, finest, ineffective, better = 0.0, "", "", None
-        for finer in subject.finer_subjects():
-            changes, gain = finer_change(finer, data, evaluator, current)
+        for finer in context.finer():
+            changes, gain = finer_change(finer, current)
             if changes <= error:
                 continue
-            error, finest, ineffective = changes, finer.description, ""
+            error, finest, ineffective = changes, finer.subject.description, ""
             if refine and finer_is_promising(data, changes, gain, current):
-                found = refit_at(finer, data, evaluator, current)
-                ineffective = finer.description if found else ""
+                found = refit_at(finer, current)
+                ineffective = finest if found else ""
                 if found and improves(data, found, current):
-                    better = fit_to_convergence(finer, data, evaluator, found)
+                    better = fit_to_convergence(finer, found)
                     break
         if better is None:
-            return Nominal(subject, current, error if finest else None, finest, tuple(remarks), ineffective)
+            return Nominal(context.subject, current, error if finest else None, finest, tuple(remarks), ineffective)
         remarks.append(
-            f"the discretisation limits the model: {finest} replaces {subject.description} and reduces the excess "
-            f"misfit to {_percent(better.excess, current.excess)}"
+            f"the discretisation limits the model: {finest} replaces {context.subject.description} and reduces the "
+            f"excess misfit to {100 * max(better.excess, 0.0) / current.excess:.0f} %"
         )
-        subject, current = finer, better
-    return Nominal(subject, current, None, "", tuple(remarks))
+        context, current = finer, better
+    return Nominal(context.subject, current, None, "", tuple(remarks))
 
 
 def finer_is_promising(data: WhitenedData, changes: float, gain: float, current: Refit) -> bool:
@@ -100,15 +91,14 @@ def finer_is_promising(data: WhitenedData, changes: float, gain: float, current:
     return matters and (gain > policy.finer_predicted_gain or changes**2 >= current.excess)
 
 
-def finer_change(finer: Subject, data: WhitenedData, evaluator: Evaluator, refit: Refit) -> tuple[float, float]:
+def finer_change(finer: FitContext, refit: Refit) -> tuple[float, float]:
     """Change by a finer model that the genes cannot compensate (root mean square, m or N), and the gain.
 
     The gain is the fraction of the excess that the change removes by the linearised model; zeros where the simulation
     fails.
     """
-    fit = refit.fit
-    problem = Problem(finer.extended(refit.names), data.recordings, fit.problem.free, fit.problem.base, data.axes)
-    found, reasons, _ = data.evaluate(problem, evaluator, np.array([list(fit.values.values())]))
+    fit, data = refit.fit, finer.data
+    found, reasons, _ = finer.evaluate(replace(fit.problem, model=finer.subject.extended(refit.names)), fit.individual)
     if reasons[0] is not None:
         return 0.0, 0.0
     nuisance = Nuisance(data, fit)
@@ -123,7 +113,3 @@ def finer_change(finer: Subject, data: WhitenedData, evaluator: Evaluator, refit
 def improves(data: WhitenedData, finer: Refit, coarse: Refit) -> bool:
     """Whether ``finer`` removes so much of the excess of ``coarse`` that it is worth its cost."""
     return finer.excess < (1.0 - data.policy.finer_gain) * coarse.excess and coarse.excess > 0.0
-
-
-def _percent(part: float, whole: float) -> str:
-    return f"{100 * max(part, 0.0) / whole:.0f} %"

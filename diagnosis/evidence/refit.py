@@ -7,11 +7,10 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.calibration.estimates.linearised import free_genes, values_at
-from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.problem import Problem, base_genome
+from wingfit.diagnosis.evidence.context import FitContext
 from wingfit.diagnosis.evidence.fit import (
     FIT_ERRORS,
     PRIOR_SD,
@@ -22,10 +21,8 @@ from wingfit.diagnosis.evidence.fit import (
 )
 from wingfit.diagnosis.evidence.screen import Nuisance, Trial, off_units, size_columns
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
-from wingfit.diagnosis.subject import Subject
 from wingfit.inference.score_test import explained
-
-Array = npt.NDArray[np.float64]
+from wingfit.records.array_types import Array, Float, Mask
 
 REFIT_STEPS = 6  # of a refit
 CONTINUED_STEPS = 10  # of a refit that is continued
@@ -94,120 +91,89 @@ def cross_validated_excess(data: WhitenedData, fit: Fit) -> float | None:
     return total
 
 
-def refit_with(
-    subject: Subject,
-    data: WhitenedData,
-    nominal: Fit,
-    evaluator: Evaluator,
-    trials: Sequence[Trial],
-    base: Fit | None = None,
-) -> Refit | None:
+def refit_with(context: FitContext, nominal: Fit, trials: Sequence[Trial], base: Fit | None = None) -> Refit | None:
     """Fit the nominal model with the suspects of ``trials``, each from its trial's location and size.
 
     ``base`` is a fit that contains all but the last of them. None where no start can be simulated.
     """
-    before = base or nominal
-    model = subject.extended([trial.suspect.name for trial in trials])
+    before, data = base or nominal, context.data
+    model = context.subject.extended([trial.suspect.name for trial in trials])
     added = [trials[-1]] if base else list(trials)
     genes = [(gene.name, trial) for trial in added for gene in trial.suspect.genes]
     values = nominal.problem.base.replace(nominal.values).as_dict() | before.values
     free = (*before.problem.free, *(name for name, _ in genes))
-    problem = Problem(model, data.recordings, free, base_genome(model, values), data.axes)
+    problem = context.problem(model, free, base_genome(model, values))
     for part in 0.5 ** np.arange(MAX_HALVINGS):
         start = np.concatenate([before.unit, *(_scaled_start(trial, part) for trial in added)])
         try:
-            fit = _fit_added_genes(subject, data, problem, evaluator, start, before)
+            fit = _fit_added_genes(context, problem, start, before.jacobian)
         except FIT_ERRORS:
             continue
         sizes = np.array([True] * len(before.unit) + [gene in trial.suspect.size_genes for gene, trial in genes])
         diverged = data.chi_squared(fit.coefficients) > data.policy.diverged * trials[0].remaining_chi_squared
         if len(trials) == 1 and diverged and not sizes.all():
             with suppress(*FIT_ERRORS):
-                first = _fit_subset(subject, data, problem, evaluator, start, before, sizes)
-                first = _fit_added_genes(subject, data, problem, evaluator, first.unit, first)
+                first = _fit_added_genes(context, problem, *_fit_subset(context, problem, start, before, sizes))
                 fit = min((fit, first), key=lambda one: one.cost)
         return make_refit(data, fit, trials)
     return None
 
 
-def _fit_added_genes(
-    subject: Subject, data: WhitenedData, problem: Problem, evaluator: Evaluator, start: Array, before: Fit
-) -> Fit:
-    """Fit all genes of ``problem``; the first columns of the Jacobian are those of ``before``."""
-    known = np.arange(len(start)) < before.jacobian.shape[1]
-    jacobian = np.zeros((len(before.jacobian), len(start)))
-    jacobian[:, known] = before.jacobian[:, : known.sum()]
-    return broyden_fit(subject, data, problem, evaluator, start, jacobian, known=known, steps=REFIT_STEPS)
+def _fit_added_genes(context: FitContext, problem: Problem, start: Array, first_columns: Array) -> Fit:
+    """Fit all genes of ``problem`` from ``start`` [F]; ``first_columns`` [D, K] of the Jacobian are known."""
+    known = np.arange(len(start)) < first_columns.shape[1]
+    jacobian = np.zeros((len(first_columns), len(start)))
+    jacobian[:, known] = first_columns[:, : known.sum()]
+    return broyden_fit(context, problem, start, jacobian, known=known, steps=REFIT_STEPS)
 
 
-def _fit_subset(
-    subject: Subject,
-    data: WhitenedData,
-    problem: Problem,
-    evaluator: Evaluator,
-    start: Array,
-    before: Fit,
-    which: npt.NDArray[np.bool_],
-) -> Fit:
-    """Fit the genes ``which`` [F] of ``problem`` only; the others stay at ``start``, with zero slopes.
+def _fit_subset(context: FitContext, problem: Problem, start: Array, before: Fit, which: Mask) -> tuple[Array, Array]:
+    """Fit the genes ``which`` [F] of ``problem`` only, because shape genes that move before the size may diverge.
 
-    Shape genes that move before the size is known may diverge.
+    Returns all genes [F], the others at ``start``, and the columns of the Jacobian that ``before`` has, [D, K].
     """
     genes = free_genes(problem)
     base = problem.base.replace(dict(zip(problem.free, values_at(genes, start[None])[0].tolist(), strict=True)))
     free = tuple(name for name, one in zip(problem.free, which, strict=True) if one)
-    part = Problem(problem.model, problem.recordings, free, base, problem.axes)
-    found = _fit_added_genes(subject, data, part, evaluator, start[which], before)
+    found = _fit_added_genes(context, replace(problem, free=free, base=base), start[which], before.jacobian)
     unit, jacobian = start.copy(), np.zeros((len(found.coefficients), len(start)))
     unit[which], jacobian[:, which] = found.unit, found.jacobian
-    return replace(found, problem=problem, unit=unit, jacobian=jacobian[:, : len(before.unit)])
+    return unit, jacobian[:, : len(before.unit)]
 
 
-def refit_at(subject: Subject, data: WhitenedData, evaluator: Evaluator, refit: Refit) -> Refit | None:
-    """``refit`` fitted with the model of ``subject`` from its current genes; None where that cannot be simulated."""
-    before = refit.fit
-    model = subject.extended(refit.names)
-    problem = Problem(model, data.recordings, before.problem.free, before.problem.base, data.axes)
-    known = np.ones(len(before.unit), bool)
+def refit_at(context: FitContext, refit: Refit, start: Float[Array, " F"] | None = None) -> Refit | None:
+    """``refit`` fitted with the model of ``context`` from its current genes, or anew from ``start`` [F].
+
+    None where that cannot be simulated.
+    """
+    before, problem = refit.fit, replace(refit.fit.problem, model=context.subject.extended(refit.names))
+    genes, known_columns = (before.unit, before.jacobian) if start is None else (start, before.jacobian[:, :0])
     try:
-        fit = broyden_fit(
-            subject, data, problem, evaluator, before.unit, before.jacobian, known=known, steps=REFIT_STEPS
-        )
+        fit = _fit_added_genes(context, problem, genes, known_columns)
     except FIT_ERRORS:
         return None
-    return make_refit(data, fit, refit.trials)
+    return make_refit(context.data, fit, refit.trials)
 
 
-def continue_fit(
-    subject: Subject, data: WhitenedData, evaluator: Evaluator, refit: Refit, steps: int = CONTINUED_STEPS
-) -> Refit:
+def continue_fit(context: FitContext, refit: Refit, steps: int = CONTINUED_STEPS) -> Refit:
     """``refit`` fitted further with the Jacobian measured at every step; unchanged where that cannot be simulated.
 
     An individual that was reached from a nearby motion may flutter when it is simulated from rest.
     """
     fit = refit.fit
     try:
-        for better in gauss_newton_fit(subject, data, fit.problem, evaluator, fit.unit, steps):
+        for better in gauss_newton_fit(context, fit.problem, fit.unit, steps):
             fit = better
     except FIT_ERRORS:
         return refit
-    return make_refit(data, fit, refit.trials)
+    return make_refit(context.data, fit, refit.trials)
 
 
-def fit_to_convergence(subject: Subject, data: WhitenedData, evaluator: Evaluator, refit: Refit) -> Refit:
+def fit_to_convergence(context: FitContext, refit: Refit) -> Refit:
     """``refit`` fitted until it converges, with a measured Jacobian; score tests need that."""
     if not refit.fit.converged:
-        refit = continue_fit(subject, data, evaluator, refit)
-    return make_refit(data, with_measured_jacobian(subject, data, evaluator, refit.fit), refit.trials)
-
-
-def restart_fit(subject: Subject, data: WhitenedData, evaluator: Evaluator, refit: Refit, start: Array) -> Refit | None:
-    """``refit`` fitted from other genes ``start`` [F]; None where these cannot be simulated."""
-    try:
-        fit = broyden_fit(subject, data, refit.fit.problem, evaluator, start, steps=REFIT_STEPS)
-    except FIT_ERRORS:
-        return None
-    return make_refit(data, fit, refit.trials)
+        refit = continue_fit(context, refit)
+    return make_refit(context.data, with_measured_jacobian(context, refit.fit), refit.trials)
 
 
 def strongest_trials(data: WhitenedData, found: Sequence[list[Trial]], limit: int) -> list[Trial]:
@@ -225,7 +191,7 @@ def partner_trials(data: WhitenedData, base: Refit, found: Sequence[list[Trial]]
     return [trial for gain, trial in _by_explained(nuisance, residual, found, base.names) if gain > least_gain]
 
 
-def contribution(data: WhitenedData, evaluator: Evaluator, refit: Refit, trials: Sequence[Trial] = ()) -> Array | None:
+def contribution(context: FitContext, refit: Refit, trials: Sequence[Trial] = ()) -> Float[Array, " D"] | None:
     """Change of the coefficients [D] when the suspects of ``trials`` (all by default) are switched off.
 
     All other genes stay the same. None where that cannot be simulated.
@@ -233,22 +199,24 @@ def contribution(data: WhitenedData, evaluator: Evaluator, refit: Refit, trials:
     fit, off = refit.fit, dict(refit.fit.values)
     for trial in trials or refit.trials:
         off |= {gene.name: gene.nominal for gene in trial.suspect.genes if gene.name in trial.suspect.size_genes}
-    found, reasons, _ = data.evaluate(fit.problem, evaluator, np.array([list(off.values())]))
+    found, reasons, _ = context.evaluate(fit.problem, np.array([list(off.values())]))
     return None if reasons[0] else np.asarray(found[0] - fit.coefficients)
 
 
 def substitute_trials(
-    data: WhitenedData, evaluator: Evaluator, refit: Refit, trial: Trial, found: Sequence[list[Trial]], limit: int
+    context: FitContext, refit: Refit, trial: Trial, found: Sequence[list[Trial]], limit: int
 ) -> list[Trial]:
     """Trials of other suspects that can reproduce most of the contribution of ``trial`` to ``refit``, best first."""
-    change = contribution(data, evaluator, refit, [trial])
+    change = contribution(context, refit, [trial])
     if change is None:
         return []
     own = {gene.name for gene in trial.suspect.genes}
     kept = np.array([name not in own for name in refit.fit.problem.free])
-    nuisance = Nuisance(data, replace(refit.fit, unit=refit.fit.unit[kept], jacobian=refit.fit.jacobian[:, kept]))
+    fit = refit.fit
+    others = replace(fit, unit=fit.unit[kept], jacobian=fit.jacobian[:, kept], motion_genes=fit.motion_genes[kept])
+    nuisance = Nuisance(context.data, others)
     done = nuisance.project_out(change)
-    least_gain = data.policy.substitute * float(done @ done)
+    least_gain = context.data.policy.substitute * float(done @ done)
     return [one for gain, one in _by_explained(nuisance, done, found, refit.names)[:limit] if gain > least_gain]
 
 

@@ -11,18 +11,16 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.calibration.estimates.linearised import free_genes, unit_at, values_at
-from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.problem import Problem, base_genome
+from wingfit.diagnosis.evidence.context import FitContext
 from wingfit.diagnosis.evidence.fit import PRIOR_SD, Fit
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
-from wingfit.diagnosis.subject import Subject, Suspect
+from wingfit.diagnosis.subject import Suspect
 from wingfit.inference import score_test
 from wingfit.inference.score_test import amounts, remaining, spread
-
-Array = npt.NDArray[np.float64]
+from wingfit.records.array_types import Array, Float
 
 LOCATION_SAMPLES = 15  # besides the typical location: two groups of lanes
 SHAPE_SAMPLES = 7  # for a suspect with other shape genes
@@ -44,15 +42,15 @@ class Trial:
     """
 
     suspect: Suspect
-    unit: Array
-    changes: Array
+    unit: Float[Array, "S E"]
+    changes: Float[Array, "S D"]
     gain: float
-    multiples: Array
+    multiples: Float[Array, " S"]
     freedom: int
     remaining_chi_squared: float
 
     @property
-    def start(self) -> Array:
+    def start(self) -> Float[Array, " E"]:
         """Genes [E] of the suspect in unit coordinates, at the fitted sizes."""
         off = off_units(self.suspect)
         size = size_columns(self.suspect)
@@ -75,7 +73,7 @@ class Nuisance:
         self.genes = score_test.Nuisance.of(np.vstack([slopes, weight * np.eye(slopes.shape[1])]))
         self.residual = self.genes.rest(np.concatenate([fit.coefficients / data.scale, weight * (fit.unit - 0.5)]))
 
-    def project_out(self, changes: Array) -> Array:
+    def project_out(self, changes: Float[Array, "*B D"]) -> Float[Array, "*B N"]:
         """Whitened ``changes`` [..., D] of harmonic coefficients, minus the part that the F nominal genes can explain.
 
         The result [..., D + F] has an entry for the prior of each gene.
@@ -83,9 +81,14 @@ class Nuisance:
         return self.genes.rest(changes / self.scale)
 
 
-def off_units(suspect: Suspect) -> Array:
+def off_units(suspect: Suspect) -> Float[Array, " E"]:
     """Genes [E] in unit coordinates with the suspect switched off."""
     return unit_at(list(suspect.genes), np.array([gene.nominal for gene in suspect.genes]))
+
+
+def typical_units(suspect: Suspect) -> Float[Array, " E"]:
+    """Genes [E] in unit coordinates with the suspect at its typical size and location."""
+    return unit_at(list(suspect.genes), np.array([suspect.typical[gene.name] for gene in suspect.genes]))
 
 
 def size_columns(suspect: Suspect) -> list[int]:
@@ -94,41 +97,33 @@ def size_columns(suspect: Suspect) -> list[int]:
 
 
 def score_tests(
-    subject: Subject,
-    data: WhitenedData,
-    nominal: Fit,
-    evaluator: Evaluator,
-    suspects: Sequence[Suspect],
-    known: Sequence[str] = (),
+    context: FitContext, nominal: Fit, suspects: Sequence[Suspect], known: Sequence[str] = ()
 ) -> Iterator[tuple[Suspect, list[Trial]]]:
     """Test every suspect at a fit; yields its trials, best first (none where it cannot be simulated).
 
     ``nominal`` is the nominal fit, or a fit with the suspects ``known`` added; all its genes may adapt.
     """
-    nuisance = Nuisance(data, nominal)
+    nuisance = Nuisance(context.data, nominal)
     values = nominal.problem.base.replace(nominal.values).as_dict()
     for suspect in suspects:
-        genome = nominal.problem.genomes(np.array(list(nominal.values.values())))[0]
-        model = subject.with_initial_motion(subject.extended([*known, suspect.name]), genome)
+        model = context.subject.extended([*known, suspect.name])
+        model = context.subject.with_initial_motion(model, nominal.genome)
         free = tuple(gene.name for gene in suspect.genes)
-        problem = Problem(model, data.recordings, free, base_genome(model, values), data.axes)
-        yield suspect, _suspect_trials(data, problem, nominal, evaluator, suspect, nuisance)
+        problem = context.problem(model, free, base_genome(model, values))
+        yield suspect, _suspect_trials(context, problem, nominal, suspect, nuisance)
 
 
 def _suspect_trials(
-    data: WhitenedData, problem: Problem, nominal: Fit, evaluator: Evaluator, suspect: Suspect, nuisance: Nuisance
+    context: FitContext, problem: Problem, nominal: Fit, suspect: Suspect, nuisance: Nuisance
 ) -> list[Trial]:
     groups = list(_genes_to_try(suspect))
     units = np.concatenate(groups)
-    found, reasons, _ = data.evaluate(problem, evaluator, values_at(free_genes(problem), units))
+    found, reasons, _ = context.evaluate(problem, values_at(free_genes(problem), units))
     bad = np.array([reason is not None for reason in reasons])
     changes = np.where(bad[:, None], 0.0, found) - np.where(bad[:, None], 0.0, nominal.coefficients)
-    trials, row = [], 0
-    for genes in groups:
-        rows = slice(row, row + len(genes))
-        row += len(genes)
-        if not bad[rows].any():
-            trials.append(_trial(suspect, genes, changes[rows], nuisance))
+    ends = np.cumsum([len(genes) for genes in groups])[:-1]
+    parts = zip(groups, np.split(changes, ends), np.split(bad, ends), strict=True)
+    trials = [_trial(suspect, genes, own, nuisance) for genes, own, failed in parts if not failed.any()]
     return sorted(trials, key=lambda trial: -trial.gain)
 
 
@@ -149,12 +144,10 @@ def _trial(suspect: Suspect, genes: Array, changes: Array, nuisance: Nuisance) -
 
 def _multiple_limits(suspect: Suspect, genes: Array) -> tuple[Array, Array]:
     """Smallest and largest multiples [S] of each size that stay in the box."""
-    off, low, high = off_units(suspect), np.zeros(len(genes)), np.zeros(len(genes))
-    for row, unit in enumerate(genes):
-        column = max(size_columns(suspect), key=lambda k: abs(unit[k] - off[k]))
-        move = unit[column] - off[column]
-        ends = sorted(((0.0 - off[column]) / move, (1.0 - off[column]) / move))
-        low[row], high[row] = ends
+    off, size = off_units(suspect), np.array(size_columns(suspect))
+    column = size[np.abs(genes[:, size] - off[size]).argmax(axis=1)]  # of the gene that each row moves
+    move = genes[np.arange(len(genes)), column] - off[column]
+    low, high = np.sort([(0.0 - off[column]) / move, (1.0 - off[column]) / move], axis=0)
     return low, high
 
 
@@ -169,8 +162,7 @@ def _shapes_to_try(suspect: Suspect, typical: Array) -> list[Array]:
 
 def _genes_to_try(suspect: Suspect) -> Iterator[Array]:
     """Genes [S, E] in unit coordinates, one row for each size, at one location and shape."""
-    off, size = off_units(suspect), size_columns(suspect)
-    typical = unit_at(list(suspect.genes), np.array([suspect.typical[gene.name] for gene in suspect.genes]))
+    off, typical, size = off_units(suspect), typical_units(suspect), size_columns(suspect)
     shape = [k for k in range(len(off)) if k not in size]
     for spot in _shapes_to_try(suspect, typical[shape]) if shape else [typical[shape]]:
         for part in (1.0,) if shape else (1.0, 0.3, 3.0, -1.0):

@@ -8,7 +8,6 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.calibration.estimates.linearised import residuals_of
 from wingfit.calibration.evaluator import Evaluator
@@ -16,8 +15,7 @@ from wingfit.calibration.problem import Problem, compared
 from wingfit.diagnosis.policy import POLICY, Policy
 from wingfit.inference.noise.harmonic import HarmonicFit, harmonic_fit, whole_markers
 from wingfit.records import Recording
-
-Array = npt.NDArray[np.float64]
+from wingfit.records.array_types import Array, Float
 
 
 @dataclass(frozen=True)
@@ -70,28 +68,28 @@ class WhitenedData:
         return tuple(slice(a, b) for a, b in pairwise(ends))
 
     @cached_property
-    def variance(self) -> Array:
+    def variance(self) -> Float[Array, " D"]:
         """[D] noise variance of the coefficients."""
         return np.concatenate([fit.variance[fit.used].ravel() for fit in self.beat_fits])
 
     @cached_property
-    def weight(self) -> Array:
+    def weight(self) -> Float[Array, " D"]:
         """[D] weight of a coefficient's square in the mean square over all samples of all channels."""
         channels = sum(int(fit.used.sum()) for fit in self.beat_fits)
         return np.concatenate([np.tile(fit.weight, int(fit.used.sum())) for fit in self.beat_fits]) / channels
 
     @cached_property
-    def scale(self) -> Array:
+    def scale(self) -> Float[Array, " D"]:
         """[D] standard deviation of the coefficients by noise and tolerance together; whitening divides by it."""
         allowed = [self.tolerance**2 / (len(v.order) * np.tile(v.weight, int(v.used.sum()))) for v in self.beat_fits]
         return np.asarray(np.sqrt(self.variance + np.concatenate(allowed)))
 
-    def coefficients_of(self, residuals: Sequence[Array]) -> Array:
+    def coefficients_of(self, residuals: Sequence[Float[Array, "*B _ _"]]) -> Float[Array, "*B D"]:
         """Coefficients [..., D] of the residuals [..., T, C] of each recording."""
         found = [fit.of(one)[..., fit.used, :] for fit, one in zip(self.beat_fits, residuals, strict=True)]
         return np.concatenate([one.reshape(*one.shape[:-2], -1) for one in found], axis=-1)
 
-    def chi_squared(self, coefficients: Array) -> float:
+    def chi_squared(self, coefficients: Float[Array, " D"]) -> float:
         """Sum of squares of whitened coefficients [D]."""
         return float(np.sum((coefficients / self.scale) ** 2))
 
@@ -100,7 +98,7 @@ class WhitenedData:
         """Number of independent samples of a model's error: a few for each recording, however long it is."""
         return min(self.policy.effective_samples * len(self.recordings), self.policy.max_effective_samples)
 
-    def deviance(self, coefficients: Array) -> Array:
+    def deviance(self, coefficients: Float[Array, "*B D"]) -> Float[Array, "*B"]:
         """Minus twice the log-likelihood [...] of coefficients [..., D]: noise plus a model error of unknown size.
 
         The chi-squared beyond its expectation D is a model's error, of which only ``effective_samples`` are
@@ -110,7 +108,7 @@ class WhitenedData:
         whole = ((coefficients / self.scale) ** 2).sum(axis=-1)
         return np.asarray(whole - beyond + self.effective_samples * np.log1p(beyond / self.effective_samples))
 
-    def likelihood_weight(self, coefficients: Array) -> float:
+    def likelihood_weight(self, coefficients: Float[Array, " D"]) -> float:
         """Slope of :meth:`deviance` with chi-squared at coefficients [D], as in iteratively reweighted fits."""
         return float(1.0 / (1.0 + self._chi_squared_excess(coefficients) / self.effective_samples))
 
@@ -122,17 +120,17 @@ class WhitenedData:
     def _chi_squared_excess(self, coefficients: Array) -> Array:
         return np.asarray(np.maximum(((coefficients / self.scale) ** 2).sum(axis=-1) - len(self.scale), 0.0))
 
-    def excess(self, coefficients: Array) -> float:
+    def excess(self, coefficients: Float[Array, " D"]) -> float:
         """Mean square beyond the noise of residuals with coefficients [D], m^2 or N^2; noise may make it negative."""
         return float(self.weight @ (coefficients**2 - self.variance))
 
-    def excess_by_recording(self, coefficients: Array) -> Array:
+    def excess_by_recording(self, coefficients: Float[Array, " D"]) -> Float[Array, " R"]:
         """Excess [R] of each recording."""
         every = self.weight * (coefficients**2 - self.variance)
         return np.array([every[part].sum() / self.recording_weights[r] for r, part in enumerate(self.recording_slices)])
 
     @cached_property
-    def recording_weights(self) -> Array:
+    def recording_weights(self) -> Float[Array, " R"]:
         """[R] weight of each recording in the mean square."""
         used = np.array([int(fit.used.sum()) for fit in self.beat_fits], float)
         return np.asarray(used / used.sum())
@@ -154,8 +152,8 @@ class WhitenedData:
         return float(every[slow].sum() / 2.0 + np.sqrt(2.0 / independent) * every.sum())
 
     def evaluate(
-        self, problem: Problem, evaluator: Evaluator, values: Array
-    ) -> tuple[Array, tuple[str | None, ...], list[Array]]:
+        self, problem: Problem, evaluator: Evaluator, values: Float[Array, "B F"]
+    ) -> tuple[Float[Array, "B D"], tuple[str | None, ...], list[Array]]:
         """Coefficients [B, D] of the residuals of ``values`` [B, F], reasons of failed individuals, and residuals."""
         evaluation = evaluator.evaluate(problem, values, residuals=True)
         residuals = residuals_of(evaluation)

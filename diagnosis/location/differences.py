@@ -5,16 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.diagnosis.evidence.intervals import standard_errors
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.finding import Exponent, Interval, Where
 from wingfit.diagnosis.location.maps import PHASES, RecordingResidual, harmonics
 from wingfit.records import Condition
+from wingfit.records.array_types import Array, Float
 from wingfit.sim.atmosphere import density
-
-Array = npt.NDArray[np.float64]
 
 EXTENT_QUANTILES = (0.05, 0.95)  # of the excess: ends of the reported extent
 MIN_PHASE_CONCENTRATION = 0.35  # length of the mean phase vector from which a misfit has a phase
@@ -22,7 +20,9 @@ WHOLE_EXTENT = 0.8  # of the span or chord: a misfit that extends over as much h
 MIN_RATIO = 1.05  # of two values of a variable that differ
 
 
-def residual_location(data: WhitenedData, residuals: Sequence[RecordingResidual], coefficients: Array) -> Where:
+def residual_location(
+    data: WhitenedData, residuals: Sequence[RecordingResidual], coefficients: Float[Array, " D"]
+) -> Where:
     """Location, phase, axis, harmonics and scaling of coefficients [D], split into ``residuals``."""
     spread = harmonics(data, coefficients)
     span, chord = (_extent_along(residuals, name) for name in ("span", "chord"))
@@ -32,20 +32,12 @@ def residual_location(data: WhitenedData, residuals: Sequence[RecordingResidual]
     return Where(words, span, chord, phase, axis, spread, exponents)
 
 
-def _channel_excess(residuals: Sequence[RecordingResidual]) -> list[Array]:
-    """Excess of each channel of each recording."""
-    return [
-        np.maximum((residual.coefficients**2 - residual.variance) @ residual.beat_fit.weight, 0.0)
-        for residual in residuals
-    ]
-
-
 def _extent_along(residuals: Sequence[RecordingResidual], name: str) -> Interval | None:
     """Median and extent of the misfit along the span or the chord, from markers; None for forces."""
     at, mass = [], []
-    for residual, masses in zip(residuals, _channel_excess(residuals), strict=True):
-        for place, one in zip(residual.locations, masses, strict=True):
-            value = place.span if name == "span" else place.chord
+    for residual in residuals:
+        for place, one in zip(residual.locations, residual.excess, strict=True):
+            value = getattr(place, name)
             if value is None:
                 return None
             at.append(value)
@@ -95,8 +87,8 @@ def _phase(residuals: Sequence[RecordingResidual]) -> Interval | None:
 
 def _axis(residuals: Sequence[RecordingResidual]) -> str:
     totals = dict.fromkeys("xyz", 0.0)
-    for residual, masses in zip(residuals, _channel_excess(residuals), strict=True):
-        for place, one in zip(residual.locations, masses, strict=True):
+    for residual in residuals:
+        for place, one in zip(residual.locations, residual.excess, strict=True):
             totals[place.axis] += float(one)
     return max(totals, key=lambda axis: totals[axis])
 
@@ -130,15 +122,12 @@ def _exponents(data: WhitenedData, coefficients: Array) -> tuple[Exponent, ...]:
 
 def _variables(conditions: Sequence[Condition]) -> list[tuple[str, str, tuple[float, float], Array]]:
     """Name, unit, range and values of the variables, all positive."""
-    f = np.array([c.flap_frequency for c in conditions])
-    rho = np.array([density(c.pressure, c.temperature) for c in conditions])
-    speed = np.array([c.airspeed for c in conditions])
-    found = [("flap frequency", "Hz", (float(f.min()), float(f.max())), f)]
-    if (rho > 0).all():
-        found.append(("air density", "kg/m^3", (float(rho.min()), float(rho.max())), rho))
-    if (speed > 0).all():
-        found.append(("airspeed", "m/s", (float(speed.min()), float(speed.max())), speed))
-    return found
+    every = (
+        ("flap frequency", "Hz", [c.flap_frequency for c in conditions]),
+        ("air density", "kg/m^3", [density(c.pressure, c.temperature) for c in conditions]),
+        ("airspeed", "m/s", [c.airspeed for c in conditions]),
+    )
+    return [(name, unit, (min(v), max(v)), np.array(v, float)) for name, unit, v in every if min(v) > 0]
 
 
 def _sentence(
@@ -150,7 +139,9 @@ def _sentence(
     exponents: Sequence[Exponent],
 ) -> str:
     place = _span_text(span, chord)
-    when = "over the whole beat" if phase is None else f"{_phase_text(phase)}"
+    when = "over the whole beat"
+    if phase is not None:
+        when = f"from {(phase.low or 0.0) % 1.0:.2f} to {(phase.high or 0.0) % 1.0:.2f} of the beat"
     largest = int(np.argmax(spread))
     line = "a constant offset" if largest == 0 else f"mostly at {largest} per beat"
     grows = [_scaling_text(one) for one in exponents]
@@ -201,11 +192,6 @@ def _span_text(span: Interval | None, chord: Interval | None) -> str:
     return words
 
 
-def _phase_text(phase: Interval) -> str:
-    low, high = phase.low or 0.0, phase.high or 0.0
-    return f"from {low % 1.0:.2f} to {high % 1.0:.2f} of the beat"
-
-
 def _scaling_text(one: Exponent) -> str:
     low, high, power = one.power.low, one.power.high, one.power.value
     if low is None or high is None or high - low > 2.0:
@@ -213,10 +199,6 @@ def _scaling_text(one: Exponent) -> str:
     if low <= 0.0 <= high:
         return f"independent of {one.variable}" if high - low < 1.0 else ""
     name = {1: f"{one.variable}", 2: f"{one.variable} squared"}.get(round(power), f"{one.variable}^{power:.1f}")
-    return (
-        f"grows with {name}"
-        if power > 0.5
-        else f"grows slowly with {one.variable}"
-        if power > 0
-        else (f"falls with {one.variable}")
-    )
+    if power > 0.5:
+        return f"grows with {name}"
+    return f"grows slowly with {one.variable}" if power > 0 else f"falls with {one.variable}"

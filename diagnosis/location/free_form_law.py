@@ -13,16 +13,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.diagnosis.evidence.intervals import standard_errors
 from wingfit.diagnosis.finding import FreeLaw, Interval, Term
-from wingfit.diagnosis.location.law_features import Candidate, Motion, candidates
+from wingfit.diagnosis.location.law_features import Candidate, candidates
 from wingfit.diagnosis.location.missing_load import GENE_ERROR_SD, Case
+from wingfit.records.array_types import Array, Bool, Float, Index, Int, Mask
 from wingfit.sim.effects.probe import Probe
-
-Array = npt.NDArray[np.float64]
-Index = npt.NDArray[np.int64]
+from wingfit.sim.wing.probing import StationMotion
 
 MAX_TERMS = 3  # of a law
 MIN_GAIN = 0.02  # of the excess of left-out recordings that a term must explain
@@ -39,31 +37,31 @@ class _NormalEquations:
     ``size`` [M] by which coefficients were scaled.
     """
 
-    curvature: Array
-    slope: Array
-    power: Array
-    count: Array
-    size: Array
+    curvature: Float[Array, "R M M"]
+    slope: Float[Array, "R M"]
+    power: Float[Array, " R"]
+    count: Float[Array, " R"]
+    size: Float[Array, " M"]
 
     def without(self, remaining: int) -> _NormalEquations:
         """All recordings but one."""
         kept = np.arange(len(self.power)) != remaining
         return _NormalEquations(self.curvature[kept], self.slope[kept], self.power[kept], self.count[kept], self.size)
 
-    def fit(self, terms: Index, which: npt.NDArray[np.bool_]) -> Array:
+    def fit(self, terms: Int[Index, "B N"], which: Bool[Mask, " R"]) -> Float[Array, "B N"]:
         """Coefficients [B, N] of ``terms`` [B, N] from the recordings ``which`` [R]."""
         matrix = self.curvature[which].sum(axis=0)[terms[:, :, None], terms[:, None, :]]
         ridge = 1e-9 * np.einsum("bnn->bn", matrix).max(axis=1, initial=1e-300)[:, None, None]
         slope = self.slope[which].sum(axis=0)[terms]
         return np.asarray(np.linalg.solve(matrix + ridge * np.eye(terms.shape[1]), slope[..., None])[..., 0])
 
-    def remaining(self, recording: int, terms: Index, found: Array) -> Array:
+    def remaining(self, recording: int, terms: Int[Index, "B N"], found: Float[Array, "B N"]) -> Float[Array, " B"]:
         """Sum of squares [B] of a recording's residual with coefficients ``found`` [B, N] of ``terms`` [B, N]."""
         matrix = self.curvature[recording][terms[:, :, None], terms[:, None, :]]
         along = (found * self.slope[recording][terms]).sum(axis=1)
         return np.asarray(self.power[recording] + np.einsum("bn,bnm,bm->b", found, matrix, found) - 2 * along)
 
-    def explained(self, terms: Index) -> Array:
+    def explained(self, terms: Int[Index, "B N"]) -> Float[Array, " B"]:
         """Fraction [B] of the excess that ``terms`` [B, N] explain, recordings left out one at a time."""
         after = np.zeros(len(terms))
         for r in range(len(self.power)):
@@ -76,7 +74,7 @@ class _NormalEquations:
         return max(float((self.power - self.count).sum()), 1e-9)
 
 
-def free_law(cases: Sequence[Case], probe: Probe, motions: Sequence[Motion]) -> FreeLaw | None:
+def free_law(cases: Sequence[Case], probe: Probe, motions: Sequence[StationMotion]) -> FreeLaw | None:
     """The law of the missing load of ``cases``, from the ``motions`` of the nominal model at the stations of ``probe``.
 
     None for fewer than three recordings, or without a misfit beyond the noise. A law without terms means that none
@@ -97,7 +95,7 @@ def free_law(cases: Sequence[Case], probe: Probe, motions: Sequence[Motion]) -> 
 
 
 def _sums(
-    cases: Sequence[Case], probe: Probe, motions: Sequence[Motion], dictionary: Sequence[Candidate]
+    cases: Sequence[Case], probe: Probe, motions: Sequence[StationMotion], dictionary: Sequence[Candidate]
 ) -> _NormalEquations:
     M, F = len(dictionary), cases[0].sensitivities.shape[1]
     loads = [
@@ -128,7 +126,7 @@ def _products(case: Case, loads: Array) -> Array:
     return np.asarray(shown.T @ (both.T @ both) @ shown)
 
 
-def _probe_sizes(probe: Probe, crossing: float, motion: Motion, dictionary: Sequence[Candidate]) -> Array:
+def _probe_sizes(probe: Probe, crossing: float, motion: StationMotion, dictionary: Sequence[Candidate]) -> Array:
     """Sizes of the probe's unit forces [P, M] that best reproduce each candidate load."""
     series = np.linalg.pinv(probe.terms(motion.phase + crossing))
     hats = np.linalg.pinv(probe.hats(motion.stations))

@@ -4,61 +4,34 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from wingfit.records.array_types import Array, Float, Mask
+from wingfit.sim.wing.probing import StationMotion
 
 OUTER, INNER = 0.6, 0.4  # of the span: start of the outer part, end of the inner part
 
 
-class Motion(Protocol):
-    """Motion of J stations of a wing at N instants of a beat; see :class:`sim.wing.probing.StationMotion`."""
-
-    @property
-    def stations(self) -> Array: ...  # noqa: D102
-    @property
-    def phase(self) -> Array: ...  # noqa: D102
-    @property
-    def velocity(self) -> Array: ...  # noqa: D102
-    @property
-    def forward(self) -> Array: ...  # noqa: D102
-    @property
-    def acceleration(self) -> Array: ...  # noqa: D102
-    @property
-    def deflection(self) -> Array: ...  # noqa: D102
-    @property
-    def pitch_rate(self) -> Array: ...  # noqa: D102
-    @property
-    def chord(self) -> Array: ...  # noqa: D102
-    @property
-    def mass(self) -> Array: ...  # noqa: D102
-    @property
-    def density(self) -> float: ...  # noqa: D102
-    @property
-    def airspeed(self) -> float: ...  # noqa: D102
-    @property
-    def flap_frequency(self) -> float: ...  # noqa: D102
-
-
 @dataclass(frozen=True)
 class Feature:
-    """A load per metre of span: a coefficient in ``unit`` times ``field`` [J, N] of a motion; ``words`` describe it."""
+    """A load per metre of span: a coefficient in ``unit`` times ``field`` [stations, instants] of a motion.
+
+    ``words`` describe it.
+    """
 
     name: str
     unit: str
     words: str
-    field: Callable[[Motion], Array]
+    field: Callable[[StationMotion], Array]
 
 
 @dataclass(frozen=True)
 class Window:
-    """A part of the wing or of the beat: 1 inside, 0 outside [J, N]. ``words`` are empty for the whole."""
+    """A part of the wing or beat: ``field`` [stations, instants] is 1 inside, 0 outside. No ``words`` for the whole."""
 
     words: str
-    field: Callable[[Motion], Array]
+    field: Callable[[StationMotion], Array]
 
 
 def _wave(order: int, power: int, sine: bool) -> Feature:
@@ -137,7 +110,7 @@ BEAT_WINDOWS: tuple[Window, ...] = (
 )
 
 
-def _where(motion: Motion, inside: npt.NDArray[np.bool_]) -> Array:
+def _where(motion: StationMotion, inside: Mask) -> Array:
     return np.where(np.broadcast_to(inside, motion.velocity.shape), 1.0, 0.0)
 
 
@@ -149,8 +122,8 @@ class Candidate:
     span: Window
     beat: Window
 
-    def field(self, motion: Motion) -> Array:
-        """Load per coefficient [J, N]."""
+    def field(self, motion: StationMotion) -> Float[Array, "J N"]:
+        """Load per metre of span for a coefficient of one, [stations, instants]."""
         return self.feature.field(motion) * self.span.field(motion) * self.beat.field(motion)
 
     @property

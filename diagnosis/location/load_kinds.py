@@ -7,11 +7,9 @@ from itertools import product
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from wingfit.records.array_types import Array, Float
 from wingfit.sim.effects.probe import Probe
-
-Array = npt.NDArray[np.float64]
 
 _LENGTHS = (0.25, 0.5)  # of the span: correlation lengths of smooth loads
 _CENTRES = np.linspace(0.0, 1.0, 41)  # of localised loads along the span (0 to 1)
@@ -45,21 +43,21 @@ class LoadForm(NamedTuple):
 
     family: LoadFamily
     number: int
-    spread: Array
+    spread: Float[Array, " M"]
 
     @property
-    def root(self) -> Array:
-        """Square root [P, Z M] of the covariance at strength one."""
+    def root(self) -> Float[Array, "P Q"]:
+        """Square root [P, Q] (Q is Z times M) of the covariance at strength one."""
         return np.asarray(np.kron(self.family.shapes[self.number].T, np.diag(self.spread)), float)
 
 
-def spreads(probe: Probe) -> list[Array]:
+def spreads(probe: Probe) -> list[Float[Array, " M"]]:
     """Possible standard deviations [M] of the terms of a load over the beat."""
     order = np.arange(1, probe.harmonics + 1)
     return [np.concatenate([[1.0], np.tile(order**-decay, 2)]) for decay in _DECAYS]
 
 
-def smooth(probe: Probe, chord: Array | None) -> LoadFamily:
+def smooth(probe: Probe, chord: Float[Array, " J"] | None) -> LoadFamily:
     """Loads that are correlated over a length of the span; forces and moments are independent."""
     y, shapes = np.array(probe.stations), []
     for length in _LENGTHS:
@@ -71,7 +69,7 @@ def smooth(probe: Probe, chord: Array | None) -> LoadFamily:
     return LoadFamily(_without_rods(probe, shapes), ((None, None, None),) * len(shapes), _SMOOTH / len(shapes))
 
 
-def localised(probe: Probe, chord: Array | None) -> LoadFamily:
+def localised(probe: Probe, chord: Float[Array, " J"] | None) -> LoadFamily:
     """Localised loads: forces as Gaussian bumps along the span, with the moments of their location along the chord."""
     span = np.linspace(0.0, 1.0, 401)
     hats, shapes = probe.hats(span), []

@@ -6,14 +6,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.finding import MarkerMisfit, Overlay, PhaseMap, table
 from wingfit.diagnosis.subject import ChannelLocation, Subject
 from wingfit.inference.noise.harmonic import HarmonicFit
-
-Array = npt.NDArray[np.float64]
+from wingfit.records.array_types import Array, Float
 
 PHASES = 72  # instants of a beat in maps
 BANDS = 6  # along the span
@@ -29,12 +27,19 @@ class RecordingResidual:
 
     beat_fit: HarmonicFit
     locations: tuple[ChannelLocation, ...]
-    coefficients: Array
-    variance: Array
-    beat: Array
+    coefficients: Float[Array, "C P"]
+    variance: Float[Array, "C P"]
+    beat: Float[Array, "N C"]
+
+    @property
+    def excess(self) -> Array:
+        """[C] mean square of each channel beyond the noise, at least 0."""
+        return np.maximum((self.coefficients**2 - self.variance) @ self.beat_fit.weight, 0.0)
 
 
-def recording_residuals(subject: Subject, data: WhitenedData, coefficients: Array) -> list[RecordingResidual]:
+def recording_residuals(
+    subject: Subject, data: WhitenedData, coefficients: Float[Array, " D"]
+) -> list[RecordingResidual]:
     """Split a coefficient vector [D] by recording."""
     found = []
     for recording, beat_fit, part in zip(data.recordings, data.beat_fits, data.recording_slices, strict=True):
@@ -45,16 +50,13 @@ def recording_residuals(subject: Subject, data: WhitenedData, coefficients: Arra
     return found
 
 
-def beat_series(beat_fit: HarmonicFit, origin: float, count: int = PHASES) -> Array:
+def beat_series(beat_fit: HarmonicFit, origin: float, count: int = PHASES) -> Float[Array, "count P"]:
     """[count, P] value of each coefficient's basis function at equal steps of the beat; zero for slow trends."""
     psi = origin + 2 * np.pi * np.arange(count) / count
-    columns = []
-    sine = np.zeros(len(beat_fit.order), bool)
-    kept = int(beat_fit.order[~beat_fit.trend].max())
-    sine[kept + 1 : 2 * kept + 1] = True
-    for order, odd, slow in zip(beat_fit.order, sine, beat_fit.trend, strict=True):
-        columns.append(np.zeros(count) if slow else (np.sin if odd else np.cos)(order * psi))
-    return np.stack(columns, axis=1)
+    angle, column = psi[:, None] * beat_fit.order, np.arange(len(beat_fit.order))
+    last = int(beat_fit.order[~beat_fit.trend].max())  # columns: mean, cosines, sines, trends
+    waves = np.where((last < column) & (column <= 2 * last), np.sin(angle), np.cos(angle))
+    return np.where(beat_fit.trend, 0.0, waves)
 
 
 def markers(before: Sequence[RecordingResidual], after: Sequence[RecordingResidual]) -> tuple[MarkerMisfit, ...]:
@@ -69,13 +71,11 @@ def markers(before: Sequence[RecordingResidual], after: Sequence[RecordingResidu
 def _marker(
     place: ChannelLocation, before: Sequence[RecordingResidual], after: Sequence[RecordingResidual]
 ) -> MarkerMisfit:
-    first, then = (_mean_square(place.name, recording_residuals) for recording_residuals in (before, after))
+    first, then = (_root_mean_square(place.name, residuals) for residuals in (before, after))
     total, beats = np.zeros(PHASES), {axis: np.zeros(PHASES) for axis in "xyz"}
-    for residual in before:
-        for column, other in enumerate(residual.locations):
-            if other.name == place.name:
-                total += residual.beat[:, column] ** 2
-                beats[other.axis] += residual.beat[:, column]
+    for residual, c in _channels_of(place.name, before):
+        total += residual.beat[:, c] ** 2
+        beats[residual.locations[c].axis] += residual.beat[:, c]
     worst = int(np.argmax(total))
     direction = np.array([beats[axis][worst] for axis in "xyz"])
     length = float(np.linalg.norm(direction))
@@ -83,12 +83,17 @@ def _marker(
     return MarkerMisfit(place.name, place.span, place.chord, place.x, place.y, first, then, worst / PHASES, (x, y, z))
 
 
-def _mean_square(name: str, recording_residuals: Sequence[RecordingResidual]) -> float:
+def _channels_of(name: str, residuals: Sequence[RecordingResidual]) -> Iterator[tuple[RecordingResidual, int]]:
+    """The channels of a marker or force axis: the residual of each recording that has it, and the columns there."""
+    for residual in residuals:
+        yield from ((residual, c) for c, place in enumerate(residual.locations) if place.name == name)
+
+
+def _root_mean_square(name: str, residuals: Sequence[RecordingResidual]) -> float:
+    """Root mean square beyond the noise of a marker or force axis."""
     squares = [
         float(residual.beat_fit.weight @ (residual.coefficients[c] ** 2 - residual.variance[c]))
-        for residual in recording_residuals
-        for c, place in enumerate(residual.locations)
-        if place.name == name
+        for residual, c in _channels_of(name, residuals)
     ]
     return float(np.sqrt(max(sum(squares) / len(squares), 0.0)))
 
@@ -122,7 +127,7 @@ def _squares(recording_residuals: Sequence[RecordingResidual], edges: Array) -> 
     return np.asarray(total / np.maximum(count, 1))
 
 
-def harmonics(data: WhitenedData, coefficients: Array) -> tuple[float, ...]:
+def harmonics(data: WhitenedData, coefficients: Float[Array, " D"]) -> tuple[float, ...]:
     """Fraction of the excess in each harmonic of the beat, from 0; trends are ignored."""
     order = np.concatenate([np.tile(v.order, int(v.used.sum())) for v in data.beat_fits])
     trend = np.concatenate([np.tile(v.trend, int(v.used.sum())) for v in data.beat_fits])
@@ -146,10 +151,8 @@ def overlays(
         square = np.where(data.beat_fits[r].used, np.nan_to_num(apart**2).sum(axis=0), 0.0)
         channel = int(np.argmax(square))
         seen = np.isfinite(before[r][:, channel])
-        psi = 2 * np.pi * recording.condition.flap_frequency * recording.times[seen] - subject.beat_start_phase(
-            recording
-        )
-        phase = (psi / (2 * np.pi)) % 1.0
+        psi = 2 * np.pi * recording.condition.flap_frequency * recording.times[seen]
+        phase = ((psi - subject.beat_start_phase(recording)) / (2 * np.pi)) % 1.0
         turn = np.argsort(phase)
         recorded = recording.values[seen, channel]
         yield Overlay(

@@ -15,13 +15,11 @@ from dataclasses import dataclass
 from itertools import groupby
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.diagnosis.finding import Interval, MissingLoad, table
 from wingfit.diagnosis.location.load_kinds import LoadForm, drive_errors, localised, smooth, spreads
+from wingfit.records.array_types import Array, Float, Index, Int
 from wingfit.sim.effects.probe import Probe
-
-Array = npt.NDArray[np.float64]
 
 PHASES = 36  # instants of a beat at which loads are reported
 GENE_ERROR_SD = 0.3  # standard deviation of the nominal genes' errors, unit coordinates
@@ -30,9 +28,7 @@ MIN_EVIDENCE = 5.0  # log evidence relative to no load; below it there is none
 _STRENGTHS = 10.0 ** np.arange(-3.0, 4.01, 0.125)  # N/m, or the unit of the responses
 _MIN_RELATIVE_PROBABILITY = 0.005  # relative to the most probable kind; less probable kinds are ignored
 _MAX_KINDS = 60  # that are averaged
-RESPONSE_ERROR = (  # fraction by which errors of the model's responses may change the evidence
-    0.002  # of the evidence: what the model's responses may make it wrong by, and one kind likelier than another
-)
+RESPONSE_ERROR = 0.002  # of the evidence: error that the model's responses may cause, and so favour one kind of load
 _DRAWS = 400
 _SPAN = np.linspace(0.0, 1.0, 41)
 MIN_PHASE_CONCENTRATION = 0.3  # length of the mean phase vector; below it the load is spread over the beat
@@ -51,14 +47,14 @@ class Case:
     """
 
     name: str
-    residual: Array
-    responses: Array
-    sensitivities: Array
+    residual: Float[Array, " D"]
+    responses: Float[Array, "D P"]
+    sensitivities: Float[Array, "D F"]
     crossing: float
 
 
-def whitened(values: Array, place: npt.NDArray[np.int64], lag1: float) -> Array:
-    """Whiten rows [n, ...] at sample indices ``place``, whose noise has autocorrelation lag1^distance."""
+def whitened(values: Float[Array, "N C"], place: Int[Index, " N"], lag1: float) -> Float[Array, "N C"]:
+    """Whiten rows [N, C] at sample indices ``place``, whose noise has autocorrelation lag1^distance."""
     if not len(values):
         return values
     kept = lag1 ** np.diff(place)[:, None]
@@ -78,8 +74,8 @@ class LoadKind:
     width: float | None
     chord: float | None
     drive_error: bool
-    sizes: Array
-    covariance: Array
+    sizes: Float[Array, "R P"]
+    covariance: Float[Array, "R P P"]
 
 
 @dataclass(frozen=True)
@@ -99,20 +95,17 @@ class InferredLoads:
     names: tuple[str, ...]
     crossings: tuple[float, ...]
     kinds: tuple[LoadKind, ...]
-    evidence: Array
-    floor: Array
-
-    @property
-    def localised(self) -> float:
-        """Probability of localised loads."""
-        return sum(kind.probability for kind in self.kinds if kind.centre is not None)
+    evidence: Float[Array, " R"]
+    floor: Float[Array, " R"]
 
     @property
     def drive_error(self) -> bool:
         """Whether the drive rods are in error, and no load acts."""
         return self.kinds[0].drive_error
 
-    def fields(self, span: Array, phase: Array) -> tuple[Array, Array]:
+    def fields(
+        self, span: Float[Array, " J"], phase: Float[Array, " N"]
+    ) -> tuple[Float[Array, "R K N"], Float[Array, "R K N"]]:
         """Forces and standard errors [R, span, phase] at ``span`` (0 to 1) and ``phase`` (beats).
 
         For errors of the drive, the rods' turns, deg, [R, 2, phase].
@@ -144,7 +137,7 @@ class InferredLoads:
 
 @dataclass(frozen=True)
 class LoadPlace:
-    """Where and when the missing load acts: centres with 90 % intervals, and extents.
+    """Where and when the missing load acts: centres with 90 % intervals (None where not known), and extents.
 
     ``span`` and ``extent``, which holds 90 % of the load, from 0 to 1; ``phase`` in beats from the start of the beat,
     None where the load is spread over the beat; ``duration``, which holds 90 % of the load above half of its maximum
@@ -152,10 +145,10 @@ class LoadPlace:
     moments. Errors of the drive have a phase only.
     """
 
-    span: Interval | None
-    extent: tuple[float, float]
-    phase: Interval | None
-    duration: tuple[float, float]
+    span: Interval | None = None
+    extent: tuple[float, float] = (0.0, 1.0)
+    phase: Interval | None = None
+    duration: tuple[float, float] = (0.0, 1.0)
     chord: Interval | None = None
 
 
@@ -167,9 +160,7 @@ class _NormalEquations:
         both = np.concatenate([H, S], axis=1)
         remainder = y - both @ np.linalg.lstsq(both, y, rcond=1e-8)[0]
         size, left_over = both.shape[1], float(remainder @ remainder)
-        explained = (
-            max(float(y @ y) - left_over - size, 0.0) / size
-        )  # mean square, in the directions of loads and genes
+        explained = max(float(y @ y) - left_over - size, 0.0) / size  # mean square in directions of loads and genes
         self.floor = float(np.sqrt(max(1.0, left_over / max(len(y) - size, 1)) + NONLINEARITY**2 * explained))
         scale = self.floor**-2
         self.A, self.B, self.C = scale * (H.T @ H), scale * (H.T @ S), scale * (S.T @ S)
@@ -205,7 +196,10 @@ class _NormalEquations:
 
 
 def infer(
-    cases: Sequence[Case], probe: Probe, chord: Array | None = None, response_error: float = RESPONSE_ERROR
+    cases: Sequence[Case],
+    probe: Probe,
+    chord: Float[Array, " J"] | None = None,
+    response_error: float = RESPONSE_ERROR,
 ) -> InferredLoads:
     """Infer the loads of ``cases``, which share the nominal genes; ValueError where there is none.
 
@@ -304,12 +298,10 @@ def locate_load(inferred: InferredLoads, seed: int = 0) -> LoadPlace | None:
         if not count:
             continue
         fields = _posterior_draws(inferred, kind, shown, phase, int(count), rng)
-        if kind.drive_error:
-            pass
-        elif kind.centre is not None and kind.width is not None:
+        if kind.centre is not None and kind.width is not None:
             bump = np.exp(-0.5 * ((_SPAN - kind.centre) / kind.width) ** 2)
             along.append(np.tile(bump, (count, 1)))
-        else:
+        elif not kind.drive_error:
             along.append(np.abs(fields).sum(axis=(0, 3)))
         over = fields - fields.mean(axis=3, keepdims=True) if kind.drive_error else fields.sum(axis=2, keepdims=True)
         during.append(np.abs(over).sum(axis=(0, 2)))
@@ -317,15 +309,11 @@ def locate_load(inferred: InferredLoads, seed: int = 0) -> LoadPlace | None:
     if inferred.drive_error:
         return LoadPlace(None, (0.0, 1.0), *_phase_location(phase, np.concatenate(during)))
     span, extent = _span_location(np.concatenate(along))
-    likeliest = next((kind for kind in inferred.kinds if kind.centre is not None), None)
-    chord = None
-    if likeliest is not None and inferred.localised > 0.5:  # the mean over all locations would lie between root and tip
-        span = _with_interval(likeliest.centre, span)
-        chord = (
-            _with_interval(likeliest.chord, Interval(*np.quantile(chords, [0.5, 0.05, 0.95]).tolist()))
-            if chords
-            else None
-        )
+    localised, chord = [kind for kind in inferred.kinds if kind.centre is not None], None
+    if sum(kind.probability for kind in localised) > 0.5:  # the mean over all locations would lie between root and tip
+        span = _with_interval(localised[0].centre, span)
+        if chords:
+            chord = _with_interval(localised[0].chord, Interval(*np.quantile(chords, [0.5, 0.05, 0.95]).tolist()))
     return LoadPlace(span, extent, *_phase_location(phase, np.concatenate(during)), chord)
 
 
@@ -339,7 +327,7 @@ def _with_interval(value: float | None, draws: Interval) -> Interval:
 def _posterior_draws(
     inferred: InferredLoads,
     kind: LoadKind,
-    shown: npt.NDArray[np.int64],
+    shown: Index,
     phase: Array,
     count: int,
     rng: np.random.Generator,
@@ -381,7 +369,5 @@ def _phase_location(phase: Array, size: Array) -> tuple[Interval | None, tuple[f
     order = np.argsort(apart)
     total = np.cumsum((peak / peak.sum(axis=1, keepdims=True)).mean(axis=0)[order])
     first, last = np.interp([0.05, 0.95], total, apart[order])
-    return Interval(centre, centre + float(off[0]), centre + float(off[1])), (
-        centre + float(first),
-        centre + float(last),
-    )
+    low, high, start, end = (centre + float(one) for one in (*off, first, last))
+    return Interval(centre, low, high), (start, end)

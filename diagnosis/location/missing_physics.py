@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
-import numpy.typing as npt
 
+from wingfit.diagnosis.evidence.context import FitContext
 from wingfit.diagnosis.evidence.refit import Refit
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
-from wingfit.diagnosis.finding import FreeLaw, Interval, MissingLoad, table
+from wingfit.diagnosis.finding import FreeLaw, MissingLoad, table
 from wingfit.diagnosis.location.free_form_law import free_law
 from wingfit.diagnosis.location.missing_load import (
     PHASES,
@@ -23,10 +23,9 @@ from wingfit.diagnosis.location.missing_load import (
     whitened,
 )
 from wingfit.diagnosis.subject import Subject
+from wingfit.records.array_types import Array, Float
 from wingfit.sim.effects.probe import Probe
 from wingfit.sim.wing.probing import Probed, StationMotion
-
-Array = npt.NDArray[np.float64]
 
 PROBE = Probe(tuple(np.linspace(0.0, 1.0, 7).tolist()), 8, turning=True, driving=True)
 MAX_INERTIA_RATIO = 10.0  # times the wing's inertia: no load of the air or of a neighbour is as large
@@ -37,29 +36,13 @@ MAX_RECORDINGS = 3  # that are probed: those with the largest misfit
 class MissingPhysics:
     """The missing loads by recording, their location, and a law; empty where the rig cannot be probed.
 
-    ``drive_error``: the drive rods are in error, and no load acts. ``pulse``: instant of a recorded force.
+    ``drive_error``: the drive rods are in error, and no load acts.
     """
 
     loads: tuple[MissingLoad, ...] = ()
-    place: LoadPlace | None = None
+    place: LoadPlace = field(default_factory=LoadPlace)
     law: FreeLaw | None = None
     drive_error: bool = False
-    pulse: Interval | None = None
-
-    @property
-    def span(self) -> Interval | None:
-        """Location along the span."""
-        return None if self.place is None else self.place.span
-
-    @property
-    def chord(self) -> Interval | None:
-        """Location along the chord."""
-        return None if self.place is None else self.place.chord
-
-    @property
-    def phase(self) -> Interval | None:
-        """Instant in the beat."""
-        return self.pulse if self.place is None else self.place.phase
 
 
 @dataclass(frozen=True)
@@ -81,11 +64,10 @@ def load_estimates(
 ) -> Iterator[tuple[str, LoadEstimate | None]]:
     """The load that each of the fitted ``models`` is missing; yields the name of each recording before it is probed."""
     for subject, nominal in models:
-        fit = nominal.fit
-        genome, found = fit.problem.genomes(np.array(list(fit.values.values())))[0], []
+        found = []
         for r in which:
             yield data.recordings[r].name, None
-            found.append((r, subject.probe_responses(genome, data.recordings[r], PROBE)))
+            found.append((r, subject.probe_responses(nominal.fit.genome, data.recordings[r], PROBE)))
         known = [(r, one) for r, one in found if one is not None]
         if known:
             cases = tuple(_case(data, nominal, r, one) for r, one in known)
@@ -101,14 +83,13 @@ def missing_physics(found: Sequence[LoadEstimate], *, law: bool) -> MissingPhysi
     if not found:
         return MissingPhysics()
     whole = max(len(guess.cases) for guess in found)
-    best = min(
-        (guess for guess in found if len(guess.cases) == whole), key=lambda guess: guess.inferred.noise_inflation
-    )
+    complete = [guess for guess in found if len(guess.cases) == whole]
+    best = min(complete, key=lambda guess: guess.inferred.noise_inflation)
     loads, drive_error = missing_loads(best.inferred), best.inferred.drive_error
     if not drive_error and not _plausible(loads, best.motions):
         return MissingPhysics()
     free_form = free_law(best.cases, PROBE, best.motions) if law and not drive_error else None
-    return MissingPhysics(loads, locate_load(best.inferred), free_form, drive_error)
+    return MissingPhysics(loads, locate_load(best.inferred) or LoadPlace(), free_form, drive_error)
 
 
 def _plausible(loads: Sequence[MissingLoad], motions: Sequence[StationMotion]) -> bool:
@@ -131,13 +112,14 @@ def _case(data: WhitenedData, nominal: Refit, r: int, probed: Probed) -> Case:
     )
 
 
-def missing_forces(subject: Subject, data: WhitenedData, nominal: Refit) -> tuple[MissingLoad, ...]:
+def missing_forces(context: FitContext, nominal: Refit) -> tuple[MissingLoad, ...]:
     """For recordings of forces, the missing force along the axis with the largest residual."""
-    found = []
+    data, found = context.data, []
     for recording, beat_fit, residuals in zip(data.recordings, data.beat_fits, nominal.fit.residuals, strict=True):
         power = np.where(beat_fit.used, np.nansum(np.nan_to_num(residuals) ** 2, axis=0), 0.0)
         column = int(np.argmax(power))
-        phase = recording.condition.flap_frequency * recording.times - subject.beat_start_phase(recording) / (2 * np.pi)
+        origin = context.subject.beat_start_phase(recording) / (2 * np.pi)
+        phase = recording.condition.flap_frequency * recording.times - origin
         noise = max(float(beat_fit.noise[column]), data.tolerance)
         lag1 = float(np.clip(beat_fit.lag1, 0.0, 0.99))
         found.append(missing_force(recording.name, residuals[:, column], phase, noise, lag1))
@@ -145,7 +127,7 @@ def missing_forces(subject: Subject, data: WhitenedData, nominal: Refit) -> tupl
 
 
 def missing_force(
-    name: str, residuals: Array, phase: Array, noise: float, lag1: float, harmonics: int = 8
+    name: str, residuals: Float[Array, " T"], phase: Float[Array, " T"], noise: float, lag1: float, harmonics: int = 8
 ) -> MissingLoad:
     """For a recording of forces, the missing force: the mean beat of one axis' residual, N.
 

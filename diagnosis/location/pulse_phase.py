@@ -10,19 +10,16 @@ the filter, and its error is twice as large. The significance of the pulse is te
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 from scipy.stats import chi2
 
+from wingfit.diagnosis.evidence.context import FitContext
 from wingfit.diagnosis.evidence.fit import Fit
 from wingfit.diagnosis.evidence.intervals import standard_errors
 from wingfit.diagnosis.evidence.screen import Nuisance
-from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.finding import Interval
-from wingfit.diagnosis.subject import Subject
 from wingfit.inference.score_test import explained
+from wingfit.records.array_types import Array, Mask
 from wingfit.sim.filtering import gain, sampling_rate
-
-Array = npt.NDArray[np.float64]
 
 INSTANTS = 144
 WIDTH = 0.015  # of a beat, standard deviation
@@ -30,21 +27,19 @@ MIN_EXPLAINED = 0.1  # of the residual: a pulse that explains less has no instan
 FALSE_ALARM_PROBABILITY = 0.01  # that noise alone explains as much at any instant
 
 
-def locate_pulse(subject: Subject, data: WhitenedData, fit: Fit) -> Interval | None:
+def locate_pulse(context: FitContext, fit: Fit) -> Interval | None:
     """Instant (beats) of the pulse that explains most of the residual of ``fit``; None where none is significant.
 
     Its interval contains the instants at which it would explain nearly as much, given the model error.
     """
-    nuisance = Nuisance(data, fit)
+    data, nuisance = context.data, Nuisance(context.data, fit)
     residual, whitened = nuisance.residual, fit.coefficients / data.scale
     phase = np.arange(INSTANTS) / INSTANTS
-    gains = np.array([explained(nuisance.project_out(_pulses(subject, data, at)), residual) for at in phase])
+    gains = np.array([explained(nuisance.project_out(_pulses(context, at)), residual) for at in phase])
     best = int(np.argmax(gains))
-    low_passed_pulse = _pulses(subject, data, phase[best], low_passed=True)
-    decrease, by_noise = (
-        explained(nuisance.project_out(low_passed_pulse), residual),
-        float(chi2.isf(FALSE_ALARM_PROBABILITY / INSTANTS, len(low_passed_pulse))),
-    )
+    low_passed_pulse = _pulses(context, phase[best], low_passed=True)
+    decrease = explained(nuisance.project_out(low_passed_pulse), residual)
+    by_noise = float(chi2.isf(FALSE_ALARM_PROBABILITY / INSTANTS, len(low_passed_pulse)))
     if decrease < max(MIN_EXPLAINED * float(residual @ residual), by_noise):
         return None
     beyond = max(float(whitened @ whitened) - decrease - len(whitened), 0.0)
@@ -54,22 +49,22 @@ def locate_pulse(subject: Subject, data: WhitenedData, fit: Fit) -> Interval | N
     return Interval(float(phase[best]), float(phase[best] - low), float(phase[best] + high))
 
 
-def _extent(near: npt.NDArray[np.bool_], distance: Array, sign: int) -> float:
+def _extent(near: Mask, distance: Array, sign: int) -> float:
     """Distance to which the instants ``near`` extend on one side without a gap, plus half an instant."""
     order = np.argsort(np.where(sign * distance >= 0, sign * distance, np.inf))[: INSTANTS // 2]
     ends = np.flatnonzero(~near[order])
     return float(sign * distance[order[(ends[0] if len(ends) else len(order)) - 1]]) + 0.5 / INSTANTS
 
 
-def _pulses(subject: Subject, data: WhitenedData, at: float, *, low_passed: bool = False) -> Array:
+def _pulses(context: FitContext, at: float, *, low_passed: bool = False) -> Array:
     """Coefficients [channels, D] of a pulse ``at`` an instant (beats) in each channel of each recording separately.
 
     Sharp, or ``low_passed`` like the recording.
     """
-    rows = []
+    data, rows = context.data, []
     for recording, beat_fit, part in zip(data.recordings, data.beat_fits, data.recording_slices, strict=True):
         order = np.arange(1, int(beat_fit.order[~beat_fit.trend].max()) + 1)
-        psi = subject.beat_start_phase(recording) + 2 * np.pi * at
+        psi = context.subject.beat_start_phase(recording) + 2 * np.pi * at
         size = 2 * np.exp(-0.5 * (2 * np.pi * WIDTH * order) ** 2)
         if low_passed and recording.low_pass is not None:
             frequency = order * recording.condition.flap_frequency

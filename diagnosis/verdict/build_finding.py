@@ -4,19 +4,30 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import islice
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
-from wingfit.calibration.evaluator import Evaluator
 from wingfit.diagnosis.evidence.fit import with_measured_jacobian
+from wingfit.diagnosis.evidence.intervals import gene_values
 from wingfit.diagnosis.evidence.nominal import Nominal
 from wingfit.diagnosis.evidence.refit import Refit, contribution, refit_at
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
-from wingfit.diagnosis.finding import Advice, Finding, Floors, GeneValue, Interval, Proof, RecordingMisfit, Where
+from wingfit.diagnosis.finding import (
+    Advice,
+    Finding,
+    Floors,
+    GeneValue,
+    Interval,
+    Proof,
+    RecordingMisfit,
+    Where,
+    in_milli,
+)
 from wingfit.diagnosis.location import maps
 from wingfit.diagnosis.location.differences import cause_location, residual_location
+from wingfit.diagnosis.location.missing_load import LoadPlace
 from wingfit.diagnosis.location.missing_physics import (
     MissingPhysics,
     largest_residuals,
@@ -28,40 +39,37 @@ from wingfit.diagnosis.location.pulse_phase import locate_pulse
 from wingfit.diagnosis.search_state import SearchState
 from wingfit.diagnosis.verdict.next_experiment import rank_conditions, separations
 from wingfit.diagnosis.verdict.proof import ResidualPair, predict_held_out, proof, recording_misfits
-from wingfit.diagnosis.verdict.verdict import Decision, all_genes, decide, hypotheses, summary
+from wingfit.diagnosis.verdict.verdict import Decision, decide, hypotheses, summary
 from wingfit.inference.noise.harmonic import still_markers
 from wingfit.records import Recording
 
-Array = npt.NDArray[np.float64]
 Step = tuple[float, str, Finding | None]
 
 WORSE_FACTOR = 1.1  # times the misfit before: recordings that fit worse than that get a remark
 
 
-def build_finding(state: SearchState, name: str, held_out: Sequence[Recording], evaluator: Evaluator) -> Iterator[Step]:
+def build_finding(state: SearchState, name: str, held_out: Sequence[Recording]) -> Iterator[Step]:
     """Build the finding of a finished search; yields the fraction of the work done, the stage, and the finding last."""
-    if state.nominal is None or state.weights is None:
-        raise ValueError("a finding needs a search that has ended")
-    decision = decide(state.weights)
-    best = state.nominal.refit if decision.verdict == "adequate" else decision.best
+    nominal, weights = state.fitted_nominal.refit, state.final_weights
+    decision = decide(weights)
+    best = nominal if decision.verdict == "adequate" else decision.best
     yield 0.0, "computing the intervals of the genes", None
-    best = replace(best, fit=with_measured_jacobian(state.subject, state.data, evaluator, best.fit))
+    best = replace(best, fit=with_measured_jacobian(state.context, best.fit))
     yield 0.05, "predicting the held-out recordings", None
-    validation, failed = predict_held_out(held_out, state.data, evaluator, state.nominal.refit.fit, best.fit)
+    validation, failed = predict_held_out(held_out, state.context, nominal.fit, best.fit)
     missing = MissingPhysics()
     if decision.verdict == "unnamed" or _is_load(decision, best):
-        unnamed = decision.verdict == "unnamed"
-        for fraction, stage, located in _locate(state, evaluator, unnamed=unnamed):
+        for fraction, stage, located in _locate(state, unnamed=decision.verdict == "unnamed"):
             missing = located
             yield 0.15 + 0.6 * fraction, stage, None
     advice: tuple[Advice, ...] = ()
     if decision.verdict != "adequate":
         apart = []
-        for part, one in separations(state.subject, state.data, state.weights, evaluator):
+        for part, one in separations(state.context, weights):
             apart += [one] if one else []
             yield 0.75 + 0.2 * part, "comparing conditions to record next", None
-        advice = rank_conditions(state.data, state.weights, apart)
-    location = _where(state, decision, best, missing, evaluator)
+        advice = rank_conditions(state.data, weights, apart)
+    location = _where(state, decision, best, missing)
     found = _finding(state, name, decision, best, validation, missing, advice, location)
     yield 1.0, "done", replace(found, remarks=(*found.remarks, *failed))
 
@@ -72,19 +80,19 @@ def _is_load(decision: Decision, best: Refit) -> bool:
     return decision.verdict in ("named", "ambiguous") and not families & {"actuation", "measurement"}
 
 
-def _locate(state: SearchState, evaluator: Evaluator, *, unnamed: bool) -> Iterator[tuple[float, str, MissingPhysics]]:
+def _locate(state: SearchState, *, unnamed: bool) -> Iterator[tuple[float, str, MissingPhysics]]:
     """Locate the missing physics recording by recording; where it is ``unnamed``, also with a finer model and a law."""
     data, nominal = state.data, state.fitted_nominal.refit
     if data.recordings[0].kind == "forces":
-        when = locate_pulse(state.subject, data, nominal.fit) if unnamed else None
-        loads = missing_forces(state.subject, data, nominal)
-        yield 1.0, "locating the missing force", MissingPhysics(loads, pulse=when)
+        when = locate_pulse(state.context, nominal.fit) if unnamed else None
+        loads = missing_forces(state.context, nominal)
+        yield 1.0, "locating the missing force", MissingPhysics(loads, LoadPlace(phase=when))
         return
     models, which = [(state.subject, nominal)], largest_residuals(data, nominal)
-    for finer in state.subject.finer_subjects()[:1] if unnamed else ():
-        yield 0.0, f"fitting a {finer.description}", MissingPhysics()
-        fitted = refit_at(finer, data, evaluator, nominal)
-        models += [(finer, fitted)] if fitted is not None else []
+    for finer in islice(state.context.finer(), int(unnamed)):
+        yield 0.0, f"fitting a {finer.subject.description}", MissingPhysics()
+        fitted = refit_at(finer, nominal)
+        models += [(finer.subject, fitted)] if fitted is not None else []
     found = []
     for k, (name, guess) in enumerate(load_estimates(models, data, which)):
         yield k / ((len(which) + 1.0) * len(models)), f"probing the wing under {name}", MissingPhysics()
@@ -92,26 +100,24 @@ def _locate(state: SearchState, evaluator: Evaluator, *, unnamed: bool) -> Itera
     yield 1.0, "locating the missing physics", missing_physics(found, law=unnamed)
 
 
-def _where(state: SearchState, decision: Decision, best: Refit, missing: MissingPhysics, evaluator: Evaluator) -> Where:
+def _where(state: SearchState, decision: Decision, best: Refit, missing: MissingPhysics) -> Where:
     """Where the misfit lies; for a named effect, where the effect acts: a fit spreads a misfit over the beat."""
     data, coefficients = state.data, state.fitted_nominal.refit.fit.coefficients
     if decision.verdict in ("named", "measurement fault"):
-        acts = contribution(data, evaluator, best)
+        acts = contribution(state.context, best)
         data, coefficients = (data, coefficients) if acts is None else (data.noiseless, acts)
     found = residual_location(data, maps.recording_residuals(state.subject, data, coefficients), coefficients)
     shown_refit = state.fitted_nominal.refit if decision.verdict == "unnamed" else best
-    own = {gene.name: gene.value for gene in all_genes(state.data, shown_refit)}
-    span = _effect_location(shown_refit, own, "span") or missing.span
-    chord = _effect_location(shown_refit, own, "chord") or missing.chord
-    phase = missing.phase if decision.verdict != "measurement fault" else None
-    return Where(
-        found.words + cause_location(span, chord, phase, drive_error=missing.drive_error),
-        span or found.span,
-        chord or found.chord,
-        phase or found.phase,
-        found.axis,
-        found.harmonics,
-        found.exponents,
+    own = {gene.name: gene.value for gene in gene_values(state.data, shown_refit)}
+    span = _effect_location(shown_refit, own, "span") or missing.place.span
+    chord = _effect_location(shown_refit, own, "chord") or missing.place.chord
+    phase = missing.place.phase if decision.verdict != "measurement fault" else None
+    return replace(
+        found,
+        words=found.words + cause_location(span, chord, phase, drive_error=missing.drive_error),
+        span=span or found.span,
+        chord=chord or found.chord,
+        phase=phase or found.phase,
     )
 
 
@@ -131,10 +137,8 @@ def _finding(
     advice: tuple[Advice, ...],
     location: Where,
 ) -> Finding:
-    subject, data, weights = state.subject, state.data, state.weights
-    if state.nominal is None or weights is None:
-        raise ValueError("a finding needs a search that has ended")
-    nominal, discretisation = state.nominal.refit, _discretisation_error(state)
+    subject, data, weights = state.subject, state.data, state.final_weights
+    nominal, discretisation = state.fitted_nominal.refit, _discretisation_error(state)
     own = ResidualPair(data, nominal.fit.residuals, best.fit.residuals)
     rows = recording_misfits(own, held_out=False, floor=discretisation)
     shown = list(maps.overlays(subject, data, own.before, own.after, held_out=False))
@@ -146,7 +150,7 @@ def _finding(
         proved = proof(validation, discretisation, unit, effects_added=bool(best.names))
         shown += maps.overlays(subject, validation.data, validation.before, validation.after, held_out=True)
     before, after = (maps.recording_residuals(subject, data, one.fit.coefficients) for one in (nominal, best))
-    suspects, genes = {suspect.name: suspect for suspect in subject.suspects}, all_genes(data, best)
+    suspects, genes = {suspect.name: suspect for suspect in subject.suspects}, gene_values(data, best)
     weights = replace(weights, refits=tuple(best if one.names == best.names else one for one in weights.refits))
     return Finding(
         dataset=name,
@@ -174,8 +178,8 @@ def _finding(
         advice=advice,
         outline=subject.outline,
         remarks=(
-            *state.nominal.remarks,
-            *_refinement_remarks(state.nominal),
+            *state.fitted_nominal.remarks,
+            *_refinement_remarks(state.fitted_nominal),
             *_noise_remarks(data),
             *_unidentified_sizes(genes, best),
             *_worsened(rows, best, unit),
@@ -189,9 +193,9 @@ def _discretisation_error(state: SearchState) -> float:
     Zero where a finer discretisation fits no better.
     """
     nominal = state.fitted_nominal
-    if state.weights is None or nominal.discretisation_error is None or nominal.tried_finer:
+    if nominal.discretisation_error is None or nominal.tried_finer:
         return 0.0
-    least = min(one.excess for one in state.weights.refits)
+    least = min(one.excess for one in state.final_weights.refits)
     return min(nominal.discretisation_error, float(np.sqrt(max(least, 0.0))))
 
 
@@ -207,15 +211,12 @@ def _summary_texts(
     data: WhitenedData, nominal: Refit, best: Refit, place: str, proved: Proof | None
 ) -> Mapping[str, str]:
     """The parts of the summary as text."""
-    unit = "mm" if data.recordings[0].kind == "tracks" else "mN"
-
-    def size(excess: float) -> str:
-        return f"{1e3 * np.sqrt(data.noise**2 + max(excess, 0.0)):.3g} {unit}"
-
+    unit = "m" if data.recordings[0].kind == "tracks" else "N"
+    before, after = (np.sqrt(data.noise**2 + max(one.excess, 0.0)) for one in (nominal, best))
     return {
-        "before": size(nominal.excess),
-        "after": size(best.excess),
-        "noise": f"{1e3 * data.noise:.3g} {unit}",
+        "before": in_milli(before, unit),
+        "after": in_milli(after, unit),
+        "noise": in_milli(data.noise, unit),
         "where": place,
         "held_out": f"On {proved.words}."
         if proved
@@ -224,19 +225,16 @@ def _summary_texts(
 
 
 def _refinement_remarks(nominal: Nominal) -> tuple[str, ...]:
-    if not nominal.tried_finer:
-        return ()
-    finer = nominal.tried_finer
-    return (f"a finer discretisation ({finer}) hardly fits better: the discretisation is not the cause",)
+    remark = f"a finer discretisation ({nominal.tried_finer}) hardly fits better: the discretisation is not the cause"
+    return (remark,) if nominal.tried_finer else ()
 
 
 def _noise_remarks(data: WhitenedData) -> tuple[str, ...]:
     within_beats = [r.name for r, v in zip(data.recordings, data.beat_fits, strict=True) if not v.between_beats]
-    still = {r.name: still_markers(r) for r in data.recordings}
     remarks = [
-        f"{name}: the recorded position of {', '.join(markers)} never changes; ignored: check how tracks are exported"
-        for name, markers in still.items()
-        if markers
+        f"{one.name}: the recorded position of {', '.join(markers)} never changes; ignored: check the export of tracks"
+        for one in data.recordings
+        if (markers := still_markers(one))
     ]
     if within_beats:
         remarks.append(
@@ -255,9 +253,8 @@ def _unidentified_sizes(genes: Sequence[GeneValue], best: Refit) -> tuple[str, .
 
 def _worsened(rows: Sequence[RecordingMisfit], best: Refit, unit: str) -> tuple[str, ...]:
     """Remark on recordings that fit worse with the added effects."""
-    name = "mm" if unit == "m" else "mN"
     worse = [
-        f"{row.name} from {1e3 * row.before.value:.3g} to {1e3 * row.after.value:.3g} {name}"
+        f"{row.name} from {1e3 * row.before.value:.3g} to {in_milli(row.after.value, unit)}"
         for row in rows
         if best.names and row.after.value > WORSE_FACTOR * row.before.value
     ]

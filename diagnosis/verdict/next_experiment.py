@@ -3,23 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.calibration.estimates.linearised import free_genes, residuals_of, values_at
-from wingfit.calibration.evaluator import Evaluator
+from wingfit.diagnosis.evidence.context import FitContext
 from wingfit.diagnosis.evidence.fit import PRIOR_SD, Fit
 from wingfit.diagnosis.evidence.refit import Refit
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.finding import Advice
-from wingfit.diagnosis.subject import Subject
 from wingfit.diagnosis.verdict.weigh_hypotheses import HypothesisWeights, tolerated_excess
 from wingfit.inference.differences import Outputs, differences
 from wingfit.records import Condition, Recording
-
-Array = npt.NDArray[np.float64]
+from wingfit.records.array_types import Array, Float
 
 MIN_PROBABILITY = 0.02  # of a hypothesis that is compared
 MAX_RIVALS = 3  # hypotheses that are compared
@@ -36,7 +33,7 @@ def rival_refits(weights: HypothesisWeights) -> list[Refit]:
 
 
 def separations(
-    subject: Subject, data: WhitenedData, weights: HypothesisWeights, evaluator: Evaluator
+    context: FitContext, weights: HypothesisWeights
 ) -> Iterator[tuple[float, tuple[float, Condition] | None]]:
     """Separation of the hypotheses under candidate conditions; yields the fraction done and each result.
 
@@ -44,25 +41,26 @@ def separations(
     no other condition can be among the best MAX_ADVICE. Yields nothing where there are no two hypotheses or no
     conditions.
     """
-    rivals, conditions = rival_refits(weights), subject.candidate_conditions()
+    rivals, conditions = rival_refits(weights), context.subject.candidate_conditions()
     if len(rivals) < 2:
         return
     if weights.probabilities.max() >= NEARLY_CERTAIN:
         conditions = conditions[:MAX_CONDITIONS_IF_CERTAIN]
-    predicted = list[tuple[float, _PredictedCondition]]()
+    predicted, (first, *others) = list[tuple[float, Recording]](), rivals
+    model = context.subject.with_initial_motion(context.subject.extended(first.names), first.fit.genome)
     for k, condition in enumerate(conditions):
-        prediction = _predict_condition(subject, rivals[0], condition)
-        if prediction is not None:
-            most = _separation(subject, data, prediction, rivals[1:], evaluator, adapt=False)
-            predicted += [] if most is None else [(most, prediction)]
+        recording = context.subject.simulated_recording(model, first.fit.genome, condition)
+        if recording is not None:
+            most = _least_separation(context, first, recording, others, adapt=False)
+            predicted += [] if most is None else [(most, recording)]
         yield 0.5 * (k + 1) / len(conditions), None
     found = list[float]()
-    for k, (most, prediction) in enumerate(sorted(predicted, key=lambda pair: -pair[0])):
+    for k, (most, recording) in enumerate(sorted(predicted, key=lambda pair: -pair[0])):
         if sum(one >= most for one in found) >= MAX_ADVICE:
             return
-        least = _separation(subject, data, prediction, rivals[1:], evaluator, adapt=True)
+        least = _least_separation(context, first, recording, others, adapt=True)
         found += [] if least is None else [least]
-        yield 0.5 + 0.5 * (k + 1) / len(predicted), None if least is None else (least, prediction.recording.condition)
+        yield 0.5 + 0.5 * (k + 1) / len(predicted), None if least is None else (least, recording.condition)
 
 
 def rank_conditions(
@@ -73,58 +71,31 @@ def rank_conditions(
     return tuple(_advice(data, weights, rivals, size, condition) for size, condition in best)
 
 
-@dataclass(frozen=True)
-class _PredictedCondition:
-    """The ``recording`` that the first hypothesis, with ``genome`` [G], predicts under a condition."""
-
-    genome: Array
-    recording: Recording
-
-
-def _predict_condition(subject: Subject, first: Refit, condition: Condition) -> _PredictedCondition | None:
-    genome = first.fit.problem.genomes(np.array(list(first.fit.values.values())))[0]
-    model = subject.with_initial_motion(subject.extended(first.names), genome)
-    recording = subject.simulated_recording(model, genome, condition)
-    return None if recording is None else _PredictedCondition(genome, recording)
-
-
-def _separation(
-    subject: Subject,
-    data: WhitenedData,
-    prediction: _PredictedCondition,
-    others: Sequence[Refit],
-    evaluator: Evaluator,
-    *,
-    adapt: bool,
+def _least_separation(
+    context: FitContext, first: Refit, recording: Recording, others: Sequence[Refit], *, adapt: bool
 ) -> float | None:
-    """Smallest separation of several rivals; None where one of them cannot be simulated."""
-    genome, recording = prediction.genome, prediction.recording
-    values = [separation(subject, data, genome, recording, one.fit, evaluator, adapt=adapt) for one in others]
+    """Smallest separation of the rivals ``others``; None where one of them cannot be simulated."""
+    values = [separation(context, first.fit.genome, recording, one.fit, adapt=adapt) for one in others]
     known = [one for one in values if one is not None]
     return min(known) if len(known) == len(others) else None
 
 
 def separation(
-    subject: Subject,
-    data: WhitenedData,
-    genome: Array,
-    recording: Recording,
-    rival: Fit,
-    evaluator: Evaluator,
-    *,
-    adapt: bool,
+    context: FitContext, genome: Float[Array, " G"], recording: Recording, rival: Fit, *, adapt: bool
 ) -> float | None:
-    """Root mean square difference (in noises) of a rival from the first hypothesis' prediction ``recording``.
+    """Root mean square difference (in noises) of a rival from the ``recording`` that the first hypothesis predicts.
+
+    ``genome`` [G] is that of the first hypothesis.
 
     With ``adapt`` the rival's genes adapt as far as the existing recordings allow. A difference that the genes
     can compensate would not distinguish the hypotheses (T-optimality: Atkinson and Fedorov 1975, with the posterior of
     the genes). None where the rival cannot be simulated.
     """
-    model = subject.with_initial_motion(rival.problem.model, genome)
+    model, data = context.subject.with_initial_motion(rival.problem.model, genome), context.data
     problem = replace(rival.problem, model=model, recordings=(recording,))
 
     def simulate(units: Array) -> tuple[Outputs, tuple[str | None, ...]]:
-        evaluation = evaluator.evaluate(problem, values_at(free_genes(problem), units), residuals=True)
+        evaluation = context.evaluator.evaluate(problem, values_at(free_genes(problem), units), residuals=True)
         return residuals_of(evaluation), evaluation.reasons
 
     columns = np.arange(len(rival.unit)) if adapt else np.empty(0, np.int64)

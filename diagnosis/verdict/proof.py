@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
-from wingfit.calibration.evaluator import Evaluator
-from wingfit.calibration.problem import Problem
+from wingfit.diagnosis.evidence.context import FitContext
 from wingfit.diagnosis.evidence.fit import Fit
 from wingfit.diagnosis.evidence.intervals import CONFIDENCE
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
-from wingfit.diagnosis.finding import Interval, Proof, RecordingMisfit
+from wingfit.diagnosis.finding import Interval, Proof, RecordingMisfit, in_milli
 from wingfit.records import Recording
-
-Array = npt.NDArray[np.float64]
+from wingfit.records.array_types import Array
 
 BOOTSTRAP_DRAWS = 400  # of markers, with replacement (Efron 1979)
 MIN_MARKERS = 4  # for a bootstrap over markers
@@ -34,21 +31,28 @@ class ResidualPair:
     after: tuple[Array, ...]
     incomplete: bool = False
 
+    @property
+    def squares(self) -> Iterator[Array]:
+        """Squares [2, T, C] of the residuals before and after, NaN where a channel is not used, by recording."""
+        for fit, *residuals in zip(self.data.beat_fits, self.before, self.after, strict=True):
+            yield np.stack([np.where(fit.used, one, np.nan) ** 2 for one in residuals])
+
 
 def predict_held_out(
-    recordings: Sequence[Recording], fitted: WhitenedData, evaluator: Evaluator, before: Fit, after: Fit
+    recordings: Sequence[Recording], context: FitContext, before: Fit, after: Fit
 ) -> tuple[ResidualPair | None, tuple[str, ...]]:
     """Residuals of recordings that neither model was fitted to, and remarks on those that cannot be simulated.
 
-    ``fitted`` are the data of the fits, whose force axes and thresholds are used here too. None where no recording can
-    be simulated with both models.
+    ``context`` is that of the fits, whose force axes and thresholds are used here too. None where no recording can be
+    simulated with both models.
     """
+    fitted = context.data
     kept, pairs, failed, incomplete = list[Recording](), list[tuple[Array, Array]](), list[str](), False
     for recording in recordings:
         one, found, reasons = WhitenedData.of([recording], fitted.axes, fitted.policy), [], []
         for fit in (before, after):
-            problem = Problem(fit.problem.model, one.recordings, fit.problem.free, fit.problem.base, fitted.axes)
-            _, (reason,), (residuals,) = one.evaluate(problem, evaluator, np.array([list(fit.values.values())]))
+            problem = replace(fit.problem, recordings=one.recordings)
+            _, (reason,), (residuals,) = one.evaluate(problem, context.evaluator, fit.individual)
             found.append(residuals[0])
             reasons.append(reason)
         incomplete = incomplete or reasons[1] is not None
@@ -61,9 +65,8 @@ def predict_held_out(
     if not kept:
         return None, tuple(failed)
     before_all, after_all = zip(*pairs, strict=True)
-    return ResidualPair(WhitenedData.of(kept, fitted.axes, fitted.policy), before_all, after_all, incomplete), tuple(
-        failed
-    )
+    data = WhitenedData.of(kept, fitted.axes, fitted.policy)
+    return ResidualPair(data, before_all, after_all, incomplete), tuple(failed)
 
 
 def recording_misfits(predicted: ResidualPair, *, held_out: bool, floor: float) -> tuple[RecordingMisfit, ...]:
@@ -71,8 +74,8 @@ def recording_misfits(predicted: ResidualPair, *, held_out: bool, floor: float) 
     rows = []
     for r, recording in enumerate(predicted.data.recordings):
         beat_fit, condition = predicted.data.beat_fits[r], recording.condition
-        own = ResidualPair(predicted.data, (predicted.before[r],), (predicted.after[r],))
-        before, after, _ = _misfits(own, [beat_fit.used], [recording.kind])
+        alone = replace(predicted.data, recordings=(recording,), beat_fits=(beat_fit,))
+        before, after, _ = _misfits(ResidualPair(alone, (predicted.before[r],), (predicted.after[r],)))
         noise = float(np.sqrt(np.mean(beat_fit.noise[beat_fit.used] ** 2)))
         rows.append(
             RecordingMisfit(
@@ -96,13 +99,11 @@ def proof(predicted: ResidualPair, floor: float, unit: str, *, effects_added: bo
     ``effects_added``: whether effects were added, so that the models differ.
     """
     data = predicted.data
-    used, kinds = [beat_fit.used for beat_fit in data.beat_fits], [one.kind for one in data.recordings]
-    before, after, better = _misfits(predicted, used, kinds)
+    before, after, better = _misfits(predicted)
     least = float(np.hypot(data.noise, floor))
-    display = {"m": (1e3, "mm"), "N": (1e3, "mN")}[unit]
-    change = f"{display[0] * before.value:.3g} {display[1]}"
+    change = in_milli(before.value, unit)
     if effects_added:
-        change += f" before, {display[0] * after.value:.3g} {display[1]} after"
+        change += f" before, {in_milli(after.value, unit)} after"
     better = better and not predicted.incomplete
     several = "s" if len(data.recordings) > 1 else ""
     words = f"{len(data.recordings)} held-out recording{several}: {change}, {after.value / least:.2f} times the floor"
@@ -116,21 +117,18 @@ def _relative_to_floor(interval: Interval, floor: float) -> Interval:
     return Interval(interval.value / floor, low and low / floor, high and high / floor)
 
 
-def _misfits(
-    predicted: ResidualPair, used: Sequence[npt.NDArray[np.bool_]], kinds: Sequence[str]
-) -> tuple[Interval, Interval, bool]:
+def _misfits(predicted: ResidualPair) -> tuple[Interval, Interval, bool]:
     """Root mean squares before and after with intervals, and whether the decrease is significant."""
-    groups: list[Array] = []
-    for before, after, own, kind in zip(predicted.before, predicted.after, used, kinds, strict=True):
-        width = 3 if kind == "tracks" else 1
-        squares = np.stack([np.where(own, one, np.nan) ** 2 for one in (before, after)])
+    kind, groups = predicted.data.recordings[0].kind, list[Array]()
+    for squares in predicted.squares:
         count = np.isfinite(squares[0]).sum(axis=0)
         total = np.nansum(squares, axis=1)
+        width = 3 if kind == "tracks" else 1
         rows = np.concatenate([total, count[None].astype(float)]).reshape(3, -1, width).sum(axis=2)
         groups.append(rows[:, rows[2] > 0])
     every = np.concatenate(groups, axis=1)
-    if "forces" in kinds or every.shape[1] < MIN_MARKERS:  # blocks of time instead of markers
-        every = _time_blocks(predicted, used)
+    if kind == "forces" or every.shape[1] < MIN_MARKERS:  # blocks of time instead of markers
+        every = _time_blocks(predicted)
     drawn = np.random.default_rng(0).integers(0, every.shape[1], (BOOTSTRAP_DRAWS, every.shape[1]))
     sums = every[:, drawn].sum(axis=2)
     rms = np.sqrt(sums[:2] / sums[2])
@@ -140,12 +138,11 @@ def _misfits(
     return found[0], found[1], bool(np.mean(rms[1] < rms[0]) >= 0.5 + CONFIDENCE / 2)
 
 
-def _time_blocks(predicted: ResidualPair, used: Sequence[npt.NDArray[np.bool_]], count: int = 12) -> Array:
+def _time_blocks(predicted: ResidualPair, count: int = 12) -> Array:
     """Sums of squares before and after and counts [3, N] over blocks of time."""
     rows = []
-    for before, after, own in zip(predicted.before, predicted.after, used, strict=True):
-        for part in np.array_split(np.arange(len(before)), count):
-            squares = [np.where(own, one[part], np.nan) ** 2 for one in (before, after)]
-            rows.append([np.nansum(squares[0]), np.nansum(squares[1]), np.isfinite(squares[0]).sum()])
+    for squares in predicted.squares:
+        for before, after in zip(*(np.array_split(one, count) for one in squares), strict=True):
+            rows.append([np.nansum(before), np.nansum(after), np.isfinite(before).sum()])
     found = np.array(rows, float).T
     return np.asarray(found[:, found[2] > 0])

@@ -11,7 +11,7 @@ from wingfit.diagnosis.evidence.intervals import gene_values
 from wingfit.diagnosis.evidence.refit import Refit
 from wingfit.diagnosis.evidence.screen import Trial
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
-from wingfit.diagnosis.finding import VERDICTS, GeneValue, Hypothesis, Verdict
+from wingfit.diagnosis.finding import VERDICTS, Hypothesis, Verdict
 from wingfit.diagnosis.subject import Suspect
 from wingfit.diagnosis.verdict.weigh_hypotheses import HypothesisWeights
 
@@ -90,6 +90,7 @@ def _refitted_hypothesis(
 ) -> Hypothesis:
     refit, nominal = weights.refits[k], weights.refits[0]
     suspects = [trial.suspect for trial in refit.trials]
+    own = {gene.name for suspect in suspects for gene in suspect.genes}
     predicted = None
     if refit.predicted is not None and nominal.predicted is not None:
         predicted = _explained_fraction(refit.predicted, nominal.predicted)
@@ -107,7 +108,7 @@ def _refitted_hypothesis(
         predicted=predicted,
         misfit=float(np.sqrt(max(refit.excess, 0.0) + data.noise**2)),
         refitted=True,
-        genes=effect_genes(data, refit),
+        genes=tuple(gene for gene in gene_values(data, refit) if gene.name in own),
     )
 
 
@@ -138,18 +139,6 @@ def _screened_hypothesis(trial: Trial, start: float, data: WhitenedData) -> Hypo
         float(data.noise * np.sqrt(1.0 + remaining)),
         False,
     )
-
-
-def effect_genes(data: WhitenedData, refit: Refit) -> tuple[GeneValue, ...]:
-    """Genes of the suspects of a refit."""
-    own = {gene.name for trial in refit.trials for gene in trial.suspect.genes}
-    return tuple(gene for gene in all_genes(data, refit) if gene.name in own)
-
-
-def all_genes(data: WhitenedData, refit: Refit) -> tuple[GeneValue, ...]:
-    """All free genes of a refit."""
-    off = {name: 0.0 for trial in refit.trials for name in trial.suspect.size_genes}
-    return gene_values(data, refit.fit, off)
 
 
 def _is_measurement_fault(refit: Refit) -> bool:

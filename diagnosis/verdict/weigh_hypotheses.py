@@ -19,13 +19,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.diagnosis.evidence.refit import Refit
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.policy import POLICY, Policy
-
-Array = npt.NDArray[np.float64]
+from wingfit.records.array_types import Array, Float
 
 
 @dataclass(frozen=True)
@@ -36,10 +34,10 @@ class HypothesisWeights:
     """
 
     refits: tuple[Refit, ...]
-    evidence: Array
-    probabilities: Array
+    evidence: Float[Array, " H"]
+    probabilities: Float[Array, " H"]
     unknown: float
-    excess: Array
+    excess: Float[Array, " H"]
     policy: Policy = POLICY
 
 

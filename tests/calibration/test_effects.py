@@ -257,7 +257,7 @@ def test_an_effect_that_is_not_there_is_found_at_zero_and_its_place_not_determin
     problem = bumpy(Bumpy(lower=0.0, width=0.5), -0.3, 0.5)
     found = estimate(problem, Here(), {})
     assert found.values["bump.size"] == 0.0
-    assert np.isfinite(found.correlation).all()
+    assert np.isfinite(found.uncertainty.correlation).all()
     assert not found.uncertainty.standing["bump.place"].identifiable
     assert not any("bound" in remark and "bump.size" in remark for remark in found.remarks)
     (said,) = absent(found.values, problem.free)

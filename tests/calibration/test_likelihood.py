@@ -57,10 +57,10 @@ def test_two_axes_are_weighed_by_their_full_covariance() -> None:
     found = estimate(problem(record), HERE, {})
     assert list(found.values.values()) == pytest.approx(genes, abs=1e-5)
     left = record.values - shapes @ genes
-    np.testing.assert_allclose(found.noise[0], left.T @ left / len(left), rtol=1e-3)
+    np.testing.assert_allclose(found.uncertainty.noise[0], left.T @ left / len(left), rtol=1e-3)
     n = len(left)
     cost = n + 0.5 * n * np.log(np.linalg.det(left.T @ left / n)) + n * np.log(2 * np.pi)
-    assert found.cost == pytest.approx(cost, rel=1e-6), "Eq. 22"
+    assert found.uncertainty.cost == pytest.approx(cost, rel=1e-6), "Eq. 22"
     unweighed = np.linalg.lstsq(shapes.reshape(-1, 3), record.values.ravel(), rcond=None)[0]
     assert np.abs(unweighed - genes).max() > 1e-3, "the weights matter here"
 

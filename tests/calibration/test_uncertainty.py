@@ -161,9 +161,9 @@ def test_white_noise_gives_the_textbook_covariance() -> None:
     found = estimate(problem(record), HERE, {})
     shapes = Linear().shapes(record)[:, 0]
     expected = 0.03**2 * np.linalg.inv(shapes.T @ shapes)
-    np.testing.assert_allclose(found.covariance, expected, rtol=0.25, atol=0.1 * expected.max())
+    np.testing.assert_allclose(found.uncertainty.covariance, expected, rtol=0.25, atol=0.1 * expected.max())
     scale = np.sqrt(np.diag(expected))
-    np.testing.assert_allclose(found.correlation, expected / scale / scale[:, None], atol=0.05)
+    np.testing.assert_allclose(found.uncertainty.correlation, expected / scale / scale[:, None], atol=0.05)
 
 
 def test_correlations_are_given_back_what_the_fit_took() -> None:
@@ -241,7 +241,7 @@ def test_the_ratio_of_twins_is_told_and_said() -> None:
         problem(recorded(0.01 * remembering(600, 1, np.random.default_rng(7)), model=model), model), HERE, {}
     )
     assert any(remark.startswith("a and b compensate each other") or "a : b" in remark for remark in found.remarks)
-    assert found.correlation[0, 1] > 0.99
+    assert found.uncertainty.correlation[0, 1] > 0.99
     assert not any("c is not identifiable" in remark for remark in found.remarks)
 
 

@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from wingfit.calibration.problem import Problem
 from wingfit.diagnosis.evidence import fit
+from wingfit.diagnosis.evidence.context import FitContext
 from wingfit.diagnosis.evidence.fit import Fit
 from wingfit.records import Gene, Genome
 
@@ -79,22 +80,22 @@ class ClosedForm:
 
     def broyden_fit(self, start: Array, jacobian: Array | None = None, known: Flags | None = None) -> Fit:
         """See :func:`wingfit.diagnosis.evidence.fit.broyden_fit`."""
-        return fit.broyden_fit(self.rig, self.rig, self.problem, NO_EVALUATOR, start, jacobian, known=known)
+        return fit.broyden_fit(self.context, self.problem, start, jacobian, known=known)
 
     def gauss_newton_fit(self, start: Array, steps: int) -> list[Fit]:
         """See :func:`wingfit.diagnosis.evidence.fit.gauss_newton_fit`."""
-        return list(fit.gauss_newton_fit(self.rig, self.rig, self.problem, NO_EVALUATOR, start, steps))
+        return list(fit.gauss_newton_fit(self.context, self.problem, start, steps))
 
     def with_measured_jacobian(self, fitted: Fit) -> Fit:
         """See :func:`wingfit.diagnosis.evidence.fit.with_measured_jacobian`."""
-        return fit.with_measured_jacobian(self.rig, self.rig, NO_EVALUATOR, fitted)
+        return fit.with_measured_jacobian(self.context, fitted)
 
     @property
     def simulator(self) -> fit._Simulator:
         """The simulator of a single step."""
-        return fit._Simulator(self.rig, self.rig, self.problem, NO_EVALUATOR)
+        return fit._Simulator(self.context, self.problem)
 
     @property
-    def rig(self) -> Any:
-        """Itself: it has what fits use of a subject and of data."""
-        return self
+    def context(self) -> FitContext:
+        """Itself as subject and data: it has what fits use of both."""
+        return FitContext(cast("Any", self), cast("Any", self), NO_EVALUATOR)

@@ -13,6 +13,7 @@ import pytest
 from tests.diagnosis.pendulum_rig import GENES, SUSPECTS, PendulumRig, recorded
 from wingfit.diagnosis import DiagnosisSpec
 from wingfit.diagnosis.evidence.competing_fits import StartPoint
+from wingfit.diagnosis.evidence.context import FitContext
 from wingfit.diagnosis.evidence.screen import Trial
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.policy import POLICY
@@ -91,8 +92,9 @@ def test_a_hypothesis_at_the_noise_has_no_look_alikes() -> None:
 
 def test_fits_from_the_estimates_ignore_the_given_start() -> None:
     rig = PendulumRig()
-    known = SearchState(rig, WhitenedData.of(recorded({})))
-    steps = run_search(known, DiagnosisSpec(start={"stiffness": 0.25}), rig.model.searched, InProcessEvaluator())
+    context = FitContext(rig, WhitenedData.of(recorded({})), InProcessEvaluator())
+    known = SearchState(context, DiagnosisSpec(start={"stiffness": 0.25}))
+    steps = run_search(known, rig.model.searched)
     next(steps)
     next(steps)
     assert known.initial_fit is not None

@@ -12,6 +12,7 @@ import pytest
 
 from tests.diagnosis.pendulum_rig import SUSPECTS
 from wingfit.diagnosis.evidence.competing_fits import FIRST_STEPS, _CompetingFits, fit_from_estimates, start_points
+from wingfit.diagnosis.evidence.context import FitContext
 from wingfit.diagnosis.evidence.fit import InitialSimulationError
 from wingfit.diagnosis.evidence.screen import Trial
 from wingfit.diagnosis.policy import POLICY
@@ -59,7 +60,9 @@ def compete(monkeypatch: pytest.MonkeyPatch) -> Any:
                 yield SimpleNamespace(cost=cost, coefficients=cost, unit=np.array([1e-3 * cost]))
 
         monkeypatch.setattr("wingfit.diagnosis.evidence.competing_fits._from_estimates", steps)
-        found: Any = list(fit_from_estimates(NOTHING, data(noise), NOTHING, NOTHING, entered, limit, target))
+        found: Any = list(
+            fit_from_estimates(FitContext(NOTHING, data(noise), NOTHING), NOTHING, entered, limit, target)
+        )
         if rivals is not None:
             rivals.extend(entry.name for entry, _ in found[-1])
         return (found[-1][0][0].name, found[-1][0][1].cost, steps_run) if found else ("", np.inf, steps_run)

@@ -15,7 +15,7 @@ import pytest
 from tests.diagnosis.pendulum_rig import PendulumRig, recorded
 from wingfit.calibration.estimates.linearised import free_genes, unit_at
 from wingfit.calibration.problem import Problem, base_genome
-from wingfit.diagnosis import DiagnosisSpec
+from wingfit.diagnosis.evidence.context import FitContext
 from wingfit.diagnosis.evidence.fit import (
     Fit,
     InitialSimulationError,
@@ -46,6 +46,10 @@ def whitened_pendulum(noise: float = 5e-4, seed: int = 1, **hidden: float) -> Wh
     )
 
 
+def context(data: WhitenedData) -> FitContext:
+    return FitContext(RIG, data, EVALUATOR)
+
+
 def problem(data: WhitenedData, values: Mapping[str, float] | None = None) -> Problem:
     return Problem(RIG.model, data.recordings, RIG.model.searched, base_genome(RIG.model, values or {}), data.axes)
 
@@ -57,7 +61,7 @@ def start(own: Problem) -> Array:
 
 def fit(data: WhitenedData, values: Mapping[str, float] | None = None) -> Fit:
     fitted_problem = problem(data, values)
-    *_, found = gauss_newton_fit(RIG, data, fitted_problem, EVALUATOR, start(fitted_problem), 20)
+    *_, found = gauss_newton_fit(context(data), fitted_problem, start(fitted_problem), 20)
     return found
 
 
@@ -126,7 +130,7 @@ def test_intervals_include_model_error_and_tolerance() -> None:
 def test_one_sided_and_central_differences_agree_at_a_bound() -> None:
     data = one()
     fitted_problem = problem(data)
-    simulator, every = _Simulator(RIG, data, fitted_problem, EVALUATOR), np.ones(len(fitted_problem.free), bool)
+    simulator, every = _Simulator(context(data), fitted_problem), np.ones(len(fitted_problem.free), bool)
     middle = fit(data)
     one_sided, central = (_measure_columns(simulator, middle, every, sides).jacobian for sides in (1, 2))
     assert np.linalg.norm(one_sided - central) < 0.05 * np.linalg.norm(central)
@@ -172,15 +176,16 @@ def test_a_nominal_fit_leaves_a_local_minimum_by_a_hypothesis() -> None:
     data = one()
     good = fit(data)
     bad = replace(good, unit=np.full(len(good.unit), 0.9))
-    simulator = _Simulator(RIG, data, good.problem, EVALUATOR)
+    simulator = _Simulator(context(data), good.problem)
     bad = replace(bad, coefficients=simulator.at(bad.unit[None], bad.unit)[0][0])
     caught = Nominal(RIG, make_refit(data, bad), None, "", ())
-    state = SearchState(RIG, data, caught, refits=[make_refit(data, good)])
-    found = _nominal_from_best(state, EVALUATOR)
+    state = SearchState(context(data), nominal=caught, refits=[make_refit(data, good)])
+    found = _nominal_from_best(state)
     assert found is not None
     assert found.excess < 0.1 * caught.refit.excess
-    state = SearchState(RIG, data, Nominal(RIG, make_refit(data, good), None, "", ()), refits=[make_refit(data, good)])
-    assert _nominal_from_best(state, EVALUATOR) is None
+    own = make_refit(data, good)
+    state = SearchState(context(data), nominal=Nominal(RIG, own, None, "", ()), refits=[own])
+    assert _nominal_from_best(state) is None
 
 
 @pytest.mark.parametrize(
@@ -224,8 +229,8 @@ def test_a_finer_discretisation_does_not_hide_an_effect(
     monkeypatch.setattr("wingfit.diagnosis.search.choose_discretisation", lambda *_, refine: fits[refine])
     monkeypatch.setattr("wingfit.diagnosis.search._try_suspects", tried)
     monkeypatch.setattr("wingfit.diagnosis.search.nominal_suffices", lambda *_: False)
-    state = SearchState(cast("Any", "coarse"), cast("Any", SimpleNamespace(policy=POLICY)))
-    parts = [part for part, _ in _search_coarse_first(state, DiagnosisSpec(), *cast("Any", (None, [], None)))]
+    state = SearchState(FitContext(*cast("Any", ("coarse", SimpleNamespace(policy=POLICY), None))))
+    parts = [part for part, _ in _search_coarse_first(state, cast("Any", None), [])]
     assert searched == expected
     assert cast("Any", state.nominal).subject == taken
     assert cast("Any", state.subject) == taken
@@ -243,7 +248,7 @@ def test_geodesic_acceleration_follows_a_curved_valley() -> None:
         return np.asarray((coefficients**2).sum(axis=-1))
 
     data = SimpleNamespace(scale=np.ones(2), likelihood_weight=lambda coefficients: 1.0, deviance=deviance)  # noqa: ARG005
-    simulator = cast(_Simulator, SimpleNamespace(data=data, at=at))
+    simulator = cast(_Simulator, SimpleNamespace(context=SimpleNamespace(data=data), at=at))
     unit = np.array([0.1, 0.0])
     here = at(unit[None], unit)[0][0]
     slopes = np.array([[0.0, 3e4], [-30.0, 0.0]])
@@ -258,23 +263,21 @@ def test_geodesic_acceleration_follows_a_curved_valley() -> None:
 def test_substitutes_reproduce_the_contribution_of_an_effect() -> None:
     data = whitened_pendulum(friction_torque=2e-3, delay_time=4e-3)
     nominal = fit(data)
-    found = [trials for _, trials in score_tests(RIG, data, nominal, EVALUATOR, RIG.suspects)]
+    found = [trials for _, trials in score_tests(context(data), nominal, RIG.suspects)]
     best = {trials[0].suspect.name: trials[0] for trials in found}
-    both = refit_with(RIG, data, nominal, EVALUATOR, [best["friction"], best["delay"]])
+    both = refit_with(context(data), nominal, [best["friction"], best["delay"]])
     assert both is not None
     twin = replace(best["delay"], suspect=replace(best["delay"].suspect, name="twin"))
     offered = [*found, [twin]]
-    assert substitute_trials(data, EVALUATOR, both, best["delay"], offered, 2) == [twin]
-    assert substitute_trials(data, EVALUATOR, both, best["friction"], offered, 2) == []
+    assert substitute_trials(context(data), both, best["delay"], offered, 2) == [twin]
+    assert substitute_trials(context(data), both, best["friction"], offered, 2) == []
 
 
 def test_a_failed_subset_fit_does_not_end_a_refit(monkeypatch: pytest.MonkeyPatch) -> None:
     """A diverged refit is repeated with its size first; where that fails to start, the refit stays."""
     data = whitened_pendulum(point_mass_mass=5e-3, point_mass_station=0.5)
     nominal = fit(data)
-    ((_, trials),) = score_tests(
-        RIG, data, nominal, EVALUATOR, [one for one in RIG.suspects if one.name == "point_mass"]
-    )
+    ((_, trials),) = score_tests(context(data), nominal, [one for one in RIG.suspects if one.name == "point_mass"])
     calls = []
 
     def fails(*arguments: Any) -> Fit:
@@ -283,5 +286,5 @@ def test_a_failed_subset_fit_does_not_end_a_refit(monkeypatch: pytest.MonkeyPatc
 
     data = replace(data, policy=replace(POLICY, diverged=0.0))
     monkeypatch.setattr("wingfit.diagnosis.evidence.refit._fit_subset", fails)
-    assert refit_with(RIG, data, nominal, EVALUATOR, trials[:1]) is not None
+    assert refit_with(context(data), nominal, trials[:1]) is not None
     assert calls

@@ -15,10 +15,8 @@ from wingfit.diagnosis.subject import ChannelLocation
 
 def misfit(stations: Sequence[float], sizes: Sequence[float]) -> Any:
     """One recording with a marker at each of the ``stations`` with mean square misfits ``sizes``."""
-    beat_fit = SimpleNamespace(weight=np.ones(1))
     places = tuple(ChannelLocation(f"m{k}", "z", at, 0.5, 0.0, at) for k, at in enumerate(stations))
-    coefficients = np.sqrt(np.array(sizes, float))[:, None]
-    return [SimpleNamespace(beat_fit=beat_fit, locations=places, coefficients=coefficients, variance=np.zeros(1))]
+    return [SimpleNamespace(locations=places, excess=np.array(sizes, float))]
 
 
 def along(stations: Sequence[float], sizes: Sequence[float]) -> tuple[float, float, float]:

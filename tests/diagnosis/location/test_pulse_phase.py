@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from wingfit.diagnosis.evidence.context import FitContext
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.location.pulse_phase import locate_pulse
 from wingfit.records import Condition, LowPass, Recording
@@ -45,7 +46,7 @@ def pulse_of(of: WhitenedData) -> Any:
     left = white - genes @ (genes.T @ white)
     unit = np.full(genes.shape[1], 0.5)
     fit = SimpleNamespace(coefficients=left * of.scale, jacobian=1e3 * genes * of.scale[:, None], unit=unit)
-    return locate_pulse(SUBJECT, of, cast("Any", fit))
+    return locate_pulse(FitContext(SUBJECT, of, cast("Any", None)), cast("Any", fit))
 
 
 @pytest.mark.parametrize("when", [0.05, 0.3, 0.98])

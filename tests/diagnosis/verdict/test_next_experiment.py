@@ -7,6 +7,7 @@ import numpy as np
 from tests.diagnosis.pendulum_rig import Pendulum, PendulumRig, at, recorded
 from wingfit.calibration.estimates.linearised import free_genes, unit_at
 from wingfit.calibration.problem import Problem, base_genome
+from wingfit.diagnosis.evidence.context import FitContext
 from wingfit.diagnosis.evidence.fit import Fit, gauss_newton_fit
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.verdict.next_experiment import separation
@@ -21,9 +22,8 @@ def fitted_pendulum(data: WhitenedData) -> Fit:
     model = Pendulum(("gain",))
     problem = Problem(model, data.recordings, model.searched, base_genome(model, TRUTH), data.axes)
     genes = free_genes(problem)
-    *_, found = gauss_newton_fit(
-        RIG, data, problem, EVALUATOR, unit_at(genes, np.array([problem.base[g.name] for g in genes])), 15
-    )
+    start = unit_at(genes, np.array([problem.base[gene.name] for gene in genes]))
+    *_, found = gauss_newton_fit(FitContext(RIG, data, EVALUATOR), problem, start, 15)
     return found
 
 
@@ -36,9 +36,8 @@ def apart(frequencies: tuple[float, ...], then: float, **missing: float) -> tupl
     genome = np.array([truth[gene.name] for gene in model.genes])
     recording = RIG.simulated_recording(model, genome, at(then))
     assert recording is not None
-    adapted, plain = (
-        separation(RIG, data, genome, recording, rival, EVALUATOR, adapt=adapt) for adapt in (True, False)
-    )
+    context = FitContext(RIG, data, EVALUATOR)
+    adapted, plain = (separation(context, genome, recording, rival, adapt=adapt) for adapt in (True, False))
     assert adapted is not None
     assert plain is not None
     return adapted, plain

@@ -12,11 +12,16 @@ from wingfit.diagnosis.verdict.build_finding import _worsened
 from wingfit.diagnosis.verdict.proof import ResidualPair, _misfits
 
 
+def data(kind: str, recordings: int, channels: int) -> Any:
+    """Recordings of a kind whose channels are all used."""
+    beat_fit = SimpleNamespace(used=np.ones(channels, bool))
+    return SimpleNamespace(recordings=[SimpleNamespace(kind=kind)] * recordings, beat_fits=[beat_fit] * recordings)
+
+
 def test_forces_are_bootstrapped_in_blocks_of_time() -> None:
     """Both axes have equal errors that vary in time: a bootstrap over axes would give no interval."""
     off = np.repeat(np.linspace(1.0, 3.0, 48)[:, None], 2, axis=1)
-    pair = ResidualPair(cast("Any", None), (off, off), (0.5 * off, 0.5 * off))
-    before, after, better = _misfits(pair, [np.ones(2, bool)] * 2, ["forces", "forces"])
+    before, after, better = _misfits(ResidualPair(data("forces", 2, 2), (off, off), (0.5 * off, 0.5 * off)))
     assert before.value == 2.0 * after.value
     assert better
     assert before.low is not None
@@ -28,7 +33,7 @@ def test_forces_are_bootstrapped_in_blocks_of_time() -> None:
 def test_tracks_are_bootstrapped_by_marker() -> None:
     rng = np.random.default_rng(1)
     off = np.repeat(rng.uniform(1.0, 3.0, 20), 3) * np.ones((30, 60))
-    before, _, _ = _misfits(ResidualPair(cast("Any", None), (off,), (off,)), [np.ones(60, bool)], ["tracks"])
+    before, _, _ = _misfits(ResidualPair(data("tracks", 1, 60), (off,), (off,)))
     assert before.low is not None
     assert before.high is not None
     assert before.low < before.value < before.high
