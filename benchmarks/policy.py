@@ -8,11 +8,12 @@ as changed where the verdict or the effects that it names differ from those with
 from __future__ import annotations
 
 import argparse
+import hashlib
 import json
 import sys
 import tempfile
 import time
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -20,7 +21,7 @@ from benchmarks.concealed.run_diagnosis import Outcome, Task, run
 from benchmarks.concealed.seal import read
 from benchmarks.concealed.suite import Folders, each, make, pool, task
 from benchmarks.concealed.trials import Trial, plan
-from wingfit.diagnosis.policy import POLICY, described
+from wingfit.diagnosis.policy import POLICY, Policy, described
 
 SEED = 8  # of the concealed suite
 FACTORS = {"halved": 0.5, "doubled": 2.0}
@@ -51,7 +52,11 @@ def main() -> None:
     parser.add_argument("--json", action="store_true", help="end with one line that holds everything as JSON")
     parser.add_argument("--jobs", type=int, default=2, help="processes at once")
     parser.add_argument("--wings", type=int, default=1, help="wings in the sample, the fastest first; vehicles are all")
-    parser.add_argument("--keep", type=Path, help="keep the datasets in this folder, and use those that it holds")
+    parser.add_argument(
+        "--keep",
+        type=Path,
+        help="keep datasets and conclusions in this folder, and use those that it holds; new code needs a new folder",
+    )
     parser.add_argument("--only", action="append", default=[], help="only this threshold; may be repeated")
     arguments = parser.parse_args()
     start = time.perf_counter()
@@ -92,8 +97,7 @@ def changes(trials: list[Trial], folders: Folders, jobs: int, only: list[str]) -
     for name, how in cases:
         policy = replace(POLICY, **{name: varied(name, FACTORS[how])})
         every += [replace(one, policy=policy) for one in tasks]
-    with pool(jobs) as executor:
-        said = [Said.of(one) for one in each(executor, run, every, "diagnosing")]
+    said = conclusions(every, folders.root / "conclusions", jobs)
     before, rows = said[: len(tasks)], {one["name"]: dict(one) for one in thresholds}
     for k, (name, how) in enumerate(cases):
         after = said[(k + 1) * len(tasks) : (k + 2) * len(tasks)]
@@ -107,6 +111,27 @@ def changes(trials: list[Trial], folders: Folders, jobs: int, only: list[str]) -
         "thresholds": list(rows.values()),
         "change_nothing": idle,
     }
+
+
+def conclusions(tasks: list[Task], folder: Path, jobs: int) -> list[Said]:
+    """The conclusion of each task; ``folder`` keeps them, so that an interrupted run continues where it was."""
+    folder.mkdir(parents=True, exist_ok=True)
+    files = [folder / f"{one.trial}-{_digest(one.policy)}.json" for one in tasks]
+    missing = [pair for pair in zip(tasks, files, strict=True) if not pair[1].exists()]
+    with pool(jobs) as executor:
+        each(executor, _conclude, missing, "diagnosing")
+    return [Said(verdict, tuple(named)) for verdict, named in (json.loads(file.read_text()) for file in files)]
+
+
+def _conclude(job: tuple[Task, Path]) -> None:
+    one, file = job
+    part = file.with_suffix(".part")
+    part.write_text(json.dumps(Said.of(run(one))), encoding="utf-8")
+    part.rename(file)
+
+
+def _digest(policy: Policy) -> str:
+    return hashlib.sha256(json.dumps(asdict(policy)).encode()).hexdigest()[:16]
 
 
 def _right(trial: Trial, folders: Folders, said: Said) -> bool:
