@@ -18,6 +18,7 @@ import time
 import traceback
 from collections.abc import Callable
 from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
+from concurrent.futures import wait as wait_for_futures
 from multiprocessing.connection import Connection
 from multiprocessing.connection import wait as wait_for
 from multiprocessing.context import SpawnProcess
@@ -149,11 +150,8 @@ class ProcessPoolEvaluator:
 
 def _result(future: Future[Misfit], interrupted: Callable[[], bool]) -> Misfit:
     while not interrupted():
-        try:
-            return future.result(LOOK_SECONDS)
-        except TimeoutError:
-            if future.done():  # a TimeoutError of the model itself
-                return future.result()
+        if wait_for_futures([future], LOOK_SECONDS).done:
+            return future.result()
     raise EvaluationInterruptedError
 
 

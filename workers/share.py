@@ -6,7 +6,7 @@ import os
 import pickle
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -44,8 +44,9 @@ def child_environment(**more: str) -> Iterator[None]:
 
 
 def lower_priority() -> None:
-    """Raise the niceness of this process to at least ``NICENESS``, so that the API has priority."""
-    os.nice(max(0, NICENESS - os.nice(0)))
+    """Lower the priority of this thread, and of what it starts, so that the API has priority."""
+    with suppress(OSError):  # it is lower already
+        os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), NICENESS)
 
 
 @dataclass(frozen=True)

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import base64
-import binascii
 import json
 import logging
+import re
 import secrets
 import sqlite3
 from collections.abc import Mapping
@@ -39,6 +38,7 @@ from wingfit.workers.jobs import Job, State, Wish
 LOG = logging.getLogger("wingfit")
 ANSWERS_KEPT = timedelta(days=7)
 MB = 10**6
+BEFORE = "before-"  # beginning of a cursor
 # Value of fields that the first version did not store.
 _SPEC = TypeAdapter(CalibrationSpec)
 BEFORE_METHODS: dict[str, Any] = {"method": "genetic"}
@@ -94,21 +94,15 @@ def page(
 
 def cursor_before(number: int) -> str:
     """The cursor to the rows before ``number``."""
-    return base64.urlsafe_b64encode(f"before:{number}".encode()).decode().rstrip("=")
+    return f"{BEFORE}{number}"
 
 
 def number(cursor: str) -> int:
     """The number that a cursor stands for, or a 422."""
-    try:
-        text = base64.b64decode(cursor + "=" * (-len(cursor) % 4), altchars=b"-_", validate=True).decode("ascii")
-        if text.startswith("before:") and text[7:].isdecimal() and len(text) < 26:
-            return int(text[7:])
-    except (binascii.Error, UnicodeError, ValueError):
-        pass
-    raise invalid(
-        "the cursor is not one of this server",
-        [error_item("query.cursor", cursor, "use next_cursor of the last page")],
-    )
+    if re.fullmatch(rf"{BEFORE}[0-9]{{1,18}}", cursor):
+        return int(cursor.removeprefix(BEFORE))
+    item = error_item("query.cursor", cursor, "use next_cursor of the last page")
+    raise invalid("the cursor is not one of this server", [item])
 
 
 # -- datasets --------------------------------------------------------------------------------------------
@@ -338,17 +332,7 @@ def earlier_answer(session: Session, repeat: Repeat | None) -> Answer | None:
 def keep_answer(session: Session, repeat: Repeat | None, answer: Answer) -> None:
     """Store an answer in the transaction that creates its resource."""
     if repeat:
-        session.add(
-            AnswerRow(
-                path=repeat.path,
-                key=repeat.key,
-                fingerprint=repeat.fingerprint,
-                status=answer.status,
-                location=answer.location,
-                body=dict(answer.body),
-                created_at=now(),
-            )
-        )
+        session.add(AnswerRow(**vars(repeat), **vars(answer), created_at=now()))
 
 
 def forget_answers(session: Session) -> None:

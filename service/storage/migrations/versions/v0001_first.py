@@ -25,12 +25,6 @@ def upgrade() -> None:
     )
 
 
-def downgrade() -> None:
-    """Drop everything."""
-    for table in ("answer", "generation", "checkpoint", "run", "archive", "dataset"):
-        op.drop_table(table)
-
-
 def _datasets() -> None:
     op.create_table(
         "dataset",
