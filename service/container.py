@@ -7,7 +7,8 @@ import shutil
 import time
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import AsyncExitStack
-from typing import Annotated, Any, cast
+from functools import partial
+from typing import Annotated, Any, TypedDict, Unpack, cast
 
 from fastapi import Depends, Request
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
@@ -40,23 +41,22 @@ from wingfit.workers.watch import Standing
 LOG = logging.getLogger("wingfit")
 READ_SECONDS = 1.0  # that a caller waits for the database, or for the metrics
 
-MakeEvaluator = Callable[[], RunningEvaluator]
+
+class Parts(TypedDict, total=False):
+    """What computes; tests replace it by parts that take no time."""
+
+    engine: Engine
+    diagnoser: Diagnoser
+    make_evaluator: Callable[[], RunningEvaluator]
 
 
 class Service:
     """What request handlers need: settings, database, jobs, limits and metrics."""
 
-    def __init__(
-        self,
-        settings: Settings,
-        database: Database,
-        engine: Engine | None = None,
-        make_evaluator: MakeEvaluator | None = None,
-        diagnoser: Diagnoser | None = None,
-    ) -> None:
+    def __init__(self, settings: Settings, database: Database, **parts: Unpack[Parts]) -> None:
         self.settings, self.database = settings, database
-        self.engine: Engine = engine or Engine()
-        self.diagnoser: Diagnoser = diagnoser or Diagnoser()
+        self.engine: Engine = parts.get("engine") or Engine()
+        self.diagnoser: Diagnoser = parts.get("diagnoser") or Diagnoser()
         self.keys = KeyRing()
         # Requests being answered: method, path and start, by the id of their ASGI scope.
         self.open_requests: dict[int, tuple[str, str, float]] = {}
@@ -77,7 +77,8 @@ class Service:
             database, self.changes, kinds, settings.max_runs, settings.max_runs_per_owner, settings.max_starts
         )
         self._housekeeping = Housekeeping(database, settings.keep_days, self.changes.publish)
-        self._pool = Pool(make_evaluator or _maker(settings), self.runner.attach)
+        make_evaluator = parts.get("make_evaluator") or partial(_evaluator, settings)
+        self._pool = Pool(make_evaluator, self.runner.attach)
         self.health = Health(settings, database, self._pool, kinds)
         self._metrics_text = threads.SharedCall("metrics", self.metrics.text)
 
@@ -171,24 +172,17 @@ class Service:
             ("workers", "Living workers of the evaluator.", workers.workers),
             ("job_stalled_seconds", "Longest time since the last progress of a running job.", pace.stalled_s),
             ("queue_age_seconds", "Time that the oldest waiting job has waited.", pace.waited_s),
-            (
-                "disk_free_bytes",
-                "Free space on the disk of the data folder.",
-                free,
-            ),
+            ("disk_free_bytes", "Free space on the disk of the data folder.", free),
             ("watchers", "Open event streams.", self.changes.watchers),
             ("database_bytes", "Size of the database and its log.", size),
         ):
             yield GaugeMetricFamily(f"wingfit_{name}", description, value)
 
 
-def _maker(settings: Settings) -> MakeEvaluator:
-    def make() -> RunningEvaluator:
-        from wingfit.workers import make_evaluator
+def _evaluator(settings: Settings) -> RunningEvaluator:
+    from wingfit.workers import make_evaluator
 
-        return make_evaluator(settings.evaluator, settings.workers, settings.ray_address)
-
-    return make
+    return make_evaluator(settings.evaluator, settings.workers, settings.ray_address)
 
 
 async def _service(request: Request) -> Service:

@@ -10,7 +10,7 @@ from wingfit.client.diagnosis_answers import Diagnosis
 from wingfit.client.key_answers import Key, NewKey, Session
 from wingfit.diagnosis.spec import DiagnosisSpec
 from wingfit.service.auth.key_schemas import SECRET
-from wingfit.service.diagnoses.specs import diagnosis_settings
+from wingfit.service.diagnoses.views import diagnosis_settings
 from wingfit.service.outcomes.requests import RECORDING
 from wingfit.service.runs.requests import DATASET_ID
 from wingfit.service.runs.spec_views import run_settings

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 from wingfit.calibration.spec import CalibrationSpec
 from wingfit.diagnosis.spec import DiagnosisSpec
 from wingfit.records import Dataset
-from wingfit.service.diagnoses import specs
 from wingfit.service.diagnoses.diagnoser import Diagnoser
 from wingfit.service.diagnoses.requests import DiagnosisIn
 from wingfit.service.http.problems import error_item, invalid
@@ -30,7 +30,8 @@ def checked(
     Genes of ``genome`` that the requested model does not have are ignored.
     """
     spec_views.refuse_foreign(body, dataset)
-    calibration = specs.nominal_model(body, of_run)
+    base = of_run or CalibrationSpec()
+    calibration = replace(spec_views.calibration_spec(body, base), axes=base.axes)
     spec_views.refuse_cutoff(calibration.low_pass, dataset.recordings)
     vehicle = VehicleModel.model_validate({"preset": calibration.preset, "without": list(calibration.without)})
     spec_views.refuse_effects(calibration.effects, dataset, vehicle)
@@ -42,7 +43,14 @@ def checked(
         except ValueError as error:
             raise invalid("a value is out of bounds", [error_item(f"body.fixed.{name}", value, str(error))]) from None
     start = {name: value for name, value in (genome or {}).items() if name in known}
-    spec = specs.diagnosis_spec(body, calibration, start)
+    spec = DiagnosisSpec(
+        calibration=calibration,
+        start=start,
+        suspects=tuple(body.suspects),
+        refine=body.refine,
+        refits=body.refits,
+        axes=tuple(body.axes or ()),
+    )
     try:
         diagnoser.check(spec, dataset)
     except ValueError as error:

@@ -13,7 +13,7 @@ from wingfit.client.diagnosis_answers import Diagnosis, StepEvent
 from wingfit.diagnosis.finding import Finding
 from wingfit.diagnosis.spec import Progress
 from wingfit.service.datasets.parsed_datasets import Datasets
-from wingfit.service.diagnoses import specs, views
+from wingfit.service.diagnoses import views
 from wingfit.service.diagnoses.diagnoser import Diagnoser
 from wingfit.service.jobs.job_kind import Points, Step
 from wingfit.service.storage.database import Database
@@ -44,7 +44,7 @@ class Diagnosing:
 
     def steps(self, row: DiagnosisRow, evaluator: Evaluator) -> Iterator[Step]:
         """Diagnose; a new stage is a step at once, progress within a stage after STORE_SECONDS."""
-        spec, dataset = specs.stored(row.spec), self._datasets.get(row.dataset_id)
+        spec, dataset = views.spec(row), self._datasets.get(row.dataset_id)
         stage, stored_at = "", 0.0
         for progress in self._diagnoser.diagnose(spec, dataset, evaluator):
             if progress.finding is not None:

@@ -82,7 +82,9 @@ async def list_runs(
     """List runs, newest first."""
     # A filter may pass over many rows before it finds one.
     short = limit <= http.PAGE and dataset_id is None and state is None
-    return await json_reads.answer(short, json_reads.runs, service.database, limit, cursor, dataset_id, state)
+    return await json_reads.answer(
+        lambda: json_reads.runs(service.database, limit, cursor, dataset_id, state), short=short
+    )
 
 
 def _planned(service: Service, body: RunIn) -> tuple[Dataset, CalibrationSpec]:

@@ -97,15 +97,6 @@ def restore(backup: Path, folder: Path, *, keep_keys: bool = False) -> Contents:
     return brought
 
 
-def _check_opens(folder: Path) -> None:
-    """Migrate the database to the newest schema and read every row; DataFolderError or RowError if that fails."""
-    database = Database(folder)
-    try:
-        check_rows(database)
-    finally:
-        database.close()
-
-
 def _put(backup: Path, target: Path, keep_keys: bool) -> Contents:
     """Copy ``backup`` to ``target`` if the copy passes all checks.
 
@@ -122,7 +113,8 @@ def _put(backup: Path, target: Path, keep_keys: bool) -> Contents:
             with _opened(staged, backup, "rw") as copy, copy:
                 revoke_keys(copy)
         try:
-            _check_opens(staged.parent)
+            with closing(Database(staged.parent)) as database:  # migrates it to the newest schema
+                check_rows(database)
         except (DataFolderError, RowError) as error:
             raise BackupError(f"{backup} is not put back: {error}") from None
         staged.replace(target)
