@@ -179,7 +179,7 @@ class Client(DiagnosisCalls, KeyCalls):
     def forces(self, run_id: str, recording: str | None = None, source: f.Source | None = None) -> f.Forces:
         """Fetch recorded and modelled forces of one recording over the beat; ``source`` says whose coefficients."""
         params = given(recording=recording, source=source)
-        return cast(f.Forces, self._json("GET", f"{_run(run_id)}/forces", params=params, timeout=self.simulating))
+        return cast(f.Forces, self._simulated("GET", f"{_run(run_id)}/forces", params=params))
 
     def predict(
         self,
@@ -199,7 +199,7 @@ class Client(DiagnosisCalls, KeyCalls):
             pressure_mbar=pressure_mbar,
             temperature_c=temperature_c,
         )
-        return cast(f.Prediction, self._simulated(f"{_run(run_id)}/predictions", condition))
+        return cast(f.Prediction, self._simulated("POST", f"{_run(run_id)}/predictions", json=condition))
 
     def models(self) -> f.Models:
         """List the blade-element models of vehicles and their terms."""
@@ -218,9 +218,7 @@ class Client(DiagnosisCalls, KeyCalls):
     ) -> a.Comparison:
         """Fetch recorded and simulated markers of one recording."""
         params = given(recording=recording, genome=genome)
-        return cast(
-            a.Comparison, self._json("GET", f"{_run(run_id)}/comparison", params=params, timeout=self.simulating)
-        )
+        return cast(a.Comparison, self._simulated("GET", f"{_run(run_id)}/comparison", params=params))
 
     def loads(
         self,
@@ -231,10 +229,11 @@ class Client(DiagnosisCalls, KeyCalls):
     ) -> Loads:
         """Fetch motor torques, forces, powers and energies over one beat; ``outputs`` as in :meth:`simulate`."""
         params = given(recording=recording, genome=genome, outputs=list(outputs) if outputs else None)
-        return cast(Loads, self._json("GET", f"{_run(run_id)}/loads", params=params, timeout=self.simulating))
+        return cast(Loads, self._simulated("GET", f"{_run(run_id)}/loads", params=params))
 
-    def _simulated(self, path: str, body: Mapping[str, Any]) -> Any:
-        return self._json("POST", path, json=body, key=str(uuid.uuid4()), timeout=self.simulating)
+    def _simulated(self, method: str, path: str, **options: Any) -> Any:
+        """An answer that requires a simulation; asking again has no effect on the server."""
+        return self._json(method, path, key=str(uuid.uuid4()), timeout=self.simulating, **options)
 
     def events(self, run_id: str, *, last_event_id: str | None = None, patience_s: float = 60.0) -> Iterator[a.Event]:
         """Yield the server-sent events of a run until its final state.
@@ -267,7 +266,7 @@ class Client(DiagnosisCalls, KeyCalls):
         loads = outputs if isinstance(outputs, bool) else list(outputs)
         wing = {"division": division, "accuracy_mm": accuracy_mm, "outputs": loads}
         body = _simulation(dataset_id, recording, genome, effects, **wing)
-        return cast(a.Simulation, self._simulated("/v1/simulations", body))
+        return cast(a.Simulation, self._simulated("POST", "/v1/simulations", json=body))
 
     def simulate_forces(
         self,
@@ -288,7 +287,7 @@ class Client(DiagnosisCalls, KeyCalls):
         """
         model = {"preset": preset, "without": list(without), "peel_width_beats": peel_width_beats}
         body = _simulation(dataset_id, recording, genome, effects, low_pass_hz=low_pass_hz, **model)
-        return cast(f.ForceSimulation, self._simulated("/v1/simulations", body))
+        return cast(f.ForceSimulation, self._simulated("POST", "/v1/simulations", json=body))
 
     def loads_under(
         self,
@@ -309,7 +308,7 @@ class Client(DiagnosisCalls, KeyCalls):
         loads = True if outputs is None else list(outputs)
         wing = {"division": division, "accuracy_mm": accuracy_mm, "outputs": loads}
         body = _simulation(dataset_id, recording, genome, effects, condition=dict(condition or {}), **wing)
-        return cast(Loads, self._simulated("/v1/loads", body))
+        return cast(Loads, self._simulated("POST", "/v1/loads", json=body))
 
 
 def _simulation(

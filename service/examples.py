@@ -92,12 +92,7 @@ _KEY: Key = {
     "revoked_at": None,
 }
 _NEW_KEY: NewKey = {**_KEY, "secret": SECRET}
-_SESSION: Session = {
-    "keys_required": True,
-    "key_id": _KEY["id"],
-    "owner": _KEY["owner"],
-    "scopes": _KEY["scopes"],
-}
+_SESSION: Session = {"keys_required": True, "key_id": _KEY["id"], "owner": _KEY["owner"], "scopes": _KEY["scopes"]}
 
 EXAMPLES: Mapping[type, Mapping[str, object]] = {
     Dataset: _DATASET,

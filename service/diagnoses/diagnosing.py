@@ -15,7 +15,7 @@ from wingfit.diagnosis.spec import Progress
 from wingfit.service.datasets.parsed_datasets import Datasets
 from wingfit.service.diagnoses import views
 from wingfit.service.diagnoses.diagnoser import Diagnoser
-from wingfit.service.jobs.job_kind import Points, Step
+from wingfit.service.jobs.job_kind import JobKind, Points, Step
 from wingfit.service.storage.database import Database
 from wingfit.service.storage.tables import DiagnosisRow, FindingRow, StepRow
 from wingfit.workers import jobs
@@ -24,7 +24,7 @@ from wingfit.workers import jobs
 STORE_SECONDS = 0.5
 
 
-class Diagnosing:
+class Diagnosing(JobKind):
     """How diagnoses are computed."""
 
     what, path, prefix, step_event = "diagnosis", "/v1/diagnoses", "dx", "step"

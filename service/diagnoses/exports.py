@@ -15,17 +15,8 @@ from wingfit.service.storage.tables import DiagnosisRow
 
 Json = dict[str, Any]
 RANKING = (
-    "title",
-    "family",
-    "source",
-    "signature",
-    "probability",
-    "evidence",
-    "score",
-    "freedom",
-    "explained",
-    "predicted",
-)
+    "title", "family", "source", "signature", "probability", "evidence", "score", "freedom", "explained", "predicted",
+)  # fmt: skip
 # Units of loads as CF conventions write them.
 CF_UNITS = {"N/m": "N m-1"}
 CONDITION = (

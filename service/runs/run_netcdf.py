@@ -90,9 +90,8 @@ def _history(root: Any, database: Database, row: RunRow) -> None:
 
 
 def _genes(root: Any, genes: Any) -> None:
-    nc.texts(root, "gene", "gene", "gene", (gene["name"] for gene in genes))
-    nc.texts(root, "gene_unit", "gene", "unit of the gene's values", (gene["unit"] for gene in genes))
-    nc.texts(root, "gene_description", "gene", "what the gene is", (gene["description"] for gene in genes))
+    for name, meaning in (("", "gene"), ("_unit", "unit of the gene's values"), ("_description", "what the gene is")):
+        nc.texts(root, f"gene{name}", "gene", meaning, (gene[name.removeprefix("_") or "name"] for gene in genes))
     for name, units, said in GENE_NUMBERS:
         values = nc.or_nan(gene.get(name) for gene in genes)
         nc.numbers(root, f"gene_{name}", ("gene",), units, said, values)

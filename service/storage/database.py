@@ -12,7 +12,7 @@ import os
 import sqlite3
 import threading
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO, Any, ClassVar
@@ -34,7 +34,8 @@ from wingfit.service.storage.disk_space import FULL
 
 FILE_NAME = "wingfit.sqlite3"
 LOCK_NAME = "wingfit.lock"
-BUSY_TIMEOUT_MS = 10_000
+BUSY_SECONDS = 10.0  # that a statement waits for a lock
+WRITER, READER = ("journal_mode=WAL", "synchronous=FULL", "foreign_keys=ON"), ("query_only=ON",)
 READERS = 16
 
 
@@ -124,14 +125,15 @@ class Database:
         path = (folder / FILE_NAME).resolve()
         try:
             _close_to_others(path)
-            self._writer = _writer(path)
+            self._writer = _engine(f"sqlite:///{path}", "BEGIN IMMEDIATE", WRITER, poolclass=StaticPool)
             migrate(self._writer)
         except Exception as error:
             self._lock.release()
             if isinstance(error, DataFolderError):
                 raise
             raise DataFolderError(f"cannot open the database {path}: {error}") from error
-        self._readers = _readers(path)
+        url = f"sqlite:///{_read_only(path)}&uri=true"
+        self._readers = _engine(url, "BEGIN", READER, poolclass=QueuePool, pool_size=READERS, max_overflow=READERS)
         self._path = path
         self._bare: deque[sqlite3.Connection] = deque()
         self.version = 0
@@ -242,33 +244,17 @@ def migrate(engine: Engine, revision: str = "head") -> None:
         connection.commit()
 
 
-def _writer(path: Path) -> Engine:
-    engine = create_engine(
-        f"sqlite:///{path}",
-        poolclass=StaticPool,
-        connect_args={"check_same_thread": False, "timeout": BUSY_TIMEOUT_MS / 1000},
-    )
-    event.listen(engine, "connect", _prepare_writer)
-    event.listen(engine, "begin", lambda connection: connection.exec_driver_sql("BEGIN IMMEDIATE"))
-    return engine
-
-
-def _readers(path: Path) -> Engine:
-    engine = create_engine(
-        f"sqlite:///{_read_only(path)}&uri=true",
-        poolclass=QueuePool,
-        pool_size=READERS,
-        max_overflow=READERS,
-        connect_args={"check_same_thread": False, "timeout": BUSY_TIMEOUT_MS / 1000},
-    )
-    event.listen(engine, "connect", _prepare_reader)
-    event.listen(engine, "begin", lambda connection: connection.exec_driver_sql("BEGIN"))
+def _engine(url: str, begin: str, pragmas: Sequence[str], **pool: Any) -> Engine:
+    """Connections whose transactions start with the statement ``begin``."""
+    engine = create_engine(url, connect_args={"check_same_thread": False, "timeout": BUSY_SECONDS}, **pool)
+    event.listen(engine, "connect", lambda connection, _record: _prepare(connection, pragmas))
+    event.listen(engine, "begin", lambda connection: connection.exec_driver_sql(begin))
     return engine
 
 
 def _bare(path: Path) -> sqlite3.Connection:
-    connection = sqlite3.connect(_read_only(path), uri=True, check_same_thread=False)
-    _prepare_reader(connection, None)
+    connection = sqlite3.connect(_read_only(path), uri=True, check_same_thread=False, timeout=BUSY_SECONDS)
+    _prepare(connection, READER)
     return connection
 
 
@@ -276,16 +262,8 @@ def _read_only(path: Path) -> str:
     return f"file:{quote(str(path))}?mode=ro"
 
 
-def _prepare_writer(connection: sqlite3.Connection, _record: Any) -> None:
+def _prepare(connection: sqlite3.Connection, pragmas: Sequence[str]) -> None:
     # The driver must not begin transactions itself: schema changes and reads are part of ours.
     connection.isolation_level = None
-    connection.execute("PRAGMA journal_mode=WAL")
-    connection.execute("PRAGMA synchronous=FULL")
-    connection.execute("PRAGMA foreign_keys=ON")
-    connection.execute(f"PRAGMA busy_timeout={BUSY_TIMEOUT_MS}")
-
-
-def _prepare_reader(connection: sqlite3.Connection, _record: Any) -> None:
-    connection.isolation_level = None
-    connection.execute(f"PRAGMA busy_timeout={BUSY_TIMEOUT_MS}")
-    connection.execute("PRAGMA query_only=ON")
+    for pragma in pragmas:
+        connection.execute(f"PRAGMA {pragma}")

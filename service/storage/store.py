@@ -28,6 +28,7 @@ from wingfit.service.storage.tables import (
     DiagnosisRow,
     FindingRow,
     JobRow,
+    KeyRow,
     OwnedRow,
     ParsedRow,
     RunRow,
@@ -44,7 +45,7 @@ _SPEC = TypeAdapter(CalibrationSpec)
 BEFORE_METHODS: dict[str, Any] = {"method": "genetic"}
 ACTIVE = tuple(state.value for state in State if not state.final)
 
-Row = TypeVar("Row", bound=OwnedRow)
+Row = TypeVar("Row", bound=OwnedRow | KeyRow)
 Step = TypeVar("Step", bound=StepOfJob)
 
 
@@ -202,7 +203,11 @@ def finding(session: Session, diagnosis_id: str) -> dict[str, Any]:
 def admitted(session: Session, dataset_id: str, most: int) -> str | None:
     """The owner of a dataset, who will own a job on it; a 429 if ``most`` jobs of that owner have not ended."""
     owner = one(session, DatasetRow, dataset_id).owner
-    count = sum(_unfinished_of(session, table, owner) for table in (RunRow, DiagnosisRow))
+    unfinished = (
+        select(func.count()).select_from(table).where(table.state.in_(ACTIVE), _of(table, owner))
+        for table in (RunRow, DiagnosisRow)
+    )
+    count = sum(session.scalar(query) or 0 for query in unfinished)
     if count >= most:
         raise ProblemError(
             429,
@@ -210,11 +215,6 @@ def admitted(session: Session, dataset_id: str, most: int) -> str | None:
             f"{count} jobs have not ended, and {most} are the most at a time; wait for some, or cancel them",
         )
     return owner
-
-
-def _unfinished_of(session: Session, table: type[JobRow], owner: str | None) -> int:
-    active = select(func.count()).select_from(table).where(table.state.in_(ACTIVE), _of(table, owner))
-    return session.scalar(active) or 0
 
 
 def _of(table: type[OwnedRow], owner: str | None) -> ColumnElement[bool]:
@@ -285,11 +285,7 @@ def spec_json(given: CalibrationSpec | DiagnosisSpec) -> dict[str, Any]:
 
 
 # By the part of a location that names the resource.
-_MADE: dict[str, type[OwnedRow]] = {
-    "datasets": DatasetRow,
-    "runs": RunRow,
-    "diagnoses": DiagnosisRow,
-}
+_MADE: dict[str, type[OwnedRow]] = {"datasets": DatasetRow, "runs": RunRow, "diagnoses": DiagnosisRow}
 
 
 @dataclass(frozen=True)
