@@ -21,7 +21,6 @@ from wingfit.service.http import concurrency_limit, threads
 from wingfit.service.http.concurrency_limit import ConcurrencyLimit
 from wingfit.service.http.events import Events
 from wingfit.service.jobs.evaluator_startup import Pool
-from wingfit.service.jobs.job_kind import JobKind
 from wingfit.service.jobs.runner import JobRef, Runner
 from wingfit.service.jobs.wakeups import Changes
 from wingfit.service.operations.health import Health
@@ -89,12 +88,6 @@ class Service:
         self.runner.recover()
         self._housekeeping.start()
         self._pool.start()
-
-    def enqueue(self, kind: JobKind, job_id: str) -> None:
-        """Queue a stored job."""
-        with self.database.read() as session:
-            owner = store.one(session, kind.table, job_id).owner
-        self.runner.enqueue(kind, job_id, owner)
 
     def load_keys(self) -> None:
         """Read the valid keys from the database; event streams that were opened with a revoked key end."""

@@ -26,7 +26,8 @@ from typing import Any, Literal
 from wingfit.calibration.problem import Misfit, Problem
 from wingfit.workers.batch_evaluator import BatchEvaluator, Interrupted
 from wingfit.workers.errors import EvaluationInterruptedError, EvaluatorClosedError, WorkerLostError
-from wingfit.workers.share import ProblemMemory, Task, child_environment, lower_priority
+from wingfit.workers.recent import Recent
+from wingfit.workers.share import PROBLEMS_KEPT, Task, child_environment, lower_priority
 from wingfit.workers.watch import ATTEMPTS, START_SECONDS, STARTS, Expectation, Standing, Tally
 
 LOG = logging.getLogger("wingfit.workers")
@@ -221,7 +222,7 @@ class _Worker:
                 answer: Answer = self._connection.recv()
                 kind, content = answer
                 if kind == "need problem":
-                    self._connection.send(pickle.dumps(problem, pickle.HIGHEST_PROTOCOL))
+                    self._connection.send(problem)
                 if kind == "begun":
                     self._expect(limit)
         except (EOFError, OSError) as error:
@@ -255,7 +256,7 @@ def _serve(connection: Connection) -> None:
     # Ctrl-C in a terminal reaches every process of the group; only the owner handles it.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     lower_priority()
-    problems = ProblemMemory()
+    problems = Recent[Problem](PROBLEMS_KEPT)
     while True:
         try:
             key, task, residuals = connection.recv()
@@ -264,14 +265,14 @@ def _serve(connection: Connection) -> None:
             return
 
 
-def _attempt(connection: Connection, problems: ProblemMemory, key: str, task: Task, residuals: bool) -> Answer:
-    def fetch() -> bytes:
+def _attempt(connection: Connection, problems: Recent[Problem], key: str, task: Task, residuals: bool) -> Answer:
+    def fetch() -> Problem:
         connection.send(("need problem", None))
-        content: bytes = connection.recv()
-        return content
+        problem: Problem = connection.recv()
+        return problem
 
     try:
-        problem = problems.fetched(key, fetch)
+        problem = problems.use(key, fetch)
         connection.send(("begun", None))
         began = time.monotonic()
         return "done", (task.run(problem, residuals=residuals), time.monotonic() - began)

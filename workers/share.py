@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import os
-import pickle
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 
@@ -14,7 +13,6 @@ import numpy.typing as npt
 
 from wingfit.calibration.evaluator import Unit, run_unit
 from wingfit.calibration.problem import Misfit, Problem
-from wingfit.workers.recent import Recent
 
 NICENESS = 10
 PROBLEMS_KEPT = 8
@@ -65,15 +63,3 @@ class Task:
     def run(self, problem: Problem, *, residuals: bool) -> Misfit:
         """Evaluate a copy, because arrays in shared memory may be read-only."""
         return run_unit(problem, np.array(self.values), self.unit, residuals=residuals)
-
-
-class ProblemMemory(Recent[Problem]):
-    """The problems used last, by key; not thread-safe."""
-
-    def __init__(self, most: int = PROBLEMS_KEPT) -> None:
-        super().__init__(most)
-
-    def fetched(self, key: str, fetch: Callable[[], bytes]) -> Problem:
-        """The problem with this key; ``fetch`` returns it pickled if it is not in memory."""
-        # The bytes come from the process that owns this worker.
-        return self.use(key, lambda: pickle.loads(fetch()))  # noqa: S301

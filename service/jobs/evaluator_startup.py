@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 import threading
 from collections.abc import Callable
-from concurrent.futures import wait
 from typing import Literal
 
 from wingfit.service.http import threads
@@ -71,8 +70,7 @@ class Pool:
             if self._thread.ident:  # the thread closes the evaluator that it is starting
                 self._thread.join(seconds)
             return not self._thread.is_alive()
-        # An evaluator that fails to close counts as closed: nothing more can be done about it.
-        return not wait([threads.call("evaluator-close", evaluator.close)], seconds).not_done
+        return threads.done_within(seconds, "evaluator-close", evaluator.close)
 
     def _start(self) -> None:
         # Worker processes inherit the priority of the thread that starts them.

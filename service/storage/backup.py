@@ -85,16 +85,13 @@ def restore(backup: Path, folder: Path, *, keep_keys: bool = False) -> Contents:
         raise BackupError(str(error)) from None
     except OSError as error:
         raise BackupError(f"cannot use the folder {folder}: {error.strerror}") from None
-    try:
+    with closing(lock):
         present = [path.name for path in folder.glob(f"{FILE_NAME}*")]
         if present:
             raise BackupError(
                 f"{folder} holds {', '.join(sorted(present))} already; move that away, or name another folder"
             )
-        brought = _put(backup, target, keep_keys)
-    finally:
-        lock.release()
-    return brought
+        return _put(backup, target, keep_keys)
 
 
 def _put(backup: Path, target: Path, keep_keys: bool) -> Contents:

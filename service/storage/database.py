@@ -11,11 +11,10 @@ import fcntl
 import os
 import sqlite3
 import threading
-from collections import deque
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import closing, contextmanager, suppress
 from pathlib import Path
-from typing import IO, Any, ClassVar
+from typing import IO, Any, ClassVar, cast
 from urllib.parse import quote
 
 from alembic import command
@@ -99,7 +98,7 @@ class FolderLock:
         self._file.flush()
         self._held.add(self.path)
 
-    def release(self) -> None:
+    def close(self) -> None:
         """Unlock the folder."""
         self._held.discard(self.path)
         self._file.close()
@@ -128,14 +127,14 @@ class Database:
             self._writer = _engine(f"sqlite:///{path}", "BEGIN IMMEDIATE", WRITER, poolclass=StaticPool)
             migrate(self._writer)
         except Exception as error:
-            self._lock.release()
+            self._lock.close()
             if isinstance(error, DataFolderError):
                 raise
             raise DataFolderError(f"cannot open the database {path}: {error}") from error
-        url = f"sqlite:///{_read_only(path)}&uri=true"
+        url = f"sqlite:///file:{quote(str(path))}?mode=ro&uri=true"
         self._readers = _engine(url, "BEGIN", READER, poolclass=QueuePool, pool_size=READERS, max_overflow=READERS)
-        self._path = path
-        self._bare: deque[sqlite3.Connection] = deque()
+        # Without a limit, because the event loop must not wait for a connection.
+        self._lookers = _engine(url, "BEGIN", READER, poolclass=QueuePool, pool_size=READERS, max_overflow=-1)
         self.version = 0
         """Changes with every write."""
 
@@ -166,23 +165,13 @@ class Database:
         """One consistent snapshot of all rows through a plain connection: for reads that must be fast."""
         if self._closed:
             raise DatabaseClosedError("the service is stopping")
-        try:
-            connection = self._bare.pop()
-        except IndexError:
-            connection = _bare(self._path)
-        connection.execute("BEGIN")
-        try:
-            yield connection
-        finally:
-            connection.execute("ROLLBACK")
-            self._bare.append(connection)
-            if self._closed:
-                self._close_bare()
-
-    def _close_bare(self) -> None:
-        with suppress(IndexError):
-            while True:
-                self._bare.pop().close()
+        with closing(self._lookers.raw_connection()) as pooled:
+            connection = cast(sqlite3.Connection, pooled.driver_connection)
+            connection.execute("BEGIN")
+            try:
+                yield connection
+            finally:
+                connection.execute("ROLLBACK")
 
     def close(self, seconds: float = -1) -> bool:
         """Refuse further reads and writes, finish the current write, unlock the folder.
@@ -196,9 +185,9 @@ class Database:
             if not self._released:
                 self._released = True
                 self._readers.dispose()
-                self._close_bare()
+                self._lookers.dispose()
                 self._writer.dispose()
-                self._lock.release()
+                self._lock.close()
         finally:
             self._guard.release()
         return True
@@ -247,23 +236,13 @@ def migrate(engine: Engine, revision: str = "head") -> None:
 def _engine(url: str, begin: str, pragmas: Sequence[str], **pool: Any) -> Engine:
     """Connections whose transactions start with the statement ``begin``."""
     engine = create_engine(url, connect_args={"check_same_thread": False, "timeout": BUSY_SECONDS}, **pool)
-    event.listen(engine, "connect", lambda connection, _record: _prepare(connection, pragmas))
+
+    def prepare(connection: sqlite3.Connection, _record: Any) -> None:
+        # The driver must not begin transactions itself: schema changes and reads are part of ours.
+        connection.isolation_level = None
+        for pragma in pragmas:
+            connection.execute(f"PRAGMA {pragma}")
+
+    event.listen(engine, "connect", prepare)
     event.listen(engine, "begin", lambda connection: connection.exec_driver_sql(begin))
     return engine
-
-
-def _bare(path: Path) -> sqlite3.Connection:
-    connection = sqlite3.connect(_read_only(path), uri=True, check_same_thread=False, timeout=BUSY_SECONDS)
-    _prepare(connection, READER)
-    return connection
-
-
-def _read_only(path: Path) -> str:
-    return f"file:{quote(str(path))}?mode=ro"
-
-
-def _prepare(connection: sqlite3.Connection, pragmas: Sequence[str]) -> None:
-    # The driver must not begin transactions itself: schema changes and reads are part of ours.
-    connection.isolation_level = None
-    for pragma in pragmas:
-        connection.execute(f"PRAGMA {pragma}")
