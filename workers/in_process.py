@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import Literal
 
 from wingfit.calibration.problem import Misfit, Problem
-from wingfit.workers.batch_evaluator import BatchEvaluator, Interrupted
+from wingfit.workers.running_evaluator import Interrupted, RunningEvaluator
 from wingfit.workers.share import Task
 from wingfit.workers.watch import Standing
 
 
-class InProcessEvaluator(BatchEvaluator):
+class InProcessEvaluator(RunningEvaluator):
     """Evaluates one unit after the other."""
 
     kind: Literal["in_process"] = "in_process"

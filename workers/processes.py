@@ -24,9 +24,9 @@ from multiprocessing.context import SpawnProcess
 from typing import Any, Literal
 
 from wingfit.calibration.problem import Misfit, Problem
-from wingfit.workers.batch_evaluator import BatchEvaluator, Interrupted
 from wingfit.workers.errors import EvaluationInterruptedError, EvaluatorClosedError, WorkerLostError
 from wingfit.workers.recent import Recent
+from wingfit.workers.running_evaluator import Interrupted, RunningEvaluator
 from wingfit.workers.share import PROBLEMS_KEPT, Task, child_environment, lower_priority
 from wingfit.workers.watch import ATTEMPTS, START_SECONDS, STARTS, Expectation, Standing, Tally
 
@@ -35,7 +35,7 @@ LOOK_SECONDS = 0.5
 Answer = tuple[Literal["need problem", "begun", "done", "raised"], Any]
 
 
-class ProcessPoolEvaluator(BatchEvaluator):
+class ProcessPoolEvaluator(RunningEvaluator):
     """Simulates individuals in ``workers`` processes (default: one per processor), each a piece of the batch."""
 
     kind: Literal["processes"] = "processes"

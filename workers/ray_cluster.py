@@ -17,11 +17,11 @@ from functools import partial
 from typing import Any, Literal
 
 from wingfit.calibration.problem import Misfit, Problem
-from wingfit.workers.batch_evaluator import BatchEvaluator, Interrupted
 from wingfit.workers.guardian import Guardian
 from wingfit.workers.ray_batches import Batch, Batches, Cluster
 from wingfit.workers.ray_connection import Connection, ray
 from wingfit.workers.recent import Recent
+from wingfit.workers.running_evaluator import Interrupted, RunningEvaluator
 from wingfit.workers.share import PROBLEMS_KEPT, Task, lower_priority
 from wingfit.workers.watch import START_SECONDS, Expectation, Standing, Tally
 
@@ -32,7 +32,7 @@ LOOK_SECONDS = 2.0
 STALE_SECONDS = 20.0
 
 
-class RayEvaluator(BatchEvaluator):
+class RayEvaluator(RunningEvaluator):
     """Distributes units over a Ray cluster, or without ``address`` over ``workers`` processes of this machine."""
 
     kind: Literal["ray"] = "ray"

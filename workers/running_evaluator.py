@@ -1,9 +1,10 @@
-"""What all evaluators do: cut a batch into tasks, refuse calls once closed, and collect the results."""
+"""The base of all evaluators: cuts a batch into tasks, refuses calls once closed, and collects the results."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from typing import Literal
 
 import numpy.typing as npt
 
@@ -11,24 +12,42 @@ from wingfit.calibration.evaluator import as_batch, gather, units
 from wingfit.calibration.problem import Evaluation, Misfit, Problem
 from wingfit.workers.errors import EvaluationInterruptedError, EvaluatorClosedError
 from wingfit.workers.share import Task
-from wingfit.workers.watch import never
+from wingfit.workers.watch import Standing, never
 
+EvaluatorKind = Literal["in_process", "processes", "ray"]
 Interrupted = Callable[[], bool]
 
 
-class BatchEvaluator(ABC):
-    """Evaluates batches; subclasses say where the tasks of a batch run."""
+class RunningEvaluator(ABC):
+    """Evaluates batches; each ``kind`` of evaluator runs the tasks of a batch elsewhere."""
 
-    kind: str
+    kind: EvaluatorKind
     _closed = False
+
+    @property
+    @abstractmethod
+    def workers(self) -> int:
+        """Number of units that can be evaluated at the same time."""
+
+    @property
+    @abstractmethod
+    def standing(self) -> Standing:
+        """Number of living workers, and counts of lost ones."""
 
     def evaluate(
         self, problem: Problem, values: npt.ArrayLike, *, residuals: bool = False, interrupted: Interrupted = never
     ) -> Evaluation:
-        """Misfits of ``values`` (individuals x genes) to every recording; several threads may call."""
+        """Misfits of ``values`` (individuals x genes) to every recording of the problem; several threads may call.
+
+        EvaluationInterruptedError soon after ``interrupted`` returns True; units that have not started are dropped.
+        """
         batch = as_batch(values)
         tasks = [Task.cut(batch, unit) for unit in units(problem, len(batch))]
         return gather(problem, self._misfits(problem, tasks, residuals, interrupted))
+
+    @abstractmethod
+    def close(self) -> None:
+        """Release processes and memory; further calls are errors."""
 
     @abstractmethod
     def _misfits(self, problem: Problem, tasks: list[Task], residuals: bool, interrupted: Interrupted) -> list[Misfit]:
