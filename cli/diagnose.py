@@ -59,9 +59,7 @@ def diagnose(
     suspects: Annotated[
         list[str] | None,
         typer.Option(
-            "--suspect",
-            callback=o.names,
-            help="Consider only these effects, e.g. added_mass,hinge_offset; repeatable.",
+            "--suspect", callback=o.names, help="Consider only these effects, e.g. added_mass,hinge_offset; repeatable."
         ),
     ] = None,
     recordings: o.Recordings = None,

@@ -44,12 +44,7 @@ class WingfitError(Exception):
     """
 
     def __init__(
-        self,
-        title: str,
-        detail: str = "",
-        *,
-        status: int | None = None,
-        errors: list[dict[str, Any]] | None = None,
+        self, title: str, detail: str = "", *, status: int | None = None, errors: list[dict[str, Any]] | None = None
     ) -> None:
         self.title, self.detail, self.status, self.errors = title, detail, status, errors or []
         super().__init__(title, detail)

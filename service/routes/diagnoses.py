@@ -40,9 +40,7 @@ event: state
 data: {"id": "dx_7d20c14be5a9f386", "state": "SUCCEEDED", "verdict": "named"}
 
 """
-_ACTIONS: Actions = {
-    "cancel": (jobs.Cancel(), "Cancel a diagnosis; if it is running, it ends within seconds."),
-}
+_ACTIONS: Actions = {"cancel": (jobs.Cancel(), "Cancel a diagnosis; if it is running, it ends within seconds.")}
 add_job_routes(router, "diagnosis", lambda service: service.diagnosing, Diagnosis, _ACTIONS, "step", _EVENTS)
 
 

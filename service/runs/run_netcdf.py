@@ -62,7 +62,7 @@ def _history(root: Any, database: Database, row: RunRow) -> None:
     square, misfit = ("m2", ("best_mm", "mm")) if row.kind == "tracks" else ("N2", ("best_mn", "mN"))
     counts = {
         "sequence": "number of the generation over all stages",
-        "generation_in_stage": "number of the generation in its stage",
+        "generation": "number of the generation in its stage",
         "evaluations": "individuals evaluated since the run began",
         "failed": "individuals of the generation that failed",
     }
@@ -73,17 +73,17 @@ def _history(root: Any, database: Database, row: RunRow) -> None:
         misfit[0]: (misfit[1], "misfit of the best individual"),
         "elapsed_seconds": ("s", "computing time since the run began"),
     }
-    whole = {name: nc.numbers(root, name, along, nc.NO_UNIT, said, kind="i8") for name, said in counts.items()}
-    real = {name: nc.numbers(root, name, along, *said) for name, said in reals.items()}
+    # The variable "generation" would be the coordinate of the dimension of that name.
+    names = {"generation": "generation_in_stage"}
+    series = {name: nc.numbers(root, name, along, *said) for name, said in reals.items()}
+    for name, said in counts.items():
+        series[name] = nc.numbers(root, names.get(name, name), along, nc.NO_UNIT, said, kind="i8")
     stage = nc.texts(root, "stage", "generation", "stage of the search")
     reasons = nc.texts(root, "reasons", "generation", "why individuals failed")
     filled = 0
     for block in blocks(database, row):
         here = slice(filled, filled := filled + len(block))
-        for name, variable in whole.items():
-            field = "generation" if name == "generation_in_stage" else name
-            variable[here] = np.array([getattr(one, field) for one in block])
-        for name, variable in real.items():
+        for name, variable in series.items():
             variable[here] = nc.or_nan(getattr(one, name) for one in block)
         stage[here] = nc.text_array(one.stage for one in block)
         reasons[here] = nc.text_array("; ".join(one.reasons) for one in block)

@@ -194,9 +194,8 @@ def finding(session: Session, diagnosis_id: str) -> dict[str, Any]:
     row = one(session, DiagnosisRow, diagnosis_id)
     body: dict[str, Any] | None = session.scalar(select(FindingRow.body).where(FindingRow.diagnosis_id == diagnosis_id))
     if body is None:
-        raise conflict(
-            f"diagnosis {diagnosis_id} is {row.state}; it has a finding when it has SUCCEEDED", state=row.state
-        )
+        message = f"diagnosis {diagnosis_id} is {row.state}; it has a finding when it has SUCCEEDED"
+        raise conflict(message, state=row.state)
     return body
 
 
@@ -209,11 +208,8 @@ def admitted(session: Session, dataset_id: str, most: int) -> str | None:
     )
     count = sum(session.scalar(query) or 0 for query in unfinished)
     if count >= most:
-        raise ProblemError(
-            429,
-            "too-many",
-            f"{count} jobs have not ended, and {most} are the most at a time; wait for some, or cancel them",
-        )
+        detail = f"{count} jobs have not ended, and {most} are the most at a time; wait for some, or cancel them"
+        raise ProblemError(429, "too-many", detail)
     return owner
 
 
