@@ -35,8 +35,7 @@ from wingfit.sim.virtual_rigs.campaign import (
     vacuum,
 )
 from wingfit.sim.wing.flexible_wing import FlexibleWing
-from wingfit.workers import make_evaluator
-from wingfit.workers.factory import EvaluatorKind
+from wingfit.workers import EvaluatorKind, make_evaluator
 
 EXAMPLE = EXAMPLES / "robird"
 TRUTH = EXAMPLE.with_name("robird.truth.json")

@@ -26,8 +26,7 @@ from wingfit.calibration.spec import CalibrationSpec
 from wingfit.cli.base.output import progress
 from wingfit.diagnosis import DiagnosisSpec, Progress, diagnose
 from wingfit.records import Dataset, load_dataset, save_dataset
-from wingfit.workers import make_evaluator
-from wingfit.workers.factory import EvaluatorKind
+from wingfit.workers import EvaluatorKind, make_evaluator
 
 HIDDEN: Concealed = {"added_mass": {"strength": 1.0}}
 FITTED = (

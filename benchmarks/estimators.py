@@ -25,8 +25,7 @@ from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.problem import Problem, base_genome
 from wingfit.calibration.search import CalibrationSpec, calibrate, model_for, prepare
 from wingfit.records import Dataset, load_dataset
-from wingfit.workers import make_evaluator
-from wingfit.workers.factory import EvaluatorKind
+from wingfit.workers import EvaluatorKind, make_evaluator
 
 EXAMPLE = EXAMPLES / "robird"
 AS_GOOD = 1.01  # ratio to the floor below which a misfit counts as equal

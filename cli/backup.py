@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -105,7 +106,5 @@ def _copy_of(data: Path, file: Path) -> None:
         lock = FolderLock(data)
     except DataFolderError as error:
         raise BackupError(f"{error}; or copy from the running server: leave --data out") from None
-    try:
+    with closing(lock):
         move(snapshot(data), file)
-    finally:
-        lock.release()

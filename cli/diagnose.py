@@ -44,20 +44,26 @@ app = commands(DIAGNOSES)
 
 
 def diagnose(
+    ctx: typer.Context,
     dataset: o.DatasetOrPath = None,
-    run: Annotated[str | None, typer.Option(help="Id of a run: start from its best genome and its settings.")] = None,
+    run_id: Annotated[
+        str | None, typer.Option("--run", help="Id of a run: start from its best genome and its settings.")
+    ] = None,
     division: o.Division = None,
     preset: o.Preset = None,
     without: o.Without = None,
     axes: o.Axes = None,
     low_pass_hz: o.LowPass = None,
     peel_width_beats: o.PeelWidth = None,
-    with_: o.With = None,
-    suspect: Annotated[
-        list[str] | None, typer.Option(help="Consider only these effects, e.g. added_mass,hinge_offset; repeatable.")
+    effects: o.With = None,
+    suspects: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--suspect", callback=o.names, help="Consider only these effects, e.g. added_mass,hinge_offset; repeatable."
+        ),
     ] = None,
     recordings: o.Recordings = None,
-    gene: o.Genes = None,
+    genes: o.Genes = None,
     fixed: Annotated[
         list[str] | None, typer.Option(help="NAME=VALUE or FILE.json: genes that are not estimated; repeatable.")
     ] = None,
@@ -82,33 +88,15 @@ def diagnose(
 
     Example: wingfit diagnose examples/robird --division 11 --report robird.html
     """
-    settings: dict[str, Any] = {
-        "run_id": run,
-        "division": division,
-        "preset": preset,
-        "without": o.names(without, "--without"),
-        "axes": axes or None,
-        "low_pass_hz": low_pass_hz,
-        "peel_width_beats": peel_width_beats,
-        "effects": o.names(with_, "--with"),
-        "suspects": o.names(suspect, "--suspect"),
-        "recordings": recordings or None,
-        "genes": gene or None,
-        "fixed": o.read_genome(fixed, "--fixed") if fixed else None,
-        "bounds_factor": bounds_factor,
-        "accuracy_mm": accuracy_mm,
-        "refits": refits,
-        "refine": None if refine else False,
-        "seed": seed,
-        "name": name,
-    }
-    settings = {key: value for key, value in settings.items() if value is not None}
+    settings = o.settings(ctx, "dataset", "fixed", "report", "as_json", "local", "workers", "url")
+    if fixed:
+        settings["fixed"] = o.read_genome(fixed, "--fixed")
     if local:
         _diagnose_here(dataset, settings, workers, report, as_json=as_json)
         return
     if workers is not None:
         raise typer.BadParameter("the server has its own; give it with --local", param_hint="--workers")
-    if dataset is None and run is None:
+    if dataset is None and run_id is None:
         raise typer.BadParameter("name a dataset, or a run with --run", param_hint="DATASET")
     with Client(url) as client:
         submitted = client.submit_diagnosis(dataset and dataset_id(client, dataset), **settings)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from pathlib import Path
 from typing import Annotated, cast
 
@@ -102,10 +103,7 @@ def _here(data: Path, name: str, owner: str, scopes: list[str]) -> NewKey:
     except DataFolderError as error:
         remedy = "for a running server leave out --data, and set WINGFIT_API_KEY to an admin key"
         raise WingfitError("no key was made", f"{error}; {remedy}") from None
-    try:
-        with database.write() as session:
-            row, secret = keys.make(session, name, owner, scopes)  # type: ignore[arg-type]  # checked above
-    finally:
-        database.close()
+    with closing(database), database.write() as session:
+        row, secret = keys.make(session, name, owner, scopes)  # type: ignore[arg-type]  # checked above
     names = ("id", "name", "owner", "scopes", "created_at", "revoked_at")
     return cast("NewKey", {name: getattr(row, name) for name in names} | {"secret": secret})

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, Literal, cast
+from typing import Any, cast
 
 from wingfit.cli.base.files import write_csv, write_text
 from wingfit.cli.base.output import number
@@ -21,14 +21,6 @@ VECTORS = {
     "velocity_m_s": "velocity_{}_m_s",
 }
 Column = tuple[str, list[float]]
-
-
-PORTS: tuple[tuple[Literal["front_motor", "rear_motor", "air", "dampers"], str], ...] = (
-    ("front_motor", "front motor"),
-    ("rear_motor", "rear motor"),
-    ("air", "air"),
-    ("dampers", "dampers"),
-)
 
 
 def write_loads(outputs: a.Outputs, path: Path) -> None:

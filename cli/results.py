@@ -18,10 +18,10 @@ def print_result(answer: Any) -> None:
         return
     misfits(answer)
     say("")
-    genes(answer["genes"])
+    print_genes(answer["genes"])
 
 
-def genes(items: list[a.GeneInfo]) -> None:
+def print_genes(items: list[a.GeneInfo]) -> None:
     """Print genes: nominal and estimated value, bounds, error, and whether the data identify them."""
     columns: Columns[a.GeneInfo] = {
         "gene": "name",

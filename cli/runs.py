@@ -15,7 +15,7 @@ from wingfit.cli.base.output import duration, emit, moment, note, percent, say, 
 from wingfit.cli.base.rounding import with_unit
 from wingfit.cli.forces.runs import forces, predict
 from wingfit.cli.jobs import JobKind, check_ended_well, commands, dataset_id, follow, state_of
-from wingfit.cli.results import genes, print_result
+from wingfit.cli.results import print_genes, print_result
 from wingfit.client import answers as a
 from wingfit.client.client import DEFAULT_URL, Client
 from wingfit.service.runs.spec_fields_by_kind import SEARCH_ONLY, VEHICLE_ONLY, WING_ONLY
@@ -57,6 +57,7 @@ app.command()(predict)
 
 @app.command()
 def submit(
+    ctx: typer.Context,
     dataset: Annotated[str, typer.Argument(help="Id of a dataset, or a folder, .zip or .nc file to upload first.")],
     division: o.Division = None,
     mode: Annotated[
@@ -74,8 +75,8 @@ def submit(
     bounds_factor: o.BoundsFactor = None,
     accuracy_mm: o.Accuracy = None,
     recordings: o.Recordings = None,
-    gene: o.Genes = None,
-    with_: o.With = None,
+    genes: o.Genes = None,
+    effects: o.With = None,
     preset: o.Preset = None,
     without: o.Without = None,
     axes: o.Axes = None,
@@ -91,29 +92,8 @@ def submit(
     Example: wingfit runs submit ID --division 11 --seed 7 --watch
     """
     with Client(url) as client:
-        run = client.submit_run(
-            dataset_id(client, dataset),
-            division=division,
-            mode=mode,
-            method=method,
-            finish=finish or None,
-            population=population,
-            stall=stall,
-            tolerance=tolerance,
-            max_generations=max_generations,
-            seed=seed,
-            bounds_factor=bounds_factor,
-            accuracy_mm=accuracy_mm,
-            recordings=recordings or None,
-            genes=gene or None,
-            effects=o.names(with_, "--with"),
-            preset=preset,
-            without=o.names(without, "--without"),
-            axes=axes or None,
-            low_pass_hz=low_pass_hz,
-            peel_width_beats=peel_width_beats,
-            name=name,
-        )
+        settings = o.settings(ctx, "dataset", "watch_it", "url", "as_json")
+        run = client.submit_run(dataset_id(client, dataset), **settings)
         if watch_it:
             note(f"run {run['id']}")
             run = follow(client, RUNS, run["id"])
@@ -172,7 +152,7 @@ def genome(
     if output:
         values = {gene["name"]: gene["best"] for gene in answer["genes"]}
         write_text(output, json.dumps(values, indent=2) + "\n", "genome")
-    emit(answer, lambda answer: genes(answer["genes"]), as_json=as_json)
+    emit(answer, lambda answer: print_genes(answer["genes"]), as_json=as_json)
     if not as_json and not answer["final"]:
         note("the run has not ended; these are the best values so far")
 

@@ -12,6 +12,7 @@ from wingfit.client.client import WingfitError
 
 
 def serve(
+    ctx: typer.Context,
     data: Annotated[
         Path | None, typer.Option(help="Folder of the database; default: $WINGFIT_DATA or ./wingfit-data.")
     ] = None,
@@ -29,16 +30,9 @@ def serve(
     from wingfit.service.server import serve as run_server
     from wingfit.service.settings import Settings, SettingsError
 
-    chosen = {
-        "WINGFIT_DATA": data,
-        "WINGFIT_HOST": host,
-        "WINGFIT_PORT": port,
-        "WINGFIT_EVALUATOR": evaluator,
-        "WINGFIT_WORKERS": workers,
-        "WINGFIT_RAY_ADDRESS": ray_address,
-    }
+    chosen = {f"WINGFIT_{name.upper()}": str(value) for name, value in ctx.params.items() if value is not None}
     try:
-        settings = Settings.from_env(dict(os.environ) | {k: str(v) for k, v in chosen.items() if v is not None})
+        settings = Settings.from_env(dict(os.environ) | chosen)
     except SettingsError as error:
         raise typer.BadParameter(str(error)) from error
     try:

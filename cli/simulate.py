@@ -47,7 +47,7 @@ def simulate(
             "flap_frequency_hz, phase_lag_deg, pressure_mbar, temperature_c, airspeed_m_s, angle_of_attack_deg."
         ),
     ] = None,
-    with_: o.With = None,
+    effects: o.With = None,
     preset: o.Preset = None,
     without: o.Without = None,
     low_pass_hz: o.LowPass = None,
@@ -73,14 +73,14 @@ def simulate(
         "--low-pass-hz": low_pass_hz,
         "--peel-width-beats": peel_width_beats,
     }
-    given: dict[str, Any] = {"genome": o.read_genome(genome or []), "effects": o.names(with_, "--with") or ()}
+    given: dict[str, Any] = {"genome": o.read_genome(genome or []), "effects": effects or ()}
     condition = o.read_condition(at or [])
     with Client(url) as client:
         described = client.dataset(dataset)
         name = recording or described["recordings"][0]["name"]
         if described["kind"] == "forces":
             o.refuse(of_wings, "the dataset describes a vehicle, and this is for wings")
-            given |= {"preset": preset or "proposed", "without": o.names(without, "--without") or ()}
+            given |= {"preset": preset or "proposed", "without": without or ()}
             given |= {"low_pass_hz": low_pass_hz, "peel_width_beats": peel_width_beats or 0.0}
             forces = client.simulate_forces(dataset, name, **given)
             write_forces(forces, output, plot)

@@ -103,26 +103,31 @@ class Dataset(TypedDict):
     recordings: list[RecordingInfo]
 
 
-class RunSpec(TypedDict):
-    """The settings of a run, with every default filled in."""
+class JobSpec(TypedDict):
+    """The settings that runs and diagnoses share, with every default filled in."""
 
     preset: str
     without: list[str]
     low_pass_hz: float | None
     peel_width_beats: float
     division: str
-    population: int
-    stall: int
-    tolerance: float
-    max_generations: int
     seed: int
     bounds_factor: float
     accuracy_mm: float
     recordings: list[str]
     genes: list[str]
     effects: list[str]
-    finish: bool
     axes: list[Literal["x", "z"]]
+
+
+class RunSpec(JobSpec):
+    """The settings of a run."""
+
+    population: int
+    stall: int
+    tolerance: float
+    max_generations: int
+    finish: bool
     mode: Literal["staged", "joint", "local"]
     method: Literal["genetic", "cma_es", "gauss_newton"]
 

@@ -112,11 +112,13 @@ class Client(DiagnosisCalls, KeyCalls):
         name; of a wing also division, bounds_factor, accuracy_mm; of a vehicle preset, without, axes, low_pass_hz,
         peel_width_beats. Omitted settings have the server's defaults.
         """
-        return cast(a.Run, self._json("POST", "/v1/runs", json=_body(dataset_id, spec), key=str(uuid.uuid4())))
+        body = given(dataset_id=dataset_id, **spec)
+        return cast(a.Run, self._json("POST", "/v1/runs", json=body, key=str(uuid.uuid4())))
 
     def check_run(self, dataset_id: str, **spec: Any) -> a.Checked:
         """Return what :meth:`submit_run` would submit, or raise the error that it would raise; nothing is stored."""
-        return cast(a.Checked, self._json("POST", "/v1/runs?validate_only=true", json=_body(dataset_id, spec)))
+        body = given(dataset_id=dataset_id, **spec)
+        return cast(a.Checked, self._json("POST", "/v1/runs?validate_only=true", json=body))
 
     def runs(self, *, dataset_id: str | None = None, state: str | None = None) -> list[a.Run]:
         """List all runs, newest first, optionally of one dataset or in one state."""
@@ -177,7 +179,7 @@ class Client(DiagnosisCalls, KeyCalls):
     def forces(self, run_id: str, recording: str | None = None, source: f.Source | None = None) -> f.Forces:
         """Fetch recorded and modelled forces of one recording over the beat; ``source`` says whose coefficients."""
         params = given(recording=recording, source=source)
-        return cast(f.Forces, self._json("GET", f"{_run(run_id)}/forces", params=params, timeout=self.simulating))
+        return cast(f.Forces, self._simulated("GET", f"{_run(run_id)}/forces", params=params))
 
     def predict(
         self,
@@ -190,12 +192,14 @@ class Client(DiagnosisCalls, KeyCalls):
         temperature_c: float | None = None,
     ) -> f.Prediction:
         """Predict the forces over a beat under any condition, from the global model of a finished run."""
-        condition: dict[str, float] = {
-            "flap_frequency_hz": flap_frequency_hz,
-            "body_pitch_deg": body_pitch_deg,
-            "airspeed_m_s": airspeed_m_s,
-        } | given(pressure_mbar=pressure_mbar, temperature_c=temperature_c)
-        return cast(f.Prediction, self._simulated(f"{_run(run_id)}/predictions", condition))
+        condition = given(
+            flap_frequency_hz=flap_frequency_hz,
+            body_pitch_deg=body_pitch_deg,
+            airspeed_m_s=airspeed_m_s,
+            pressure_mbar=pressure_mbar,
+            temperature_c=temperature_c,
+        )
+        return cast(f.Prediction, self._simulated("POST", f"{_run(run_id)}/predictions", json=condition))
 
     def models(self) -> f.Models:
         """List the blade-element models of vehicles and their terms."""
@@ -214,9 +218,7 @@ class Client(DiagnosisCalls, KeyCalls):
     ) -> a.Comparison:
         """Fetch recorded and simulated markers of one recording."""
         params = given(recording=recording, genome=genome)
-        return cast(
-            a.Comparison, self._json("GET", f"{_run(run_id)}/comparison", params=params, timeout=self.simulating)
-        )
+        return cast(a.Comparison, self._simulated("GET", f"{_run(run_id)}/comparison", params=params))
 
     def loads(
         self,
@@ -227,10 +229,11 @@ class Client(DiagnosisCalls, KeyCalls):
     ) -> Loads:
         """Fetch motor torques, forces, powers and energies over one beat; ``outputs`` as in :meth:`simulate`."""
         params = given(recording=recording, genome=genome, outputs=list(outputs) if outputs else None)
-        return cast(Loads, self._json("GET", f"{_run(run_id)}/loads", params=params, timeout=self.simulating))
+        return cast(Loads, self._simulated("GET", f"{_run(run_id)}/loads", params=params))
 
-    def _simulated(self, path: str, body: Mapping[str, Any]) -> Any:
-        return self._json("POST", path, json=body, key=str(uuid.uuid4()), timeout=self.simulating)
+    def _simulated(self, method: str, path: str, **options: Any) -> Any:
+        """An answer that requires a simulation; asking again has no effect on the server."""
+        return self._json(method, path, key=str(uuid.uuid4()), timeout=self.simulating, **options)
 
     def events(self, run_id: str, *, last_event_id: str | None = None, patience_s: float = 60.0) -> Iterator[a.Event]:
         """Yield the server-sent events of a run until its final state.
@@ -260,15 +263,10 @@ class Client(DiagnosisCalls, KeyCalls):
         ``outputs`` asks for loads over the beat: True for all, or some of motors, air, strips, sections, connectors,
         power, energy, averages.
         """
-        body = {
-            "dataset_id": dataset_id,
-            "recording": recording,
-            "division": division,
-            "genome": dict(genome or {}),
-            "outputs": outputs if isinstance(outputs, bool) else list(outputs),
-            "effects": list(effects),
-        } | given(accuracy_mm=accuracy_mm)
-        return cast(a.Simulation, self._simulated("/v1/simulations", body))
+        loads = outputs if isinstance(outputs, bool) else list(outputs)
+        wing = {"division": division, "accuracy_mm": accuracy_mm, "outputs": loads}
+        body = _simulation(dataset_id, recording, genome, effects, **wing)
+        return cast(a.Simulation, self._simulated("POST", "/v1/simulations", json=body))
 
     def simulate_forces(
         self,
@@ -287,16 +285,9 @@ class Client(DiagnosisCalls, KeyCalls):
         ``preset`` and the terms ``without`` which it is computed are those of :meth:`models`; ``low_pass_hz`` filters
         recorded and modelled forces: None at 3.2 times the flap frequency, 0 not at all.
         """
-        body = {
-            "dataset_id": dataset_id,
-            "recording": recording,
-            "genome": dict(genome or {}),
-            "preset": preset,
-            "without": list(without),
-            "peel_width_beats": peel_width_beats,
-            "effects": list(effects),
-        } | given(low_pass_hz=low_pass_hz)
-        return cast(f.ForceSimulation, self._simulated("/v1/simulations", body))
+        model = {"preset": preset, "without": list(without), "peel_width_beats": peel_width_beats}
+        body = _simulation(dataset_id, recording, genome, effects, low_pass_hz=low_pass_hz, **model)
+        return cast(f.ForceSimulation, self._simulated("POST", "/v1/simulations", json=body))
 
     def loads_under(
         self,
@@ -314,20 +305,18 @@ class Client(DiagnosisCalls, KeyCalls):
 
         Its names: flap_frequency_hz, phase_lag_deg, pressure_mbar, temperature_c, airspeed_m_s, angle_of_attack_deg.
         """
-        body = {
-            "dataset_id": dataset_id,
-            "recording": recording,
-            "condition": dict(condition or {}),
-            "division": division,
-            "genome": dict(genome or {}),
-            "outputs": True if outputs is None else list(outputs),
-            "effects": list(effects),
-        } | given(accuracy_mm=accuracy_mm)
-        return cast(Loads, self._simulated("/v1/loads", body))
+        loads = True if outputs is None else list(outputs)
+        wing = {"division": division, "accuracy_mm": accuracy_mm, "outputs": loads}
+        body = _simulation(dataset_id, recording, genome, effects, condition=dict(condition or {}), **wing)
+        return cast(Loads, self._simulated("POST", "/v1/loads", json=body))
 
 
-def _body(dataset_id: str, spec: Mapping[str, Any]) -> dict[str, Any]:
-    return {"dataset_id": dataset_id} | {key: value for key, value in spec.items() if value is not None}
+def _simulation(
+    dataset_id: str, recording: str, genome: Mapping[str, float] | None, effects: Sequence[str], **settings: Any
+) -> dict[str, Any]:
+    """The body of a request for a simulation; settings that are None are left to the server."""
+    model = {"genome": dict(genome or {}), "effects": list(effects)}
+    return given(dataset_id=dataset_id, recording=recording, **model, **settings)
 
 
 def _run(run_id: str) -> str:

@@ -6,30 +6,18 @@ from typing import Literal
 
 from typing_extensions import TypedDict
 
-from wingfit.client.answers import Job
+from wingfit.client.answers import Job, JobSpec
 
 Verdict = Literal["adequate", "named", "ambiguous", "unnamed", "measurement fault"]
 
 
-class DiagnosisSpec(TypedDict):
+class DiagnosisSpec(JobSpec):
     """The settings of a diagnosis; ``start`` is its initial genome, empty for the dataset's estimates."""
 
-    preset: str
-    without: list[str]
-    low_pass_hz: float | None
-    peel_width_beats: float
-    division: str
-    seed: int
-    bounds_factor: float
-    accuracy_mm: float
-    recordings: list[str]
-    genes: list[str]
     fixed: dict[str, float]
-    effects: list[str]
     suspects: list[str]
     refine: bool
     refits: int
-    axes: list[Literal["x", "z"]]
     start: dict[str, float]
 
 

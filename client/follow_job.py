@@ -6,8 +6,6 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any, TypeVar, cast
 
-import httpx
-
 from wingfit.client import answers as a
 from wingfit.client.diagnosis_answers import Diagnosis
 from wingfit.client.transport import ServerAwayError, Transport, WingfitError, is_passing
@@ -37,8 +35,8 @@ class Watching(Transport):
                 if job["state"] in a.FINAL:
                     yield {"id": None, "event": "state", "data": job}
                     return
-            except (httpx.TransportError, WingfitError) as error:
-                if isinstance(error, WingfitError) and not is_passing(error):
+            except WingfitError as error:
+                if not is_passing(error):
                     raise
                 away_since = away_since or time.monotonic()
                 if time.monotonic() - away_since > patience_s:

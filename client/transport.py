@@ -44,12 +44,7 @@ class WingfitError(Exception):
     """
 
     def __init__(
-        self,
-        title: str,
-        detail: str = "",
-        *,
-        status: int | None = None,
-        errors: list[dict[str, Any]] | None = None,
+        self, title: str, detail: str = "", *, status: int | None = None, errors: list[dict[str, Any]] | None = None
     ) -> None:
         self.title, self.detail, self.status, self.errors = title, detail, status, errors or []
         super().__init__(title, detail)
@@ -157,17 +152,14 @@ class Transport:
 
     @contextlib.contextmanager
     def _stream(self, method: str, path: str, **options: Any) -> Iterator[httpx.Response]:
+        """An open answer; ServerAwayError also if the connection breaks while it is read."""
         try:
-            context = self._http.stream(method, path, **options)
-            response = context.__enter__()
+            with self._http.stream(method, path, **options) as response:
+                if response.is_error:
+                    response.read()
+                yield _checked(response)
         except httpx.TransportError as error:
             raise ServerAwayError(self.base_url, error) from error
-        try:
-            if response.is_error:
-                response.read()
-            yield _checked(response)
-        finally:
-            context.__exit__(None, None, None)
 
     def _file(
         self, path: str, target: Path, name: str, on_bytes: OnBytes | None, *, private: bool = False, **options: Any
@@ -186,10 +178,8 @@ class Transport:
                         stream.write(block)
                         if on_bytes:
                             on_bytes(stream.tell(), int(response.headers.get("content-length", 0)))
-            except BaseException as error:
+            except BaseException:
                 partial.unlink(missing_ok=True)
-                if isinstance(error, httpx.TransportError):
-                    raise ServerAwayError(self.base_url, error) from error
                 raise
         partial.replace(target)
         return target

@@ -27,10 +27,7 @@ UNITS: Mapping[str, tuple[Convert, Convert]] = {
     "_mbar": (lambda pascals: pascals / PASCAL_PER_MBAR, lambda mbar: mbar * PASCAL_PER_MBAR),
     "_c": (lambda kelvins: kelvins - ZERO_CELSIUS, lambda celsius: celsius + ZERO_CELSIUS),
     "_percent": (lambda fraction: 100 * fraction, lambda percent: percent / 100),
-    "_beats": (float, float),
-    "_hz": (float, float),
-    "_m_s": (float, float),
-    "_n": (float, float),
+    **dict.fromkeys(("_beats", "_hz", "_m_s", "_n"), (float, float)),
 }
 
 

@@ -19,6 +19,7 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from importlib.resources import files
 from pathlib import Path
+from typing import Unpack
 
 from fastapi import Depends, FastAPI, Request
 from starlette.concurrency import run_in_threadpool
@@ -28,8 +29,7 @@ from starlette.routing import Match
 from starlette.staticfiles import StaticFiles
 
 from wingfit.service.auth.authentication import Authentication
-from wingfit.service.container import MakeEvaluator, Service
-from wingfit.service.diagnoses.diagnoser import Diagnoser
+from wingfit.service.container import Parts, Service
 from wingfit.service.http import problems, threads
 from wingfit.service.http import responses as http
 from wingfit.service.http.error_boundary import ErrorBoundary
@@ -38,7 +38,6 @@ from wingfit.service.http.request_limits import RequestLimits
 from wingfit.service.operations.metrics_and_log import METRICS, Metrics, MetricsAndLog
 from wingfit.service.operations.shutdown import StopLimits
 from wingfit.service.routes import backup, datasets, diagnoses, effects, exports, forces, keys, outcomes, runs, system
-from wingfit.service.runs.engine import Engine
 from wingfit.service.settings import Settings
 from wingfit.service.storage.database import Database
 from wingfit.service.version import wingfit_version
@@ -67,20 +66,14 @@ DESCRIPTION = (
 
 
 def create_app(
-    settings: Settings,
-    *,
-    database: Database | None = None,
-    engine: Engine | None = None,
-    make_evaluator: MakeEvaluator | None = None,
-    diagnoser: Diagnoser | None = None,
-    limits: StopLimits | None = None,
+    settings: Settings, *, database: Database | None = None, limits: StopLimits | None = None, **parts: Unpack[Parts]
 ) -> FastAPI:
     """Build the application. At its start it opens the data folder, unless an open ``database`` is given."""
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[dict[str, Metrics]]:
         opened = Database(settings.data) if database is None else database
-        service = Service(settings, opened, engine, make_evaluator, diagnoser)
+        service = Service(settings, opened, **parts)
         app.state.service = service
         await run_in_threadpool(service.start)
         yield {METRICS: service.metrics}  # for header_limits.Protocol

@@ -7,7 +7,8 @@ import shutil
 import time
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import AsyncExitStack
-from typing import Annotated, Any, cast
+from functools import partial
+from typing import Annotated, Any, TypedDict, Unpack, cast
 
 from fastapi import Depends, Request
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
@@ -20,7 +21,6 @@ from wingfit.service.http import concurrency_limit, threads
 from wingfit.service.http.concurrency_limit import ConcurrencyLimit
 from wingfit.service.http.events import Events
 from wingfit.service.jobs.evaluator_startup import Pool
-from wingfit.service.jobs.job_kind import JobKind
 from wingfit.service.jobs.runner import JobRef, Runner
 from wingfit.service.jobs.wakeups import Changes
 from wingfit.service.operations.health import Health
@@ -40,23 +40,22 @@ from wingfit.workers.watch import Standing
 LOG = logging.getLogger("wingfit")
 READ_SECONDS = 1.0  # that a caller waits for the database, or for the metrics
 
-MakeEvaluator = Callable[[], RunningEvaluator]
+
+class Parts(TypedDict, total=False):
+    """What computes; tests replace it by parts that take no time."""
+
+    engine: Engine
+    diagnoser: Diagnoser
+    make_evaluator: Callable[[], RunningEvaluator]
 
 
 class Service:
     """What request handlers need: settings, database, jobs, limits and metrics."""
 
-    def __init__(
-        self,
-        settings: Settings,
-        database: Database,
-        engine: Engine | None = None,
-        make_evaluator: MakeEvaluator | None = None,
-        diagnoser: Diagnoser | None = None,
-    ) -> None:
+    def __init__(self, settings: Settings, database: Database, **parts: Unpack[Parts]) -> None:
         self.settings, self.database = settings, database
-        self.engine: Engine = engine or Engine()
-        self.diagnoser: Diagnoser = diagnoser or Diagnoser()
+        self.engine: Engine = parts.get("engine") or Engine()
+        self.diagnoser: Diagnoser = parts.get("diagnoser") or Diagnoser()
         self.keys = KeyRing()
         # Requests being answered: method, path and start, by the id of their ASGI scope.
         self.open_requests: dict[int, tuple[str, str, float]] = {}
@@ -77,7 +76,8 @@ class Service:
             database, self.changes, kinds, settings.max_runs, settings.max_runs_per_owner, settings.max_starts
         )
         self._housekeeping = Housekeeping(database, settings.keep_days, self.changes.publish)
-        self._pool = Pool(make_evaluator or _maker(settings), self.runner.attach)
+        make_evaluator = parts.get("make_evaluator") or partial(_evaluator, settings)
+        self._pool = Pool(make_evaluator, self.runner.attach)
         self.health = Health(settings, database, self._pool, kinds)
         self._metrics_text = threads.SharedCall("metrics", self.metrics.text)
 
@@ -88,12 +88,6 @@ class Service:
         self.runner.recover()
         self._housekeeping.start()
         self._pool.start()
-
-    def enqueue(self, kind: JobKind, job_id: str) -> None:
-        """Queue a stored job."""
-        with self.database.read() as session:
-            owner = store.one(session, kind.table, job_id).owner
-        self.runner.enqueue(kind, job_id, owner)
 
     def load_keys(self) -> None:
         """Read the valid keys from the database; event streams that were opened with a revoked key end."""
@@ -171,24 +165,17 @@ class Service:
             ("workers", "Living workers of the evaluator.", workers.workers),
             ("job_stalled_seconds", "Longest time since the last progress of a running job.", pace.stalled_s),
             ("queue_age_seconds", "Time that the oldest waiting job has waited.", pace.waited_s),
-            (
-                "disk_free_bytes",
-                "Free space on the disk of the data folder.",
-                free,
-            ),
+            ("disk_free_bytes", "Free space on the disk of the data folder.", free),
             ("watchers", "Open event streams.", self.changes.watchers),
             ("database_bytes", "Size of the database and its log.", size),
         ):
             yield GaugeMetricFamily(f"wingfit_{name}", description, value)
 
 
-def _maker(settings: Settings) -> MakeEvaluator:
-    def make() -> RunningEvaluator:
-        from wingfit.workers import make_evaluator
+def _evaluator(settings: Settings) -> RunningEvaluator:
+    from wingfit.workers import make_evaluator
 
-        return make_evaluator(settings.evaluator, settings.workers, settings.ray_address)
-
-    return make
+    return make_evaluator(settings.evaluator, settings.workers, settings.ray_address)
 
 
 async def _service(request: Request) -> Service:

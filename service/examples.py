@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from wingfit.calibration.spec import CalibrationSpec
-from wingfit.client.answers import Dataset, Problem, RecordingInfo, Run
+from wingfit.client.answers import Dataset, Job, Problem, RecordingInfo, Run
 from wingfit.client.diagnosis_answers import Diagnosis
 from wingfit.client.key_answers import Key, NewKey, Session
 from wingfit.diagnosis.spec import DiagnosisSpec
 from wingfit.service.auth.key_schemas import SECRET
-from wingfit.service.diagnoses.specs import diagnosis_settings
+from wingfit.service.diagnoses.views import diagnosis_settings
 from wingfit.service.outcomes.requests import RECORDING
 from wingfit.service.runs.requests import DATASET_ID
 from wingfit.service.runs.spec_views import run_settings
@@ -41,46 +41,40 @@ _DATASET: Dataset = {
     "markers": 49,
     "recordings": [_RECORDING],
 }
-_RUN: Run = {
+_JOB: Job = {
     "id": "run_5c1e07a94bd83f26",
     "name": "first try",
     "dataset_id": DATASET_ID,
     "kind": "tracks",
-    "spec": run_settings(CalibrationSpec(mode="staged", method="genetic")),
     "state": "RUNNING",
-    "pending_action": None,
     "stage": "structural",
     "progress": 0.31,
     "eta_seconds": 84.0,
     "created_at": "2026-11-05T09:31:00.000000Z",
     "started_at": "2026-11-05T09:31:00.120000Z",
     "finished_at": None,
-    "generations": 12,
     "evaluations": 600,
-    "best_mm": 1.84,
-    "best_mn": None,
     "error": None,
 }
+_RUN: Run = {
+    **_JOB,
+    "spec": run_settings(CalibrationSpec(mode="staged", method="genetic")),
+    "pending_action": None,
+    "generations": 12,
+    "best_mm": 1.84,
+    "best_mn": None,
+}
 _DIAGNOSIS: Diagnosis = {
+    **_JOB,
     "id": "dx_7d20c14be5a9f386",
     "name": "Robird campaign, division 11",
-    "dataset_id": DATASET_ID,
-    "run_id": None,
-    "kind": "tracks",
-    "spec": diagnosis_settings(DiagnosisSpec()),
-    "state": "RUNNING",
-    "pending_action": None,
     "stage": "refitting with hinge offset",
-    "progress": 0.62,
-    "eta_seconds": 71.0,
-    "created_at": "2026-11-05T09:31:00.000000Z",
-    "started_at": "2026-11-05T09:31:00.120000Z",
-    "finished_at": None,
+    "run_id": None,
+    "spec": diagnosis_settings(DiagnosisSpec()),
+    "pending_action": None,
     "steps": 48,
-    "evaluations": 5210,
     "verdict": None,
     "summary": None,
-    "error": None,
 }
 _PROBLEM: Problem = {
     "type": "urn:wingfit:problem:invalid",
@@ -98,12 +92,7 @@ _KEY: Key = {
     "revoked_at": None,
 }
 _NEW_KEY: NewKey = {**_KEY, "secret": SECRET}
-_SESSION: Session = {
-    "keys_required": True,
-    "key_id": _KEY["id"],
-    "owner": _KEY["owner"],
-    "scopes": _KEY["scopes"],
-}
+_SESSION: Session = {"keys_required": True, "key_id": _KEY["id"], "owner": _KEY["owner"], "scopes": _KEY["scopes"]}
 
 EXAMPLES: Mapping[type, Mapping[str, object]] = {
     Dataset: _DATASET,

@@ -11,19 +11,18 @@ import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from types import FrameType
+from typing import Unpack
 
 import uvicorn
 from fastapi import FastAPI
 
 from wingfit.service.app import create_app
 from wingfit.service.auth import keys
-from wingfit.service.container import MakeEvaluator
-from wingfit.service.diagnoses.diagnoser import Diagnoser
+from wingfit.service.container import Parts
 from wingfit.service.http.header_limits import Protocol
 from wingfit.service.operations import shutdown
 from wingfit.service.operations.metrics_and_log import set_up_log
 from wingfit.service.operations.shutdown import Deadline, StopLimits, Watchdog
-from wingfit.service.runs.engine import Engine
 from wingfit.service.settings import Settings, SettingsError, is_loopback
 from wingfit.service.storage.database import Database, DataFolderError
 
@@ -74,14 +73,7 @@ def _unfinished(app: FastAPI) -> Iterator[str]:
     return service.unfinished() if service is not None else iter(())
 
 
-def serve(
-    settings: Settings,
-    *,
-    engine: Engine | None = None,
-    make_evaluator: MakeEvaluator | None = None,
-    diagnoser: Diagnoser | None = None,
-    limits: StopLimits | None = None,
-) -> None:
+def serve(settings: Settings, *, limits: StopLimits | None = None, **parts: Unpack[Parts]) -> None:
     """Serve until SIGTERM or Ctrl-C; ServeError if the data folder or the port is not available."""
     limits = limits or StopLimits()
     set_up_log(settings.log)
@@ -97,14 +89,7 @@ def serve(
         _require_admin_key(settings, database, listening)
     elif not is_loopback(settings.host):
         LOG.warning("listening on %s without keys: anyone who can connect can read and delete all data", settings.host)
-    app = create_app(
-        settings,
-        database=database,
-        engine=engine,
-        make_evaluator=make_evaluator,
-        diagnoser=diagnoser,
-        limits=limits,
-    )
+    app = create_app(settings, database=database, limits=limits, **parts)
     config = uvicorn.Config(
         app,
         loop="uvloop",

@@ -132,12 +132,8 @@ class Settings:
 
 def is_loopback(host: str) -> bool:
     """Whether ``host`` names this machine only."""
-    if host == "localhost":
-        return True
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return False
+    address = _address(host)
+    return host == "localhost" if address is None else address.is_loopback
 
 
 def _variable(field: str) -> str:
@@ -159,7 +155,7 @@ def _hosts(text: str) -> tuple[str, ...]:
     """Host names with commas between; SettingsError for one that no request can match."""
     names = tuple(name.strip().lower() for name in text.split(",") if name.strip())
     for name in names:
-        if not (HOST_NAME.fullmatch(name) or _is_address(name)):
+        if not (HOST_NAME.fullmatch(name) or _address(name)):
             raise SettingsError(
                 f"WINGFIT_ALLOWED_HOSTS names {name!r}, which no request can match; write host names or IP addresses "
                 "without scheme, port, path, brackets or wildcard, with commas between"
@@ -167,11 +163,11 @@ def _hosts(text: str) -> tuple[str, ...]:
     return names
 
 
-def _is_address(text: str) -> bool:
+def _address(text: str) -> ipaddress.IPv4Address | ipaddress.IPv6Address | None:
     try:
-        return bool(ipaddress.ip_address(text))
+        return ipaddress.ip_address(text)
     except ValueError:
-        return False
+        return None
 
 
 def _folder(text: str) -> Path:

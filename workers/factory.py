@@ -2,49 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Literal, Protocol, get_args
+from typing import get_args
 
-import numpy.typing as npt
-
-from wingfit.calibration.evaluator import Evaluator
-from wingfit.calibration.problem import Evaluation, Problem
-from wingfit.workers.watch import Standing, never
-
-EvaluatorKind = Literal["in_process", "processes", "ray"]
-
-
-class RunningEvaluator(Evaluator, Protocol):
-    """An evaluator with its kind and the state of its workers for the health page; its calls can be interrupted."""
-
-    def evaluate(
-        self,
-        problem: Problem,
-        values: npt.ArrayLike,
-        *,
-        residuals: bool = False,
-        interrupted: Callable[[], bool] = never,
-    ) -> Evaluation:
-        """Misfits of ``values`` [B, F]; EvaluationInterruptedError soon after ``interrupted`` returns true.
-
-        Units that no worker has started by then are dropped.
-        """
-        ...
-
-    @property
-    def kind(self) -> EvaluatorKind:
-        """Name of the implementation."""
-        ...
-
-    @property
-    def workers(self) -> int:
-        """Number of units that can be evaluated at the same time."""
-        ...
-
-    @property
-    def standing(self) -> Standing:
-        """Number of living workers, and counts of lost ones."""
-        ...
+from wingfit.workers.running_evaluator import EvaluatorKind, RunningEvaluator
 
 
 def make_evaluator(kind: EvaluatorKind, workers: int | None = None, address: str | None = None) -> RunningEvaluator:

@@ -2,49 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Literal
 
-import numpy.typing as npt
-
-from wingfit.calibration.evaluator import as_batch, gather, run_unit, units
-from wingfit.calibration.problem import Evaluation, Misfit, Problem
-from wingfit.workers.errors import EvaluationInterruptedError, EvaluatorClosedError
-from wingfit.workers.watch import Standing, never
+from wingfit.calibration.problem import Misfit, Problem
+from wingfit.workers.running_evaluator import Interrupted, RunningEvaluator
+from wingfit.workers.share import Task
+from wingfit.workers.watch import Standing
 
 
-class InProcessEvaluator:
+class InProcessEvaluator(RunningEvaluator):
     """Evaluates one unit after the other."""
 
     kind: Literal["in_process"] = "in_process"
     workers = 1
-
-    def __init__(self) -> None:
-        self._closed = False
 
     @property
     def standing(self) -> Standing:
         """One worker: this process."""
         return Standing(self.workers)
 
-    def evaluate(
-        self,
-        problem: Problem,
-        values: npt.ArrayLike,
-        *,
-        residuals: bool = False,
-        interrupted: Callable[[], bool] = never,
-    ) -> Evaluation:
-        """Misfits of ``values`` [B, F] to every recording of the problem."""
-        batch = as_batch(values)
+    def _misfits(self, problem: Problem, tasks: list[Task], residuals: bool, interrupted: Interrupted) -> list[Misfit]:
         done: list[Misfit] = []
-        for unit in units(problem, len(batch)):
-            if self._closed:
-                raise EvaluatorClosedError(self.kind)
-            if interrupted():
-                raise EvaluationInterruptedError
-            done.append(run_unit(problem, batch, unit, residuals=residuals))
-        return gather(problem, done)
+        for task in tasks:
+            self._check(interrupted)
+            done.append(task.run(problem, residuals=residuals))
+        return done
 
     def close(self) -> None:
         """Refuse further calls; a call in progress ends after its current unit."""

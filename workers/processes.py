@@ -16,34 +16,32 @@ import signal
 import threading
 import time
 import traceback
-from collections.abc import Callable
 from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
+from concurrent.futures import wait as wait_for_futures
 from multiprocessing.connection import Connection
 from multiprocessing.connection import wait as wait_for
 from multiprocessing.context import SpawnProcess
 from typing import Any, Literal
 
-import numpy.typing as npt
-
-from wingfit.calibration.evaluator import as_batch, gather, units
-from wingfit.calibration.problem import Evaluation, Misfit, Problem
+from wingfit.calibration.problem import Misfit, Problem
 from wingfit.workers.errors import EvaluationInterruptedError, EvaluatorClosedError, WorkerLostError
-from wingfit.workers.share import ProblemMemory, Task, child_environment, lower_priority
-from wingfit.workers.watch import ATTEMPTS, START_SECONDS, STARTS, Expectation, Standing, Tally, never
+from wingfit.workers.recent import Recent
+from wingfit.workers.running_evaluator import Interrupted, RunningEvaluator
+from wingfit.workers.share import PROBLEMS_KEPT, Task, child_environment, lower_priority
+from wingfit.workers.watch import ATTEMPTS, START_SECONDS, STARTS, Expectation, Standing, Tally
 
 LOG = logging.getLogger("wingfit.workers")
 LOOK_SECONDS = 0.5
 Answer = tuple[Literal["need problem", "begun", "done", "raised"], Any]
 
 
-class ProcessPoolEvaluator:
+class ProcessPoolEvaluator(RunningEvaluator):
     """Simulates individuals in ``workers`` processes (default: one per processor), each a piece of the batch."""
 
     kind: Literal["processes"] = "processes"
 
     def __init__(self, workers: int | None = None) -> None:
         self._lock = threading.Lock()
-        self._closed = False
         self._expectation, self._tally = Expectation(), Tally()
         self._pool = [_Worker() for _ in range(workers or os.cpu_count() or 1)]
         self._idle: queue.SimpleQueue[_Worker] = queue.SimpleQueue()
@@ -64,23 +62,13 @@ class ProcessPoolEvaluator:
         """Number of living processes, and counts of lost ones."""
         return self._tally.standing(sum(worker.alive for worker in self._pool))
 
-    def evaluate(
-        self,
-        problem: Problem,
-        values: npt.ArrayLike,
-        *,
-        residuals: bool = False,
-        interrupted: Callable[[], bool] = never,
-    ) -> Evaluation:
-        """Misfits of ``values`` [B, F] to every recording of the problem; several threads may call."""
-        batch = as_batch(values)
-        tasks = [Task.cut(batch, unit) for unit in units(problem, len(batch))]
+    def _misfits(self, problem: Problem, tasks: list[Task], residuals: bool, interrupted: Interrupted) -> list[Misfit]:
         futures: list[Future[Misfit]] = []
         try:
             with self._lock:
-                self._check_open()
+                self._check()
                 futures += [self._threads.submit(self._run, problem, task, residuals) for task in tasks]
-            return gather(problem, [_result(future, interrupted) for future in futures])
+            return [_result(future, interrupted) for future in futures]
         except CancelledError:
             raise EvaluatorClosedError(self.kind) from None
         finally:
@@ -99,10 +87,6 @@ class ProcessPoolEvaluator:
         self._threads.shutdown(cancel_futures=True)
         for worker in self._pool:
             worker.release()
-
-    def _check_open(self) -> None:
-        if self._closed:
-            raise EvaluatorClosedError(self.kind)
 
     def _watch(self) -> None:
         while not self._over.wait(LOOK_SECONDS):
@@ -134,7 +118,7 @@ class ProcessPoolEvaluator:
 
     def _restart(self, worker: _Worker, death: _Died, what: str, limit: float) -> None:
         with self._lock:
-            self._check_open()
+            self._check()
             pid = worker.pid
             worker.release()
             worker.start()
@@ -147,13 +131,10 @@ class ProcessPoolEvaluator:
             LOG.warning("worker process %s died (%s) with %s; it was replaced", pid, worker.last_exit, what)
 
 
-def _result(future: Future[Misfit], interrupted: Callable[[], bool]) -> Misfit:
+def _result(future: Future[Misfit], interrupted: Interrupted) -> Misfit:
     while not interrupted():
-        try:
-            return future.result(LOOK_SECONDS)
-        except TimeoutError:
-            if future.done():  # a TimeoutError of the model itself
-                return future.result()
+        if wait_for_futures([future], LOOK_SECONDS).done:
+            return future.result()
     raise EvaluationInterruptedError
 
 
@@ -241,7 +222,7 @@ class _Worker:
                 answer: Answer = self._connection.recv()
                 kind, content = answer
                 if kind == "need problem":
-                    self._connection.send(pickle.dumps(problem, pickle.HIGHEST_PROTOCOL))
+                    self._connection.send(problem)
                 if kind == "begun":
                     self._expect(limit)
         except (EOFError, OSError) as error:
@@ -275,7 +256,7 @@ def _serve(connection: Connection) -> None:
     # Ctrl-C in a terminal reaches every process of the group; only the owner handles it.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     lower_priority()
-    problems = ProblemMemory()
+    problems = Recent[Problem](PROBLEMS_KEPT)
     while True:
         try:
             key, task, residuals = connection.recv()
@@ -284,14 +265,14 @@ def _serve(connection: Connection) -> None:
             return
 
 
-def _attempt(connection: Connection, problems: ProblemMemory, key: str, task: Task, residuals: bool) -> Answer:
-    def fetch() -> bytes:
+def _attempt(connection: Connection, problems: Recent[Problem], key: str, task: Task, residuals: bool) -> Answer:
+    def fetch() -> Problem:
         connection.send(("need problem", None))
-        content: bytes = connection.recv()
-        return content
+        problem: Problem = connection.recv()
+        return problem
 
     try:
-        problem = problems.fetched(key, fetch)
+        problem = problems.use(key, fetch)
         connection.send(("begun", None))
         began = time.monotonic()
         return "done", (task.run(problem, residuals=residuals), time.monotonic() - began)

@@ -11,21 +11,19 @@ import logging
 import pickle
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from functools import partial
 from typing import Any, Literal
 
-import numpy.typing as npt
-
-from wingfit.calibration.evaluator import as_batch, gather, units
-from wingfit.calibration.problem import Evaluation, Misfit, Problem
-from wingfit.workers.errors import EvaluationInterruptedError, EvaluatorClosedError
+from wingfit.calibration.problem import Misfit, Problem
 from wingfit.workers.guardian import Guardian
 from wingfit.workers.ray_batches import Batch, Batches, Cluster
 from wingfit.workers.ray_connection import Connection, ray
 from wingfit.workers.recent import Recent
-from wingfit.workers.share import PROBLEMS_KEPT, ProblemMemory, Task, lower_priority
-from wingfit.workers.watch import START_SECONDS, Expectation, Standing, Tally, never
+from wingfit.workers.running_evaluator import Interrupted, RunningEvaluator
+from wingfit.workers.share import PROBLEMS_KEPT, Task, lower_priority
+from wingfit.workers.watch import START_SECONDS, Expectation, Standing, Tally
 
 LOG = logging.getLogger("wingfit.workers")
 STOP_SECONDS = 30.0
@@ -34,7 +32,7 @@ LOOK_SECONDS = 2.0
 STALE_SECONDS = 20.0
 
 
-class RayEvaluator:
+class RayEvaluator(RunningEvaluator):
     """Distributes units over a Ray cluster, or without ``address`` over ``workers`` processes of this machine."""
 
     kind: Literal["ray"] = "ray"
@@ -42,7 +40,6 @@ class RayEvaluator:
     def __init__(self, workers: int | None = None, address: str | None = None) -> None:
         self._connection = Connection(workers, address)
         self._condition = threading.Condition()
-        self._closed = False
         self._calls = 0
         self._references = Recent[Any](PROBLEMS_KEPT)
         # No retries by Ray, which would not report them.
@@ -62,32 +59,15 @@ class RayEvaluator:
         """Present number of processors, and counts of lost workers."""
         return self._tally.standing(self.workers)
 
-    def evaluate(
-        self,
-        problem: Problem,
-        values: npt.ArrayLike,
-        *,
-        residuals: bool = False,
-        interrupted: Callable[[], bool] = never,
-    ) -> Evaluation:
-        """Misfits of ``values`` [B, F] to every recording of the problem; several threads may call."""
-        batch = as_batch(values)
-        tasks = [Task.cut(batch, unit) for unit in units(problem, len(batch))]
-
+    def _misfits(self, problem: Problem, tasks: list[Task], residuals: bool, interrupted: Interrupted) -> list[Misfit]:
         def submit(batch: Batch, limit: float) -> Any:
             mine = [tasks[number] for number in batch.numbers]
             return self._run_tasks.remote(problem.key, [self._put(problem)], mine, limit, residuals)
 
-        def check() -> None:
-            if self._closed:
-                raise EvaluatorClosedError(self.kind)
-            if interrupted():
-                raise EvaluationInterruptedError
-
-        cluster = Cluster(lambda: self.workers, submit, lambda: self._forget(problem), check)
+        check, forget = partial(self._check, interrupted), partial(self._forget, problem)
         with self._call():
-            batches = Batches(problem, len(tasks), cluster, self._expectation, self._tally)
-            return gather(problem, batches.collect())
+            cluster = Cluster(lambda: self.workers, submit, forget, check)
+            return Batches(problem, len(tasks), cluster, self._expectation, self._tally).collect()
 
     def close(self) -> None:
         """Leave the cluster, and stop it if it was started here; calls in progress raise EvaluatorClosedError."""
@@ -104,8 +84,7 @@ class RayEvaluator:
     @contextmanager
     def _call(self) -> Iterator[None]:
         with self._condition:
-            if self._closed:
-                raise EvaluatorClosedError(self.kind)
+            self._check()
             self._calls += 1
         try:
             yield
@@ -139,7 +118,7 @@ def _count_workers() -> int:
     return int(ray.cluster_resources().get("CPU", 0))
 
 
-_problems = ProblemMemory()
+_problems = Recent[Problem](PROBLEMS_KEPT)
 _guardian: list[Guardian] = []
 
 
@@ -155,7 +134,8 @@ def _run_tasks(
         _guardian.append(Guardian())
     # The inner limit gives an error message; the outer one is for a hung worker.
     with _guardian[0].watching(2 * START_SECONDS):
-        problem = _problems.fetched(key, lambda: ray.get(reference[0], timeout=START_SECONDS))
+        # The bytes come from the process that owns this worker.
+        problem = _problems.use(key, lambda: pickle.loads(ray.get(reference[0], timeout=START_SECONDS)))  # noqa: S301
     done: list[tuple[Misfit, float]] = []
     for task in tasks:
         began = time.monotonic()

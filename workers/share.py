@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import os
-import pickle
 import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,7 +13,6 @@ import numpy.typing as npt
 
 from wingfit.calibration.evaluator import Unit, run_unit
 from wingfit.calibration.problem import Misfit, Problem
-from wingfit.workers.recent import Recent
 
 NICENESS = 10
 PROBLEMS_KEPT = 8
@@ -44,8 +42,9 @@ def child_environment(**more: str) -> Iterator[None]:
 
 
 def lower_priority() -> None:
-    """Raise the niceness of this process to at least ``NICENESS``, so that the API has priority."""
-    os.nice(max(0, NICENESS - os.nice(0)))
+    """Lower the priority of this thread, and of what it starts, so that the API has priority."""
+    with suppress(OSError):  # it is lower already
+        os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), NICENESS)
 
 
 @dataclass(frozen=True)
@@ -64,15 +63,3 @@ class Task:
     def run(self, problem: Problem, *, residuals: bool) -> Misfit:
         """Evaluate a copy, because arrays in shared memory may be read-only."""
         return run_unit(problem, np.array(self.values), self.unit, residuals=residuals)
-
-
-class ProblemMemory(Recent[Problem]):
-    """The problems used last, by key; not thread-safe."""
-
-    def __init__(self, most: int = PROBLEMS_KEPT) -> None:
-        super().__init__(most)
-
-    def fetched(self, key: str, fetch: Callable[[], bytes]) -> Problem:
-        """The problem with this key; ``fetch`` returns it pickled if it is not in memory."""
-        # The bytes come from the process that owns this worker.
-        return self.use(key, lambda: pickle.loads(fetch()))  # noqa: S301

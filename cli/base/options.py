@@ -20,6 +20,25 @@ DatasetOrPath = Annotated[
     str | None, typer.Argument(help="Id of a dataset, or a folder, .zip or .nc file to upload first.")
 ]
 
+
+def names(param: typer.CallbackParam, words: list[str] | None) -> list[str] | None:
+    """Names in the ``words`` of an option, each of which may hold several, separated by commas; None for no words.
+
+    Hyphens count as underscores: clap-and-peel is understood.
+    """
+    listed = [name.strip().replace("-", "_") for word in words or [] for name in word.split(",")]
+    if "" in listed:
+        raise typer.BadParameter(
+            "a name is empty; use one comma between names, or leave the option out", param_hint=param.opts[0]
+        )
+    return listed or None
+
+
+def settings(ctx: typer.Context, *others: str) -> dict[str, Any]:
+    """The settings of a job that were given, by their names in the API: all options of a command but ``others``."""
+    return {name: value for name, value in ctx.params.items() if name not in others and value not in (None, [], ())}
+
+
 Division = Annotated[
     str | None, typer.Option(help="4, 11, 24, or number of bodies per strip, e.g. 3,3,3,2; default: 11.")
 ]
@@ -33,11 +52,14 @@ BoundsFactor = Annotated[
 ]
 With = Annotated[
     list[str] | None,
-    typer.Option("--with", help="Include these effects of 'wingfit effects', e.g. added_mass,hinge_offset."),
+    typer.Option(
+        "--with", callback=names, help="Include these effects of 'wingfit effects', e.g. added_mass,hinge_offset."
+    ),
 ]
 Preset = Annotated[str | None, typer.Option(help="Vehicles: a model of 'wingfit models'; default: proposed.")]
 Without = Annotated[
-    list[str] | None, typer.Option(help="Vehicles: leave out this term, e.g. clap_and_peel; repeatable.")
+    list[str] | None,
+    typer.Option(callback=names, help="Vehicles: leave out this term, e.g. clap_and_peel; repeatable."),
 ]
 Axes = Annotated[
     list[str] | None,
@@ -51,19 +73,6 @@ LowPass = Annotated[
 PeelWidth = Annotated[
     float | None, typer.Option(help="Vehicles: width, in beats, over which the end of the peel is smoothed.")
 ]
-
-
-def names(words: list[str] | None, option: str) -> list[str] | None:
-    """Names in ``words``, each of which may hold several, separated by commas; None where there is none.
-
-    Hyphens count as underscores: clap-and-peel is understood.
-    """
-    listed = [name.strip().replace("-", "_") for word in words or [] for name in word.split(",")]
-    if "" in listed:
-        raise typer.BadParameter(
-            "a name is empty; use one comma between names, or leave the option out", param_hint=option
-        )
-    return listed or None
 
 
 def refuse(options: Mapping[str, object], why: str) -> None:

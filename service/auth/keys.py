@@ -8,7 +8,7 @@ from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from wingfit.service.auth.access import Scope, digest, new_secret
-from wingfit.service.http.problems import conflict, not_found
+from wingfit.service.http.problems import conflict
 from wingfit.service.storage import store
 from wingfit.service.storage.tables import KeyRow
 
@@ -30,9 +30,7 @@ def every(session: Session) -> list[KeyRow]:
 
 def revoke(session: Session, key_id: str) -> KeyRow:
     """Revoke a key; a 404 if there is none, a 409 for the last key that can manage keys."""
-    row = session.scalar(select(KeyRow).where(KeyRow.id == key_id))
-    if row is None:
-        raise not_found("key", key_id)
+    row = store.one(session, KeyRow, key_id)
     others = [key for key in every(session) if key.revoked_at is None and key.id != key_id]
     if "admin" in row.scopes and row.revoked_at is None and not any("admin" in key.scopes for key in others):
         raise conflict(f"{key_id} is the last key that can manage keys; make another key with the scope admin first")

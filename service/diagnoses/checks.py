@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 from wingfit.calibration.spec import CalibrationSpec
 from wingfit.diagnosis.spec import DiagnosisSpec
 from wingfit.records import Dataset
-from wingfit.service.diagnoses import specs
 from wingfit.service.diagnoses.diagnoser import Diagnoser
 from wingfit.service.diagnoses.requests import DiagnosisIn
 from wingfit.service.http.problems import error_item, invalid
 from wingfit.service.runs import spec_views
 from wingfit.service.runs.engine import Engine
-from wingfit.service.runs.request_checks import gene_names, unknown_recordings
+from wingfit.service.runs.request_checks import gene_names, refuse_unknown
 from wingfit.service.runs.requests import VehicleModel
 
 
@@ -30,34 +30,29 @@ def checked(
     Genes of ``genome`` that the requested model does not have are ignored.
     """
     spec_views.refuse_foreign(body, dataset)
-    calibration = specs.nominal_model(body, of_run)
+    base = of_run or CalibrationSpec()
+    calibration = replace(spec_views.calibration_spec(body, base), axes=base.axes)
     spec_views.refuse_cutoff(calibration.low_pass, dataset.recordings)
     vehicle = VehicleModel.model_validate({"preset": calibration.preset, "without": list(calibration.without)})
     spec_views.refuse_effects(calibration.effects, dataset, vehicle)
     known = gene_names(engine, calibration, dataset)
-    _refuse_unknown(calibration, dataset, known)
-    _refuse_bounds(engine, calibration, dataset)
-    start = {name: value for name, value in (genome or {}).items() if name in known}
-    spec = specs.diagnosis_spec(body, calibration, start)
-    try:
-        diagnoser.check(spec, dataset)
-    except ValueError as error:
-        raise invalid("the diagnosis does not fit the dataset", [error_item("body", None, str(error))]) from None
-    return spec
-
-
-def _refuse_unknown(calibration: CalibrationSpec, dataset: Dataset, known: tuple[str, ...]) -> None:
-    genes = [(f"body.genes.{place}", name) for place, name in enumerate(calibration.genes)]
-    genes += [(f"body.fixed.{name}", name) for name in calibration.fixed]
-    recordings = tuple(recording.name for recording in dataset.recordings)
-    faults = [*unknown_recordings(calibration.recordings, recordings), *spec_views.unknown_genes(genes, known)]
-    if faults:
-        raise invalid("the request names what does not exist", faults)
-
-
-def _refuse_bounds(engine: Engine, calibration: CalibrationSpec, dataset: Dataset) -> None:
+    refuse_unknown(calibration, dataset, known)
     for name, value in calibration.fixed.items():
         try:
             engine.genome(calibration, dataset, {name: value})
         except ValueError as error:
             raise invalid("a value is out of bounds", [error_item(f"body.fixed.{name}", value, str(error))]) from None
+    start = {name: value for name, value in (genome or {}).items() if name in known}
+    spec = DiagnosisSpec(
+        calibration=calibration,
+        start=start,
+        suspects=tuple(body.suspects),
+        refine=body.refine,
+        refits=body.refits,
+        axes=tuple(body.axes or ()),
+    )
+    try:
+        diagnoser.check(spec, dataset)
+    except ValueError as error:
+        raise invalid("the diagnosis does not fit the dataset", [error_item("body", None, str(error))]) from None
+    return spec

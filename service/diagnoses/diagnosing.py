@@ -13,9 +13,9 @@ from wingfit.client.diagnosis_answers import Diagnosis, StepEvent
 from wingfit.diagnosis.finding import Finding
 from wingfit.diagnosis.spec import Progress
 from wingfit.service.datasets.parsed_datasets import Datasets
-from wingfit.service.diagnoses import specs, views
+from wingfit.service.diagnoses import views
 from wingfit.service.diagnoses.diagnoser import Diagnoser
-from wingfit.service.jobs.job_kind import Points, Step
+from wingfit.service.jobs.job_kind import JobKind, Points, Step
 from wingfit.service.storage.database import Database
 from wingfit.service.storage.tables import DiagnosisRow, FindingRow, StepRow
 from wingfit.workers import jobs
@@ -24,7 +24,7 @@ from wingfit.workers import jobs
 STORE_SECONDS = 0.5
 
 
-class Diagnosing:
+class Diagnosing(JobKind):
     """How diagnoses are computed."""
 
     what, path, prefix, step_event = "diagnosis", "/v1/diagnoses", "dx", "step"
@@ -44,7 +44,7 @@ class Diagnosing:
 
     def steps(self, row: DiagnosisRow, evaluator: Evaluator) -> Iterator[Step]:
         """Diagnose; a new stage is a step at once, progress within a stage after STORE_SECONDS."""
-        spec, dataset = specs.stored(row.spec), self._datasets.get(row.dataset_id)
+        spec, dataset = views.spec(row), self._datasets.get(row.dataset_id)
         stage, stored_at = "", 0.0
         for progress in self._diagnoser.diagnose(spec, dataset, evaluator):
             if progress.finding is not None:

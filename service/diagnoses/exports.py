@@ -2,33 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from wingfit.client.export_answers import DiagnosisExport
-from wingfit.service.container import Service
 from wingfit.service.diagnoses import views as diagnosis_views
 from wingfit.service.http import csv_text
-from wingfit.service.runs import netcdf_variables, views
-from wingfit.service.storage import store
-from wingfit.service.storage.tables import DatasetRow, DiagnosisRow
-from wingfit.service.version import wingfit_version
+from wingfit.service.runs import netcdf_variables as nc
+from wingfit.service.runs.exports import Exported
+from wingfit.service.storage.tables import DiagnosisRow
 
 Json = dict[str, Any]
 RANKING = (
-    "title",
-    "family",
-    "source",
-    "signature",
-    "probability",
-    "evidence",
-    "score",
-    "freedom",
-    "explained",
-    "predicted",
-)
+    "title", "family", "source", "signature", "probability", "evidence", "score", "freedom", "explained", "predicted",
+)  # fmt: skip
 # Units of loads as CF conventions write them.
 CF_UNITS = {"N/m": "N m-1"}
 CONDITION = (
@@ -41,33 +29,10 @@ SPAN = "part of the span, root 0, tip 1"
 PHASE = "phase of the beat"
 
 
-@dataclass(frozen=True)
-class Exported:
-    """A diagnosis, its finding and its dataset, read ``at`` this time."""
-
-    row: DiagnosisRow
-    finding: Json
-    dataset: DatasetRow
-    at: str
-
-
-def of(service: Service, diagnosis_id: str) -> Exported:
-    """The diagnosis as it is now; a 404, or a 409 if it has no finding."""
-    with service.database.read() as session:
-        row, found = store.one(session, DiagnosisRow, diagnosis_id), store.finding(session, diagnosis_id)
-        return Exported(row, found, store.one(session, DatasetRow, row.dataset_id), store.now())
-
-
-def document(exported: Exported) -> DiagnosisExport:
-    """All of a diagnosis."""
-    return DiagnosisExport(
-        schema_id="urn:wingfit:schema:diagnosis-export:1",
-        wingfit_version=wingfit_version(),
-        exported_at=exported.at,
-        dataset=views.dataset(exported.dataset),
-        diagnosis=diagnosis_views.diagnosis(exported.row),
-        finding=exported.finding,
-    )
+def document(exported: Exported[DiagnosisRow], found: Json) -> DiagnosisExport:
+    """All of a diagnosis and of its finding."""
+    heading = exported.heading("diagnosis-export")
+    return DiagnosisExport(**heading, diagnosis=diagnosis_views.diagnosis(exported.row), finding=found)
 
 
 def table(found: Json) -> str:
@@ -80,9 +45,9 @@ def table(found: Json) -> str:
     return csv_text.lines([head, *rows])
 
 
-def file(exported: Exported) -> bytes:
-    """Maps of the misfit, missing loads, and the misfit to each recording, a group each."""
-    row, found = exported.row, exported.finding
+def file(exported: Exported[DiagnosisRow], found: Json) -> bytes:
+    """Maps of the misfit, missing loads, and the misfit to each recording as NetCDF, a group each."""
+    row = exported.row
 
     def write(root: Any) -> None:
         _recordings(root, found)
@@ -91,7 +56,7 @@ def file(exported: Exported) -> bytes:
         for number, load in enumerate(found["missing"], 1):
             _load(root.create_group(f"missing/{number}"), load)
 
-    attributes = netcdf_variables.provenance(row, exported.dataset, found["model"], exported.at) | {
+    attributes = nc.provenance(row, exported.dataset, found["model"], exported.at) | {
         "title": f"diagnosis {row.name}",
         "comment": found["summary"],
         "verdict": found["verdict"],
@@ -100,7 +65,7 @@ def file(exported: Exported) -> bytes:
         "noise": found["floors"]["noise"],
         "floor": found["floors"]["total"],
     }
-    return netcdf_variables.made(write, attributes)
+    return nc.made(write, attributes)
 
 
 def _recordings(root: Any, found: Json) -> None:
@@ -110,18 +75,16 @@ def _recordings(root: Any, found: Json) -> None:
         return
     group = root.create_group("recordings")
     group.dimensions = {"recording": len(items)}
-    netcdf_variables.texts(group, "recording", "recording", "recording", (one["name"] for one in items))
-    netcdf_variables.flags(
-        group, "held_out", "recording", "whether it was held out", (one["held_out"] for one in items)
-    )
+    nc.texts(group, "recording", "recording", "recording", (one["name"] for one in items))
+    nc.flags(group, "held_out", "recording", "whether it was held out", (one["held_out"] for one in items))
     for name, units, meaning in CONDITION:
-        netcdf_variables.numbers(group, name, along, units, meaning, _all(items, name))
+        nc.numbers(group, name, along, units, meaning, _all(items, name))
     for name, model in (("before", "nominal model, refitted"), ("after", "model with the named effects")):
         for end, meaning in (("value", ""), ("low", ", lower end of its 90 % interval"), ("high", ", upper end of it")):
-            values = netcdf_variables.or_nan(one[name][end] for one in items)
+            values = nc.or_nan(one[name][end] for one in items)
             label = name if end == "value" else f"{name}_{end}"
-            netcdf_variables.numbers(group, label, along, unit, f"misfit of the {model}{meaning}", values)
-    netcdf_variables.numbers(group, "floor", along, unit, "misfit expected of a correct model", _all(items, "floor"))
+            nc.numbers(group, label, along, unit, f"misfit of the {model}{meaning}", values)
+    nc.numbers(group, "floor", along, unit, "misfit expected of a correct model", _all(items, "floor"))
 
 
 def _markers(root: Any, found: Json) -> None:
@@ -131,22 +94,22 @@ def _markers(root: Any, found: Json) -> None:
         return
     group = root.create_group("markers")
     group.dimensions = {"marker": len(items), "axis": 3}
-    netcdf_variables.texts(group, "marker", "marker", "marker or force axis", (one["name"] for one in items))
-    netcdf_variables.texts(group, "axis", "axis", "axis", "xyz")
+    nc.texts(group, "marker", "marker", "marker or force axis", (one["name"] for one in items))
+    nc.texts(group, "axis", "axis", "axis", "xyz")
     places = {
-        "span": (netcdf_variables.NO_UNIT, SPAN),
-        "chord": (netcdf_variables.NO_UNIT, "part of the chord, leading edge 0, trailing edge 1"),
+        "span": (nc.NO_UNIT, SPAN),
+        "chord": (nc.NO_UNIT, "part of the chord, leading edge 0, trailing edge 1"),
         "x": ("m", "place on the wing, aft"),
         "y": ("m", "place on the wing, outboard"),
         "before": (unit, "misfit beyond the noise, nominal model"),
         "after": (unit, "misfit beyond the noise, with the named effects"),
-        "worst": (netcdf_variables.NO_UNIT, f"{PHASE} where the misfit is largest"),
+        "worst": (nc.NO_UNIT, f"{PHASE} where the misfit is largest"),
     }
     for name, (units, meaning) in places.items():
-        netcdf_variables.numbers(group, name, along, units, meaning, _all(items, name))
+        nc.numbers(group, name, along, units, meaning, _all(items, name))
     directions = np.array([one["direction"] for one in items])
     meaning = "mean direction of the misfit at that phase"
-    netcdf_variables.numbers(group, "direction", ("marker", "axis"), netcdf_variables.NO_UNIT, meaning, directions)
+    nc.numbers(group, "direction", ("marker", "axis"), nc.NO_UNIT, meaning, directions)
 
 
 def _phase_map(root: Any, found: Json) -> None:
@@ -156,26 +119,24 @@ def _phase_map(root: Any, found: Json) -> None:
         return
     group = root.create_group("phase_map")
     group.dimensions = {"band": len(given["bands"]), "phase": len(given["phase"])}
-    netcdf_variables.numbers(group, "band", ("band",), netcdf_variables.NO_UNIT, SPAN, given["bands"])
-    netcdf_variables.numbers(group, "phase", ("phase",), netcdf_variables.NO_UNIT, PHASE, given["phase"])
-    netcdf_variables.numbers(group, "before", ("band", "phase"), unit, "misfit of the nominal model", given["before"])
-    netcdf_variables.numbers(
-        group, "after", ("band", "phase"), unit, "misfit of the model with the named effects", given["after"]
-    )
-    netcdf_variables.numbers(group, "noise", (), unit, "misfit from noise alone in a cell", given["noise"])
+    nc.numbers(group, "band", ("band",), nc.NO_UNIT, SPAN, given["bands"])
+    nc.numbers(group, "phase", ("phase",), nc.NO_UNIT, PHASE, given["phase"])
+    nc.numbers(group, "before", ("band", "phase"), unit, "misfit of the nominal model", given["before"])
+    nc.numbers(group, "after", ("band", "phase"), unit, "misfit of the model with the named effects", given["after"])
+    nc.numbers(group, "noise", (), unit, "misfit from noise alone in a cell", given["noise"])
 
 
 def _load(group: Any, load: Json) -> None:
     """The load missing from the nominal model in one recording."""
     units, along = str(CF_UNITS.get(load["unit"], load["unit"])), ("station", "phase")
     meaning = f"rotation missing at rod {load['rod']}" if load["rod"] else "force missing from the nominal model"
-    netcdf_variables.describe(group, {"recording": load["recording"], "rod": load["rod"]})
+    nc.describe(group, {"recording": load["recording"], "rod": load["rod"]})
     group.dimensions = {"station": len(load["stations"]), "phase": len(load["phase"])}
-    netcdf_variables.numbers(group, "station", ("station",), netcdf_variables.NO_UNIT, SPAN, load["stations"])
-    netcdf_variables.numbers(group, "phase", ("phase",), netcdf_variables.NO_UNIT, PHASE, load["phase"])
-    netcdf_variables.numbers(group, "value", along, units, meaning, load["values"])
-    netcdf_variables.numbers(group, "error", along, units, f"standard error of the {meaning}", load["errors"])
+    nc.numbers(group, "station", ("station",), nc.NO_UNIT, SPAN, load["stations"])
+    nc.numbers(group, "phase", ("phase",), nc.NO_UNIT, PHASE, load["phase"])
+    nc.numbers(group, "value", along, units, meaning, load["values"])
+    nc.numbers(group, "error", along, units, f"standard error of the {meaning}", load["errors"])
 
 
 def _all(items: list[Json], name: str) -> Any:
-    return netcdf_variables.or_nan(one[name] for one in items)
+    return nc.or_nan(one[name] for one in items)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ from wingfit.records import Dataset, load_dataset
 from wingfit.service.diagnoses.checks import checked
 from wingfit.service.diagnoses.diagnoser import Diagnoser
 from wingfit.service.diagnoses.requests import DiagnosisIn
-from wingfit.service.http.problems import ProblemError
+from wingfit.service.http.problems import ProblemError, from_pydantic
 from wingfit.service.runs.engine import Engine
 from wingfit.service.runs.simulation_hints import with_remedy
 from wingfit.workers import make_evaluator
@@ -33,24 +34,19 @@ def diagnose(path: Path, request: dict[str, Any], workers: int | None, on_progre
     try:
         spec = checked(DiagnosisIn.model_validate(request), dataset, Engine(), diagnoser)
     except ValidationError as error:
-        faults = [
-            {"where": ".".join(map(str, one["loc"])), "value": one.get("input"), "message": one["msg"]}
-            for one in error.errors()
-        ]
-        raise WingfitError("the request is invalid", errors=faults) from None
+        raise WingfitError("the request is invalid", errors=[from_pydantic(one) for one in error.errors()]) from None
     except ProblemError as problem:
         raise WingfitError(problem.detail, errors=problem.errors) from None
-    evaluator, started, points = make_evaluator("processes", workers), time.monotonic(), [(0.0, 0.0)]
+    started, points = time.monotonic(), list[tuple[float, float]]()
     try:
-        for progress in diagnoser.diagnose(spec, dataset, evaluator):
-            points.append((time.monotonic() - started, progress.fraction))
-            on_progress(progress.fraction, eta_seconds(points[1:]), progress.stage)
-            if progress.finding is not None:
-                return progress.finding
+        with closing(make_evaluator("processes", workers)) as evaluator:
+            for progress in diagnoser.diagnose(spec, dataset, evaluator):
+                points.append((time.monotonic() - started, progress.fraction))
+                on_progress(progress.fraction, eta_seconds(points), progress.stage)
+                if progress.finding is not None:
+                    return progress.finding
     except ValueError as error:
         raise WingfitError("the diagnosis failed", with_remedy(str(error))) from error
-    finally:
-        evaluator.close()
     raise WingfitError("the diagnosis ended without a finding")
 
 

@@ -5,18 +5,10 @@ from __future__ import annotations
 from typing import Annotated
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StrictBool
-from pydantic_core import PydanticCustomError
 
-from wingfit.service.runs.requests import DATASET_ID, Axes, JobSettings, Name, Number, Title, Whole
+from wingfit.service.runs.requests import DATASET_ID, Axes, JobSettings, Name, Number, Title, Whole, once
 
 MOST_REFITS = 50
-
-
-def _once(names: list[str]) -> list[str]:
-    for name in names:
-        if names.count(name) > 1:
-            raise PydanticCustomError("repeated", "must name each once; {name} is there twice", {"name": name})
-    return names
 
 
 Values = Annotated[dict[str, Number], Field(max_length=1000)]
@@ -42,7 +34,7 @@ class DiagnosisIn(JobSettings, BaseModel):
     fixed: Annotated[Values, Field(description="genes that keep a value")] = {}
     suspects: Annotated[
         list[Name],
-        AfterValidator(_once),
+        AfterValidator(once),
         Field(max_length=100, description="effects to consider; empty: all of /v1/effects that fit"),
     ] = []
     refine: Annotated[StrictBool, Field(description="whether a finer division may be taken where it limits")] = True

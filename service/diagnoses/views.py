@@ -1,13 +1,38 @@
-"""Answers about diagnoses, from their rows."""
+"""Answers about diagnoses, and their specifications, from the database."""
 
 from __future__ import annotations
 
-from wingfit.client.diagnosis_answers import Diagnosis
-from wingfit.service.diagnoses import specs
+from pydantic import TypeAdapter
+
+from wingfit.client import diagnosis_answers as answers
+from wingfit.diagnosis.spec import DiagnosisSpec
+from wingfit.service.answers import answer
 from wingfit.service.runs.views import columns, job_of
 from wingfit.service.storage.tables import DiagnosisRow
+from wingfit.service.units import tidy_mm
+
+_SPEC = TypeAdapter(DiagnosisSpec)
 
 
-def diagnosis(row: DiagnosisRow) -> Diagnosis:
+def diagnosis(row: DiagnosisRow) -> answers.Diagnosis:
     """A diagnosis from its row."""
-    return job_of(Diagnosis, columns(row), specs.diagnosis_settings(specs.stored(row.spec)))
+    return job_of(answers.Diagnosis, columns(row), diagnosis_settings(spec(row)))
+
+
+def spec(row: DiagnosisRow) -> DiagnosisSpec:
+    """The specification of a diagnosis from its row."""
+    return _SPEC.validate_python(row.spec)
+
+
+def diagnosis_settings(spec: DiagnosisSpec) -> answers.DiagnosisSpec:
+    """The settings of a diagnosis as answers give them."""
+    return answer(
+        answers.DiagnosisSpec,
+        spec.calibration,
+        accuracy_mm=tidy_mm(spec.calibration.accuracy),
+        start=dict(spec.start),
+        suspects=list(spec.suspects),
+        refine=spec.refine,
+        refits=spec.refits,
+        axes=list(spec.axes),
+    )

@@ -31,11 +31,8 @@ class ConcurrencyLimit:
     async def slot(self) -> AsyncIterator[None]:
         """Wait for one of the ``limit`` slots, and hold it within the block; a 503 where too many wait."""
         if self._free.locked() and self._waiting >= self._max_waiting:
-            raise ProblemError(
-                503,
-                "busy",
-                f"{self._waiting} {self._what} are waiting, the maximum; try again in some seconds",
-            )
+            detail = f"{self._waiting} {self._what} are waiting, the maximum; try again in some seconds"
+            raise ProblemError(503, "busy", detail)
         self._waiting += 1
         try:
             await self._free.acquire()

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import AsyncIterator, Callable, Sequence
-from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 from fastapi import Header
 from pydantic_core import to_json
@@ -34,16 +33,11 @@ LastEventId = Annotated[
 ]
 
 
-@dataclass(frozen=True)
-class JobState:
-    """The present state of a job, and its steps after a sequence number, ascending."""
-
-    job: Run | Diagnosis
-    steps: Sequence[GenerationEvent | StepEvent]
+# A job, and its steps after a sequence number, ascending.
+JobState = tuple[Run | Diagnosis, Sequence[GenerationEvent | StepEvent]]
 
 
-@dataclass(frozen=True)
-class Watched:
+class Watched(NamedTuple):
     """A job to watch: its id, the event name of its steps, and ``read(session, after, limit)``, which reads it."""
 
     id: str
@@ -51,8 +45,7 @@ class Watched:
     read: Callable[[Session, int, int], JobState]
 
 
-@dataclass(frozen=True)
-class News:
+class News(NamedTuple):
     """What one read found, as events.
 
     Attributes:
@@ -135,7 +128,7 @@ def watched(kind: JobKind, job_id: str) -> Watched:
     def read(session: Session, after: int, limit: int) -> JobState:
         past = store.steps(session, kind.step_table, job_id, after, limit)
         job = kind.view(store.one(session, kind.table, job_id))
-        return JobState(job, [checked(kind.step_answer, columns(one)) for one in past])
+        return job, [checked(kind.step_answer, columns(one)) for one in past]
 
     return Watched(job_id, kind.step_event, read)
 
@@ -151,10 +144,9 @@ def described(step: str, example: str) -> dict[str, Any]:
 def _read(database: Database, watched: Watched, after: int) -> News | None:
     try:
         with database.read() as session:
-            found = watched.read(session, after, STEPS_PER_READ)
+            job, steps = watched.read(session, after, STEPS_PER_READ)
     except (ProblemError, DatabaseClosedError):
         return None
-    job, steps = found.job, found.steps
     last = steps[-1]["sequence"] if steps else after
     return News(
         steps=b"".join(_event(watched.step, step, step["sequence"]) for step in steps),

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from functools import lru_cache
-from typing import Any, ParamSpec
+from typing import Any
 
 from pydantic_core import to_json
 from starlette.concurrency import run_in_threadpool
@@ -27,7 +27,6 @@ from wingfit.service.storage.tables import RunRow
 RUN = tuple(column.name for column in RunRow.__table__.columns if column.name not in ("genome", "result"))
 ITEM = tuple(HistoryItem.__annotations__)
 RUNS_IN_CACHE = 2**14
-Arguments = ParamSpec("Arguments")
 
 # Column names and conditions are constants of this module; values are bound.
 _WHERE_RUN = "FROM run WHERE id = :id AND (:owner IS NULL OR owner = :owner)"
@@ -35,11 +34,9 @@ _RUN_EXISTS = f"SELECT 1 {_WHERE_RUN}"
 _HISTORY = f"SELECT {', '.join(ITEM)} FROM generation WHERE run_id = ? AND sequence > ? ORDER BY sequence LIMIT ?"  # noqa: S608
 
 
-async def answer(
-    short: bool, read: Callable[Arguments, bytes], *args: Arguments.args, **kwargs: Arguments.kwargs
-) -> Response:
+async def answer(read: Callable[[], bytes], *, short: bool) -> Response:
     """The JSON of ``read``: a short one in the event loop, because a thread would cost more; others in a thread."""
-    body = read(*args, **kwargs) if short else await run_in_threadpool(read, *args, **kwargs)
+    body = read() if short else await run_in_threadpool(read)
     return Response(body, media_type=http.JSON)
 
 

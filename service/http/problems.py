@@ -108,7 +108,7 @@ async def _on_http(request: Request, error: Exception) -> Response:
 
 async def _on_validation(_: Request, error: Exception) -> Response:
     assert isinstance(error, RequestValidationError)  # noqa: S101
-    return response(invalid("the request is invalid", [_from_pydantic(item) for item in error.errors()]))
+    return response(invalid("the request is invalid", [from_pydantic(item) for item in error.errors()]))
 
 
 async def _on_closed(_: Request, error: Exception) -> Response:
@@ -135,7 +135,8 @@ def internal(request: Request, error: Exception) -> Response:
     return response(ProblemError(500, "internal", "an internal error; the log of the server has the details"))
 
 
-def _from_pydantic(item: Mapping[str, Any]) -> ErrorItem:
+def from_pydantic(item: Mapping[str, Any]) -> ErrorItem:
+    """An item of ``errors`` from an error of pydantic."""
     where = ".".join(str(part) for part in item["loc"])
     value = None if item["type"] == "missing" else item.get("input")
     return error_item(where, value, item["msg"])

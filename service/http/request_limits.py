@@ -63,7 +63,8 @@ class RequestLimits:
     def _refusal(self, scope: Scope) -> ProblemError | None:
         headers = Headers(scope=scope)
         host = headers.get("host", "")
-        if _host_name(host) not in self.allowed_hosts and not _is_probe(scope):
+        is_probe = scope["path"] in PROBES and scope["method"] in ("GET", "HEAD")
+        if _host_name(host) not in self.allowed_hosts and not is_probe:
             return ProblemError(
                 400,
                 "host",
@@ -81,10 +82,6 @@ class RequestLimits:
         if length.isdecimal() and int(length) > _limit(scope):
             return _too_large(_limit(scope))
         return None
-
-
-def _is_probe(scope: Scope) -> bool:
-    return scope["path"] in PROBES and scope["method"] in ("GET", "HEAD")
 
 
 def _host_name(host: str) -> str:

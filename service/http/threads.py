@@ -32,10 +32,10 @@ def call(name: str, function: Callable[[], Result]) -> Future[Result]:
     return future
 
 
-def done_within(seconds: float, name: str, function: Callable[[], bool]) -> bool:
-    """Whether ``function`` returns True within ``seconds``; a longer call continues in its thread."""
+def done_within(seconds: float, name: str, function: Callable[[], object]) -> bool:
+    """Whether ``function`` returns within ``seconds``, and not False; a longer call continues in its thread."""
     try:
-        return call(name, function).result(seconds)
+        return call(name, function).result(seconds) is not False
     except TimeoutError:
         return False
     except Exception:

@@ -7,8 +7,10 @@ import threading
 from collections.abc import Callable
 from typing import Literal
 
-from wingfit.service.jobs.runner import lower_priority, message
+from wingfit.service.http import threads
+from wingfit.service.jobs.runner import message
 from wingfit.workers import RunningEvaluator
+from wingfit.workers.share import lower_priority
 from wingfit.workers.watch import Standing
 
 LOG = logging.getLogger("wingfit.evaluator")
@@ -68,10 +70,7 @@ class Pool:
             if self._thread.ident:  # the thread closes the evaluator that it is starting
                 self._thread.join(seconds)
             return not self._thread.is_alive()
-        closing = threading.Thread(target=evaluator.close, name="evaluator-close", daemon=True)
-        closing.start()
-        closing.join(seconds)
-        return not closing.is_alive()
+        return threads.done_within(seconds, "evaluator-close", evaluator.close)
 
     def _start(self) -> None:
         # Worker processes inherit the priority of the thread that starts them.

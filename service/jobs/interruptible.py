@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-import queue
 import threading
 from collections.abc import Callable
+from concurrent.futures import wait
+from functools import partial
 
 import numpy.typing as npt
 
 from wingfit.calibration.problem import Evaluation, Problem
+from wingfit.service.http import threads
 from wingfit.service.jobs.job_kind import InterruptedStepError
 from wingfit.workers import RunningEvaluator
 
@@ -26,31 +28,17 @@ class InterruptibleEvaluator:
 
     def evaluate(self, problem: Problem, values: npt.ArrayLike, *, residuals: bool = False) -> Evaluation:
         """Misfits of ``values`` [B, F]; InterruptedStepError once interrupted, whatever the evaluator does."""
-        answers: queue.SimpleQueue[Evaluation | BaseException] = queue.SimpleQueue()
-        # Kept for the abandoned thread: ``interrupted`` may return False again later.
-        left = threading.Event()
-
-        def work() -> None:
-            try:
-                evaluate = self._evaluator.evaluate
-                answers.put(evaluate(problem, values, residuals=residuals, interrupted=left.is_set))
-            except BaseException as error:
-                answers.put(error)
-
         if self._interrupted():
             raise InterruptedStepError
-        threading.Thread(target=work, name=f"{threading.current_thread().name}-batch", daemon=True).start()
-        while True:
-            try:
-                answer = answers.get(timeout=LOOK_SECONDS)
-            except queue.Empty:
-                if self._interrupted():
-                    left.set()
-                    raise InterruptedStepError from None
-                continue
-            if isinstance(answer, BaseException):
-                raise answer
-            return answer
+        # Kept for the abandoned thread: ``interrupted`` may return False again later.
+        left = threading.Event()
+        batch = partial(self._evaluator.evaluate, problem, values, residuals=residuals, interrupted=left.is_set)
+        answer = threads.call(f"{threading.current_thread().name}-batch", batch)
+        while not wait([answer], LOOK_SECONDS).done:
+            if self._interrupted():
+                left.set()
+                raise InterruptedStepError
+        return answer.result()
 
     def close(self) -> None:
         """Do nothing: the caller that made the evaluator closes it."""

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 from sqlalchemy.orm import Session
 
@@ -37,7 +38,7 @@ class Step:
     resumable: bool = True
 
 
-class JobKind(Protocol):
+class JobKind(ABC):
     """A kind of job (run, diagnosis): its resource in the API, its tables, and how one is computed.
 
     Attributes:
@@ -52,24 +53,18 @@ class JobKind(Protocol):
     path: str
     prefix: str
     step_event: str
+    table: type[JobRow]
+    step_table: type[StepOfJob]
+    step_answer: type[GenerationEvent] | type[StepEvent]
 
-    @property
-    def table(self) -> type[JobRow]: ...  # noqa: D102
-
-    @property
-    def step_table(self) -> type[StepOfJob]: ...  # noqa: D102
-
-    @property
-    def step_answer(self) -> type[GenerationEvent] | type[StepEvent]: ...  # noqa: D102
-
+    @abstractmethod
     def view(self, row: Any) -> Run | Diagnosis:
         """The answer that describes a job."""
-        ...
 
+    @abstractmethod
     def begin(self, session: Session, row: Any) -> Points:
         """Prepare ``row`` for a start or restart; (elapsed s, progress) of the steps after which it continues."""
-        ...
 
+    @abstractmethod
     def steps(self, row: Any, evaluator: Evaluator) -> Iterator[Step]:
         """Compute; only the last step has ``last``."""
-        ...

@@ -8,7 +8,6 @@ after any end of the process the database contains what remains to be done.
 from __future__ import annotations
 
 import logging
-import os
 import threading
 import time
 from collections import deque
@@ -29,11 +28,10 @@ from wingfit.service.storage.database import Database, DatabaseClosedError, is_f
 from wingfit.service.storage.tables import JobRow
 from wingfit.workers import RunningEvaluator, jobs
 from wingfit.workers.jobs import Instruction
+from wingfit.workers.share import lower_priority
 
 LOG = logging.getLogger("wingfit.runs")
 LONGEST_ERROR = 1000
-# Calibrations yield to the API when both need a processor.
-NICENESS = 10
 # Pause between attempts to write to a full disk: the first and the longest.
 RETRY_SECONDS = (0.5, 15.0)
 
@@ -352,14 +350,6 @@ def _failure(job: JobRef, error: Exception) -> str:
     if _is_for_user(error):
         return message(error)
     return f"the server made a mistake ({message(error)}); the {job.kind.what}'s data are kept; please report it"
-
-
-def lower_priority() -> None:
-    """Lower the priority of the calling thread and of the processes it starts."""
-    try:
-        os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), NICENESS)
-    except OSError:
-        LOG.debug("cannot lower the priority of a job")
 
 
 def _step(row: JobRow, event: jobs.Event) -> tuple[Instruction, ...]:

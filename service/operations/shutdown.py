@@ -75,17 +75,16 @@ class Deadline:
         threads.done_within(REPORT_SECONDS, "stop-report", self._report)
         leave()
 
-    def _report(self) -> bool:
+    def _report(self) -> None:
         LOG.warning("the stop takes longer than %g s; the following is given up:", self._seconds)
         for line in self._unfinished():
             LOG.warning("given up: %s", line)
         log_threads()
-        return True
 
 
 def leave() -> NoReturn:
     """Exit with status 0 without waiting for any thread; nothing that was acknowledged is lost."""
-    threads.done_within(REPORT_SECONDS, "stop-log", _flush)
+    threads.done_within(REPORT_SECONDS, "stop-log", logging.shutdown)
     os._exit(0)
 
 
@@ -121,11 +120,6 @@ def _stack_lines(frame: FrameType | None) -> Iterator[str]:
         code = frame.f_code
         yield f"{code.co_filename}:{frame.f_lineno} ({code.co_name})"
         frame = frame.f_back
-
-
-def _flush() -> bool:
-    logging.shutdown()
-    return True
 
 
 class Watchdog:

@@ -18,11 +18,8 @@ from wingfit.workers.jobs import State
 # Default source: the first of these that the run has.
 PREFERENCE: tuple[Source, ...] = ("local", "joint", "global", "average", "nominal")
 
-
 # Estimated coefficients by stage.
 Estimates = Mapping[str, Mapping[str, float]]
-# Returns coefficients, and remarks on them.
-Give = Callable[[], tuple[Mapping[str, float], tuple[str, ...]]]
 
 
 @dataclass(frozen=True)
@@ -49,14 +46,28 @@ def offered(
     service: Service, row: RunRow, dataset: Dataset, recording: str, found: Estimates
 ) -> dict[Source, Callable[[], Chosen]]:
     """Functions that return the genome of each source that the run has for a recording, the best source first."""
-    nominal = service.engine.genome(store.spec(row), dataset, {})
-    given = _given(service, row, dataset, recording, found)
+    spec = store.spec(row)
+    nominal = service.engine.genome(spec, dataset, {})
 
-    def make(source: Source) -> Chosen:
-        values, remarks = given[source]()
+    def of(source: Source, values: Mapping[str, float], remarks: tuple[str, ...] = ()) -> Chosen:
         return Chosen(source, nominal | dict(values), remarks)
 
-    return {source: partial(make, source) for source in PREFERENCE if source in given}
+    def by_law() -> Chosen:
+        predicted = service.engine.predict(spec, dataset, law(row, dataset), dataset.recording(recording).condition)
+        return of("global", predicted.values, predicted.remarks)
+
+    given: dict[Source, Callable[[], Chosen]] = {"nominal": partial(of, "nominal", {})}
+    fitted: Source
+    fitted, stage = ("joint", "joint") if spec.mode == "joint" else ("local", recording)
+    if stage in found:
+        given[fitted] = partial(of, fitted, found[stage])
+    if row.result is not None and spec.mode == "local":
+        # In the result, the average of the estimates is ``best``.
+        average = {gene["name"]: gene["best"] for gene in row.result["genes"]}
+        given["average"] = partial(of, "average", average)
+        if row.result["global_model"] is not None:
+            given["global"] = by_law
+    return {source: given[source] for source in PREFERENCE if source in given}
 
 
 def estimates(service: Service, row: RunRow, dataset: Dataset) -> Estimates:
@@ -81,25 +92,3 @@ def law(row: RunRow, dataset: Dataset) -> GlobalModel:
         why = next((remark for remark in row.result["remarks"] if "global model" in remark), None)
         raise conflict(why or "the run has no global model: only mode 'local' gives one, one estimate per recording")
     return force_views.law(stored, dataset)
-
-
-def _given(service: Service, row: RunRow, dataset: Dataset, recording: str, found: Estimates) -> dict[Source, Give]:
-    """Functions that return the coefficients of each available source, with remarks."""
-    spec = store.spec(row)
-
-    def by_law() -> tuple[Mapping[str, float], tuple[str, ...]]:
-        predicted = service.engine.predict(spec, dataset, law(row, dataset), dataset.recording(recording).condition)
-        return predicted.values, predicted.remarks
-
-    given: dict[Source, Give] = {"nominal": lambda: ({}, ())}
-    fitted: Source
-    fitted, stage = ("joint", "joint") if spec.mode == "joint" else ("local", recording)
-    if stage in found:
-        given[fitted] = lambda: (found[stage], ())
-    if row.result is not None and spec.mode == "local":
-        # In the result, the average of the estimates is ``best``.
-        average = {gene["name"]: gene["best"] for gene in row.result["genes"]}
-        given["average"] = lambda: (average, ())
-        if row.result["global_model"] is not None:
-            given["global"] = by_law
-    return given

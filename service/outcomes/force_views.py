@@ -11,7 +11,6 @@ import numpy.typing as npt
 
 from wingfit.calibration.forces.estimation import Prediction
 from wingfit.calibration.forces.result import (
-    Agreement,
     ForceComparison,
     ForceResult,
     GlobalGene,
@@ -56,11 +55,6 @@ def stored(kind: str, result: Json) -> Result | f.ForceResult:
     """The result of a calibration of either kind from its row."""
     whole = {"kind": kind} | result
     return checked(Result, whole) if kind == "tracks" else checked(f.ForceResult, whole)
-
-
-def agreement(found: Agreement, source: str) -> f.Agreement:
-    """How a model agrees with a recording; ``source`` replaces its own."""
-    return answer(f.Agreement, found, source=source)
 
 
 def forces(found: ForceComparison, source: f.SourceOrGiven | None = None) -> f.Forces:

@@ -42,10 +42,8 @@ def outputs(found: Outputs, names: Iterable[OutputName]) -> answers.Outputs:
     """The requested outputs."""
     phase = (found.phase - found.crossing) % 1.0
     order = np.argsort(phase)
-    answer: Any = {
-        "phase": np.round(phase[order], 9).tolist(),
-        "drive_phase": np.round(found.phase[order], 9).tolist(),
-    }
+    phases = {"phase": phase, "drive_phase": found.phase}
+    answer: Any = {name: np.round(values[order], 9).tolist() for name, values in phases.items()}
     if found.solution is not None:
         steps, beats, error = found.solution
         answer["numerics"] = {"steps_per_beat": steps, "beats": beats, "estimated_error_mm": mm(error)}

@@ -12,6 +12,7 @@ from wingfit.service.runs.requests import DATASET_ID, Accuracy, Division, Effect
 
 RECORDING = "vacuum-3hz-0deg"
 OutputName = Literal["motors", "air", "strips", "sections", "connectors", "power", "energy", "averages"]
+_EXAMPLE: dict[str, Any] = {"dataset_id": DATASET_ID, "recording": RECORDING, "outputs": ["motors", "averages"]}
 OUTPUT_NAMES: tuple[OutputName, ...] = get_args(OutputName)
 OutputNames = Annotated[list[OutputName], Field(max_length=len(OUTPUT_NAMES))]
 
@@ -62,35 +63,14 @@ class WingIn(BaseModel):
 class SimulationIn(VehicleModel, WingIn):
     """A simulation of one recording's condition; genes not named keep their nominal value."""
 
-    model_config = ConfigDict(
-        json_schema_extra={
-            "examples": [
-                {
-                    "dataset_id": DATASET_ID,
-                    "recording": RECORDING,
-                    "division": "4",
-                    "genome": {"E_f": 7e6},
-                    "outputs": ["motors", "averages"],
-                }
-            ]
-        }
-    )
+    model_config = ConfigDict(json_schema_extra={"examples": [_EXAMPLE | {"division": "4", "genome": {"E_f": 7e6}}]})
 
 
 class LoadsIn(WingIn):
     """A simulation for its loads alone, under the recording's condition or one that differs from it."""
 
     model_config = ConfigDict(
-        json_schema_extra={
-            "examples": [
-                {
-                    "dataset_id": DATASET_ID,
-                    "recording": RECORDING,
-                    "condition": {"flap_frequency_hz": 5.0, "airspeed_m_s": 4.0},
-                    "outputs": ["motors", "averages"],
-                }
-            ]
-        }
+        json_schema_extra={"examples": [_EXAMPLE | {"condition": {"flap_frequency_hz": 5.0, "airspeed_m_s": 4.0}}]}
     )
 
     condition: ConditionIn = ConditionIn()

@@ -40,9 +40,7 @@ event: state
 data: {"id": "dx_7d20c14be5a9f386", "state": "SUCCEEDED", "verdict": "named"}
 
 """
-_ACTIONS: Actions = {
-    "cancel": (jobs.Cancel(), "Cancel a diagnosis; if it is running, it ends within seconds."),
-}
+_ACTIONS: Actions = {"cancel": (jobs.Cancel(), "Cancel a diagnosis; if it is running, it ends within seconds.")}
 add_job_routes(router, "diagnosis", lambda service: service.diagnosing, Diagnosis, _ACTIONS, "step", _EVENTS)
 
 
@@ -97,8 +95,7 @@ def list_diagnoses(
 )
 def finding(service: ServiceDep, diagnosis_id: str, if_none_match: http.IfNoneMatch = None) -> Response:
     """Return the finding of a diagnosis; see /v1/schemas/finding."""
-    body = json.dumps(_finding(service, diagnosis_id)).encode()
-    return http.marked(body, "application/json", if_none_match)
+    return http.marked(json.dumps(finding_of(service, diagnosis_id)).encode(), http.JSON, if_none_match)
 
 
 @router.get(
@@ -110,7 +107,7 @@ def finding(service: ServiceDep, diagnosis_id: str, if_none_match: http.IfNoneMa
 )
 def report(service: ServiceDep, diagnosis_id: str, if_none_match: http.IfNoneMatch = None) -> Response:
     """Return the report: one HTML file without external resources."""
-    text = service.diagnoser.html(_finding(service, diagnosis_id))
+    text = service.diagnoser.html(finding_of(service, diagnosis_id))
     return http.marked(text.encode(), "text/html", if_none_match, REPORT_HEADERS)
 
 
@@ -146,6 +143,7 @@ def _genome(run: RunRow | None) -> dict[str, float]:
     return run.genome
 
 
-def _finding(service: Service, diagnosis_id: str) -> dict[str, Any]:
+def finding_of(service: Service, diagnosis_id: str) -> dict[str, Any]:
+    """The finding as JSON; a 404, or a 409 before the diagnosis has succeeded."""
     with service.database.read() as session:
         return store.finding(session, diagnosis_id)

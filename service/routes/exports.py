@@ -17,11 +17,13 @@ from wingfit.service.container import DOWNLOAD_SLOT, HeldSlots, Service, Service
 from wingfit.service.diagnoses import exports as diagnosis_exports
 from wingfit.service.http import csv_text
 from wingfit.service.http import responses as http
-from wingfit.service.runs import best_genome, netcdf_variables, run_netcdf
+from wingfit.service.routes.diagnoses import finding_of
+from wingfit.service.runs import best_genome, run_netcdf
 from wingfit.service.runs import exports as run_exports
+from wingfit.service.runs import netcdf_variables as nc
+from wingfit.service.storage.tables import DiagnosisRow, RunRow
 
 router = APIRouter(prefix="/v1", tags=["exports"])
-JSON = "application/json"
 LOOK_SECONDS = 1.0
 FormatQuery = Annotated[Format, Query(description="json: all of it; csv: a table; netcdf: series and maps")]
 
@@ -41,7 +43,7 @@ def _described(example: str) -> dict[str, Any]:
         "headers": saved,
         "content": {
             csv_text.MEDIA_TYPE: {"schema": {"type": "string"}, "example": example},
-            netcdf_variables.MEDIA_TYPE: {"schema": {"type": "string", "format": "binary"}},
+            nc.MEDIA_TYPE: {"schema": {"type": "string", "format": "binary"}},
         },
     }
 
@@ -63,12 +65,12 @@ async def export_run(
     if format != "netcdf":
         await held.enter_async_context(service.downloads.slot())
         return await run_in_threadpool(_run, service, run_id, format)
-    exported = await run_in_threadpool(run_exports.of, service, run_id)
+    exported = await run_in_threadpool(run_exports.of, service, RunRow, run_id)
     genome = await run_in_threadpool(best_genome.standing, service, exported.row)
     async with service.exports.slot():
         body = await _while_awaited(request, lambda gone: run_netcdf.file(service, exported, genome, gone))
         await held.enter_async_context(service.answers.slot())
-    return Response(body, media_type=netcdf_variables.MEDIA_TYPE, headers=http.attachment(f"{run_id}.nc"))
+    return Response(body, media_type=nc.MEDIA_TYPE, headers=http.attachment(f"{run_id}.nc"))
 
 
 async def _while_awaited(request: Request, make: Callable[[Callable[[], bool]], bytes]) -> bytes:
@@ -83,13 +85,13 @@ async def _while_awaited(request: Request, make: Callable[[Callable[[], bool]], 
 
 
 def _run(service: Service, run_id: str, format: Format) -> Response:  # noqa: A002
-    exported = run_exports.of(service, run_id)
+    exported = run_exports.of(service, RunRow, run_id)
     if format == "csv":
         table = run_exports.table(service.database, exported.row)
         headers = http.attachment(f"{run_id}-history.csv")
         return StreamingResponse(table, media_type=csv_text.MEDIA_TYPE, headers=headers)
     document = run_exports.document(service, exported)
-    return StreamingResponse(document, media_type=JSON, headers=http.attachment(f"{run_id}.json"))
+    return StreamingResponse(document, media_type=http.JSON, headers=http.attachment(f"{run_id}.json"))
 
 
 @router.get(
@@ -105,12 +107,12 @@ def export_diagnosis(
     format: FormatQuery = "json",  # noqa: A002
 ) -> Response:
     """Return a diagnosis that has succeeded as a file: all of it, its ranking, or its maps and misfits."""
-    exported = diagnosis_exports.of(service, diagnosis_id)
+    exported, found = run_exports.of(service, DiagnosisRow, diagnosis_id), finding_of(service, diagnosis_id)
     body: str | bytes
     if format == "csv":
-        body, media_type, name = diagnosis_exports.table(exported.finding), csv_text.MEDIA_TYPE, "-ranking.csv"
+        body, media_type, name = diagnosis_exports.table(found), csv_text.MEDIA_TYPE, "-ranking.csv"
     elif format == "netcdf":
-        body, media_type, name = diagnosis_exports.file(exported), netcdf_variables.MEDIA_TYPE, ".nc"
+        body, media_type, name = diagnosis_exports.file(exported, found), nc.MEDIA_TYPE, ".nc"
     else:
-        body, media_type, name = to_json(diagnosis_exports.document(exported)), JSON, ".json"
+        body, media_type, name = to_json(diagnosis_exports.document(exported, found)), http.JSON, ".json"
     return Response(body, media_type=media_type, headers=http.attachment(f"{diagnosis_id}{name}"))

@@ -13,7 +13,7 @@ from wingfit.service.http import responses as http
 from wingfit.service.http.problems import conflict
 from wingfit.service.outcomes import coefficient_source, force_views
 from wingfit.service.outcomes.requests import PredictionIn
-from wingfit.service.routes.outcomes import check_recording, failed, run_row
+from wingfit.service.routes.outcomes import check_recording, run_row, simulating
 from wingfit.service.storage import store
 
 router = APIRouter(prefix="/v1", tags=["forces"])
@@ -47,11 +47,9 @@ def forces(
     dataset, spec = service.datasets.get(row.dataset_id), store.spec(row)
     wanted = dataset.recordings[0].name if recording is None else recording
     check_recording(dataset, wanted, "query.recording")
-    try:
+    with simulating():
         chosen = coefficient_source.chosen(service, row, dataset, wanted, source)
         found = service.engine.forces(spec, dataset, chosen.genome, wanted, chosen.source)
-    except ValueError as error:
-        raise failed(error) from None
     answer = force_views.forces(found)
     answer["remarks"] = [*chosen.remarks, *answer["remarks"]]
     return JSONResponse(answer)
@@ -68,8 +66,6 @@ def predict(service: ServiceDep, run_id: str, body: PredictionIn) -> Response:
     """Return the forces over a beat that the run's global model predicts; nothing is stored."""
     row = run_row(service, run_id)
     law = coefficient_source.law(row, dataset := service.datasets.get(row.dataset_id))
-    try:
+    with simulating():
         found = service.engine.predict(store.spec(row), dataset, law, force_views.condition(body))
-    except ValueError as error:
-        raise failed(error) from None
     return JSONResponse(force_views.prediction(found))

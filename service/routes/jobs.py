@@ -49,7 +49,7 @@ def submit_job(
 
     answer, new = http.created(service.database, again, create)
     if new:
-        service.enqueue(kind, answer.body["id"])
+        service.runner.enqueue(kind, row.id, row.owner)
     return http.sent(answer)
 
 

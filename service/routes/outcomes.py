@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import Annotated, Literal, cast
 
@@ -11,13 +13,14 @@ from starlette.responses import JSONResponse, Response
 
 from wingfit.calibration.search import CalibrationSpec
 from wingfit.client import answers as a
-from wingfit.client.force_answers import ForceResult, ForceSimulation
+from wingfit.client.force_answers import Agreement, ForceResult, ForceSimulation
 from wingfit.client.load_answers import Loads
-from wingfit.records import Dataset, Recording
+from wingfit.records import Dataset
+from wingfit.service.answers import answer
 from wingfit.service.container import DOWNLOAD_SLOT, SIMULATION_SLOT, Service, ServiceDep
 from wingfit.service.http import json_reads
 from wingfit.service.http import responses as http
-from wingfit.service.http.problems import ProblemError, conflict, error_item, invalid
+from wingfit.service.http.problems import conflict, error_item, invalid
 from wingfit.service.outcomes import force_views, load_views
 from wingfit.service.outcomes.requests import LoadsIn, OutputName, SimulationIn, WingIn
 from wingfit.service.routes.jobs import load
@@ -26,7 +29,6 @@ from wingfit.service.runs.request_checks import gene_names
 from wingfit.service.runs.simulation_hints import with_remedy
 from wingfit.service.storage import store
 from wingfit.service.storage.tables import RunRow
-from wingfit.sim.wing.outputs import Outputs
 from wingfit.workers.jobs import State
 
 AnyResult = Annotated[a.Result | ForceResult, Field(discriminator="kind")]
@@ -47,8 +49,9 @@ async def history(
     limit: Annotated[int, Query(ge=1, le=http.LARGEST_HISTORY_PAGE)] = http.HISTORY_PAGE,
 ) -> Response:
     """Return finished generations, ascending; ``next_cursor`` is the next ``after``."""
-    short = limit <= http.HISTORY_PAGE
-    return await json_reads.answer(short, json_reads.history, service.database, run_id, after, limit)
+    return await json_reads.answer(
+        lambda: json_reads.history(service.database, run_id, after, limit), short=limit <= http.HISTORY_PAGE
+    )
 
 
 @router.get(
@@ -83,10 +86,8 @@ def comparison(
 ) -> Response:
     """Return simulated beside recorded markers over one recording."""
     dataset, spec, wanted, values = _chosen(service, run_id, recording, genome)
-    try:
+    with simulating():
         tracks = service.engine.compare(spec, dataset, values, wanted)
-    except ValueError as error:
-        raise failed(error) from None
     return JSONResponse(views.comparison(tracks))
 
 
@@ -108,7 +109,8 @@ def loads(
 ) -> Response:
     """Return motor torques, forces, powers and energies over one beat under a recording's condition."""
     dataset, spec, wanted, values = _chosen(service, run_id, recording, genome)
-    found = _loads(service, spec, dataset, values, dataset.recording(wanted))
+    with simulating():
+        found = service.engine.loads(spec, dataset, values, dataset.recording(wanted))
     return JSONResponse({"recording": wanted, "outputs": load_views.outputs(found, load_views.wanted(outputs or True))})
 
 
@@ -128,11 +130,9 @@ def simulate(service: ServiceDep, body: SimulationIn) -> Response:
     spec_views.refuse_effects(body.effects, dataset, body)
     spec = spec_views.simulation_spec(body)
     values = _genome_of(service, dataset, spec, body)
-    try:
-        simulated = _tracks if dataset.kind == "tracks" else _forces
+    simulated = _tracks if dataset.kind == "tracks" else _forces
+    with simulating():
         return JSONResponse(simulated(service, spec, dataset, values, body))
-    except ValueError as error:
-        raise failed(error) from None
 
 
 @router.post(
@@ -154,22 +154,22 @@ def loads_under(service: ServiceDep, body: LoadsIn) -> Response:
     values = _genome_of(service, dataset, spec, body)
     recorded = dataset.recording(body.recording)
     changed = replace(recorded, condition=load_views.condition(recorded.condition, body.condition))
-    found = _loads(service, spec, dataset, values, changed)
-    return JSONResponse(
-        {"recording": body.recording, "outputs": load_views.outputs(found, load_views.wanted(body.outputs))}
-    )
+    with simulating():
+        found = service.engine.loads(spec, dataset, values, changed)
+    outputs = load_views.outputs(found, load_views.wanted(body.outputs))
+    return JSONResponse({"recording": body.recording, "outputs": outputs})
 
 
 def _tracks(
     service: Service, spec: CalibrationSpec, dataset: Dataset, genome: dict[str, float], body: SimulationIn
 ) -> a.Simulation:
     tracks = service.engine.compare(spec, dataset, genome, body.recording)
-    answer = cast(a.Simulation, {**views.comparison(tracks), "mean_distance_mm": views.mean_distance_mm(tracks)})
+    simulation = cast(a.Simulation, {**views.comparison(tracks), "mean_distance_mm": views.mean_distance_mm(tracks)})
     names = load_views.wanted(body.outputs)
     if names:
-        found = _loads(service, spec, dataset, genome, dataset.recording(body.recording))
-        answer["outputs"] = load_views.outputs(found, names)
-    return answer
+        found = service.engine.loads(spec, dataset, genome, dataset.recording(body.recording))
+        simulation["outputs"] = load_views.outputs(found, names)
+    return simulation
 
 
 def _forces(
@@ -177,7 +177,7 @@ def _forces(
 ) -> ForceSimulation:
     found = service.engine.forces(spec, dataset, genome, body.recording, "nominal")
     agreed = service.engine.agreements(spec, dataset, genome, body.recording)
-    agreements = [force_views.agreement(one, "given") for one in agreed]
+    agreements = [answer(Agreement, one, source="given") for one in agreed]
     return {**force_views.forces(found, "given"), "agreements": agreements}
 
 
@@ -203,21 +203,8 @@ def _chosen(
     dataset, spec = service.datasets.get(row.dataset_id), store.spec(row)
     wanted = dataset.recordings[0].name if recording is None else recording
     check_recording(dataset, wanted, "query.recording")
-    return (
-        dataset,
-        spec,
-        wanted,
-        best_genome.best(row) if genome == "best" else service.engine.genome(spec, dataset, {}),
-    )
-
-
-def _loads(
-    service: Service, spec: CalibrationSpec, dataset: Dataset, genome: dict[str, float], recording: Recording
-) -> Outputs:
-    try:
-        return service.engine.loads(spec, dataset, genome, recording)
-    except ValueError as error:
-        raise failed(error) from None
+    values = best_genome.best(row) if genome == "best" else service.engine.genome(spec, dataset, {})
+    return dataset, spec, wanted, values
 
 
 def run_row(service: Service, run_id: str) -> RunRow:
@@ -239,6 +226,10 @@ def check_recording(dataset: Dataset, name: str, where: str) -> None:
         raise invalid("unknown recording", [error_item(where, name, f"unknown; known are {', '.join(known)}")])
 
 
-def failed(error: ValueError) -> ProblemError:
-    """A 409 for a simulation that failed, with a remedy."""
-    return conflict(f"the simulation failed: {with_remedy(str(error))}")
+@contextmanager
+def simulating() -> Iterator[None]:
+    """A 409 with a remedy for a simulation that fails (ValueError) within the block."""
+    try:
+        yield
+    except ValueError as error:
+        raise conflict(f"the simulation failed: {with_remedy(str(error))}") from None

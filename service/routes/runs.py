@@ -16,7 +16,7 @@ from wingfit.service.http import responses as http
 from wingfit.service.http.problems import error_item, invalid
 from wingfit.service.routes.jobs import Actions, add_job_routes, load, submit_job
 from wingfit.service.runs import spec_views
-from wingfit.service.runs.request_checks import gene_names, unknown_recordings
+from wingfit.service.runs.request_checks import gene_names, refuse_unknown
 from wingfit.service.runs.requests import RunIn
 from wingfit.service.storage import store
 from wingfit.service.storage.tables import RunRow
@@ -59,16 +59,15 @@ def submit(
     idempotency_key: http.RepeatKey = None,
 ) -> Response:
     """Submit a calibration; it is stored before the answer is sent, and computed when its turn comes."""
-    if validate_only:
-        dataset, spec = _planned(service, body)
-        name = body.name or spec_views.run_name(dataset, spec)
-        return JSONResponse(Checked(name=name, spec=spec_views.run_settings(spec)))
 
     def plan() -> RunRow:
         dataset, spec = _planned(service, body)
         name = body.name or spec_views.run_name(dataset, spec)
         return RunRow(dataset_id=body.dataset_id, kind=dataset.kind, name=name, spec=store.spec_json(spec))
 
+    if validate_only:
+        row = plan()
+        return JSONResponse(Checked(name=row.name, spec=spec_views.run_settings(store.spec(row))))
     return submit_job(request, service, service.calibrating, idempotency_key, body, plan)
 
 
@@ -83,29 +82,22 @@ async def list_runs(
     """List runs, newest first."""
     # A filter may pass over many rows before it finds one.
     short = limit <= http.PAGE and dataset_id is None and state is None
-    return await json_reads.answer(short, json_reads.runs, service.database, limit, cursor, dataset_id, state)
+    return await json_reads.answer(
+        lambda: json_reads.runs(service.database, limit, cursor, dataset_id, state), short=short
+    )
 
 
 def _planned(service: Service, body: RunIn) -> tuple[Dataset, CalibrationSpec]:
-    """The dataset and specification of a request, or a 422."""
+    """The dataset of a request, and its specification with every default filled in; or a 422."""
     dataset = load(service, body.dataset_id)
     spec_views.refuse_foreign(body, dataset)
     spec_views.refuse_cutoff(body.low_pass_hz, dataset.recordings)
     spec_views.refuse_effects(body.effects, dataset, body)
-    spec = _checked(service, spec_views.calibration_spec(body), dataset)
-    spec_views.refuse_idle(body, spec.method)
-    return dataset, spec
-
-
-def _checked(service: Service, spec: CalibrationSpec, dataset: Dataset) -> CalibrationSpec:
-    """The specification with every default filled in, or a 422."""
-    known_genes = gene_names(service.engine, spec, dataset)
-    known_recordings = tuple(recording.name for recording in dataset.recordings)
-    genes = [(f"body.genes.{place}", name) for place, name in enumerate(spec.genes)]
-    faults = [*unknown_recordings(spec.recordings, known_recordings), *spec_views.unknown_genes(genes, known_genes)]
-    if faults:
-        raise invalid("the request names what does not exist", faults)
+    spec = spec_views.calibration_spec(body)
+    refuse_unknown(spec, dataset, gene_names(service.engine, spec, dataset))
     try:
-        return service.engine.check(spec, dataset)
+        spec = service.engine.check(spec, dataset)
     except ValueError as error:
         raise invalid("the specification does not fit the dataset", [error_item("body", None, str(error))]) from None
+    spec_views.refuse_idle(body, spec.method)
+    return dataset, spec

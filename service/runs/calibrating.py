@@ -12,7 +12,7 @@ from wingfit.calibration.forces.result import ForceResult
 from wingfit.calibration.search import Generation
 from wingfit.client.answers import GenerationEvent, Run
 from wingfit.service.datasets.parsed_datasets import Datasets
-from wingfit.service.jobs.job_kind import Points, Step
+from wingfit.service.jobs.job_kind import JobKind, Points, Step
 from wingfit.service.outcomes import force_views
 from wingfit.service.runs import views
 from wingfit.service.runs.engine import Engine
@@ -23,7 +23,7 @@ from wingfit.service.units import finite
 from wingfit.workers import jobs
 
 
-class Calibrating:
+class Calibrating(JobKind):
     """How runs are computed."""
 
     what, path, prefix, step_event = "run", "/v1/runs", "run", "generation"

@@ -7,11 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Generic, TypeVar
 
 from pydantic_core import to_json
 
 from wingfit.client.answers import HistoryItem, Run
-from wingfit.client.export_answers import RunExport
+from wingfit.client.export_answers import Export, RunExport
 from wingfit.service.answers import checked
 from wingfit.service.container import Service
 from wingfit.service.http import csv_text
@@ -19,9 +20,10 @@ from wingfit.service.outcomes import force_views
 from wingfit.service.runs import best_genome, views
 from wingfit.service.storage import store
 from wingfit.service.storage.database import Database
-from wingfit.service.storage.tables import DatasetRow, GenerationRow, RunRow
+from wingfit.service.storage.tables import DatasetRow, DiagnosisRow, GenerationRow, RunRow
 from wingfit.service.version import wingfit_version
 
+AnyJob = TypeVar("AnyJob", RunRow, DiagnosisRow)
 BLOCK = 1000
 # Columns of the table, by the fields of a generation; the first two are squares of the unit of the run's kind.
 SQUARES = ("best", "mean")
@@ -30,18 +32,27 @@ MORE_COLUMNS = ("evaluations", "failed", "reasons", "elapsed_seconds")
 
 
 @dataclass(frozen=True)
-class Exported:
-    """A run and its dataset, read ``at`` this time."""
+class Exported(Generic[AnyJob]):
+    """A run or diagnosis and its dataset, read ``at`` this time."""
 
-    row: RunRow
+    row: AnyJob
     dataset: DatasetRow
     at: str
 
+    def heading(self, schema: str) -> Export:
+        """The fields that the exports of runs and of diagnoses share; ``schema`` names the kind of export."""
+        return Export(
+            schema_id=f"urn:wingfit:schema:{schema}:1",
+            wingfit_version=wingfit_version(),
+            exported_at=self.at,
+            dataset=views.dataset(self.dataset),
+        )
 
-def of(service: Service, run_id: str) -> Exported:
-    """The run as it is now, or a 404."""
+
+def of(service: Service, table: type[AnyJob], job_id: str) -> Exported[AnyJob]:
+    """The job of ``table`` as it is now, or a 404."""
     with service.database.read() as session:
-        row = store.one(session, RunRow, run_id)
+        row = store.one(session, table, job_id)
         return Exported(row, store.one(session, DatasetRow, row.dataset_id), store.now())
 
 
@@ -66,10 +77,18 @@ def table(database: Database, row: RunRow) -> Iterator[str]:
         yield csv_text.lines([[_cell(one, name) for name in fields] for one in block])
 
 
-def document(service: Service, exported: Exported) -> Iterator[str]:
+def document(service: Service, exported: Exported[RunRow]) -> Iterator[str]:
     """A RunExport as JSON; the part that needs the dataset is computed at once, the history while it is sent."""
-    empty = to_json(_without_history(service, exported)).decode()
-    return _filled(service.database, exported.row, empty.removesuffix("]}"))
+    row, run = exported.row, views.run(exported.row)
+    without_history = RunExport(
+        **exported.heading("run-export"),
+        run=run,
+        request=request(run),
+        genome=None if row.genome is None else best_genome.standing(service, row),
+        result=None if row.result is None else force_views.stored(row.kind, row.result),
+        history=[],
+    )
+    return _filled(service.database, row, to_json(without_history).decode().removesuffix("]}"))
 
 
 def _filled(database: Database, row: RunRow, head: str) -> Iterator[str]:
@@ -78,21 +97,6 @@ def _filled(database: Database, row: RunRow, head: str) -> Iterator[str]:
         items = ",\n".join(to_json(checked(HistoryItem, views.columns(one))).decode() for one in block)
         yield f",\n{items}" if number else items
     yield "]}\n"
-
-
-def _without_history(service: Service, exported: Exported) -> RunExport:
-    row, run = exported.row, views.run(exported.row)
-    return RunExport(
-        schema_id="urn:wingfit:schema:run-export:1",
-        wingfit_version=wingfit_version(),
-        exported_at=exported.at,
-        run=run,
-        request=request(run),
-        dataset=views.dataset(exported.dataset),
-        genome=None if row.genome is None else best_genome.standing(service, row),
-        result=None if row.result is None else force_views.stored(row.kind, row.result),
-        history=[],
-    )
 
 
 def request(run: Run) -> dict[str, object]:

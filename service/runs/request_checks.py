@@ -6,6 +6,7 @@ from wingfit.calibration.search import CalibrationSpec
 from wingfit.records import Dataset, EstimateError
 from wingfit.service.http.problems import ErrorItem, error_item, invalid
 from wingfit.service.runs.engine import Engine
+from wingfit.service.runs.spec_views import unknown_genes
 
 
 def gene_names(engine: Engine, spec: CalibrationSpec, dataset: Dataset) -> tuple[str, ...]:
@@ -21,7 +22,16 @@ def gene_names(engine: Engine, spec: CalibrationSpec, dataset: Dataset) -> tuple
         raise invalid("there is no such model", [error_item(where, value, str(error))]) from None
 
 
-def unknown_recordings(names: tuple[str, ...], known: tuple[str, ...]) -> list[ErrorItem]:
+def refuse_unknown(spec: CalibrationSpec, dataset: Dataset, known_genes: tuple[str, ...]) -> None:
+    """A 422 for recordings that the dataset does not have, and for genes that the model does not have."""
+    genes = [(f"body.genes.{place}", name) for place, name in enumerate(spec.genes)]
+    genes += [(f"body.fixed.{name}", name) for name in spec.fixed]
+    recordings = tuple(recording.name for recording in dataset.recordings)
+    if faults := [*_unknown_recordings(spec.recordings, recordings), *unknown_genes(genes, known_genes)]:
+        raise invalid("the request names what does not exist", faults)
+
+
+def _unknown_recordings(names: tuple[str, ...], known: tuple[str, ...]) -> list[ErrorItem]:
     """Faults for requested recordings that the dataset does not have; only the first fault lists those that it has."""
     unknown = [(place, name) for place, name in enumerate(names) if name not in known]
     remedies = [f"known are {', '.join(known)}", *["see those named above"] * len(unknown)]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from typing import Annotated, Literal
+from typing import Annotated, Literal, TypeVar
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StrictBool
 from pydantic_core import PydanticCustomError
@@ -12,6 +12,7 @@ Mode = Literal["staged", "joint", "local"]
 Method = Literal["genetic", "cma_es", "gauss_newton"]
 Preset = Literal["proposed", "berman_wang", "dickinson"]
 ForceAxis = Literal["x", "z"]
+AnyName = TypeVar("AnyName", bound=str)
 
 DATASET_ID = "ds_0f3c9a7be1d24568"
 LARGEST_SEED = 2**53 - 1
@@ -50,10 +51,7 @@ def _readable(division: str) -> str:
 Division = Annotated[
     str,
     AfterValidator(_readable),
-    Field(
-        json_schema_extra={"pattern": DIVISION, "maxLength": LONGEST_DIVISION},
-        description=DIVISION_FORMS,
-    ),
+    Field(json_schema_extra={"pattern": DIVISION, "maxLength": LONGEST_DIVISION}, description=DIVISION_FORMS),
 ]
 
 
@@ -83,15 +81,17 @@ Accuracy = Annotated[
 ]
 
 
-def _different(axes: list[ForceAxis]) -> list[ForceAxis]:
-    if len(set(axes)) < len(axes):
-        raise PydanticCustomError("repeated_axis", "must name an axis once")
-    return axes
+def once(names: list[AnyName]) -> list[AnyName]:
+    """``names``, none of which may be there twice."""
+    for name in names:
+        if names.count(name) > 1:
+            raise PydanticCustomError("repeated", "must name each once; {name} is there twice", {"name": name})
+    return names
 
 
 Axes = Annotated[
     list[ForceAxis],
-    AfterValidator(_different),
+    AfterValidator(once),
     Field(
         min_length=1,
         max_length=2,

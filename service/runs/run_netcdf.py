@@ -21,7 +21,8 @@ from wingfit.records.files.folder import RECORDINGS
 from wingfit.service.container import Service
 from wingfit.service.http.problems import ProblemError
 from wingfit.service.outcomes import coefficient_source, force_views
-from wingfit.service.runs import best_genome, netcdf_variables, views
+from wingfit.service.runs import best_genome, views
+from wingfit.service.runs import netcdf_variables as nc
 from wingfit.service.runs.exports import Exported, blocks, request
 from wingfit.service.storage import store
 from wingfit.service.storage.database import Database
@@ -41,7 +42,7 @@ GENE_NUMBERS = (
 )
 
 
-def file(service: Service, exported: Exported, genome: GenomeInfo, gone: Callable[[], bool]) -> bytes:
+def file(service: Service, exported: Exported[RunRow], genome: GenomeInfo, gone: Callable[[], bool]) -> bytes:
     """The file; a 503 before the next recording once the client is ``gone``."""
     dataset = service.datasets.get(exported.row.dataset_id)
 
@@ -52,11 +53,8 @@ def file(service: Service, exported: Exported, genome: GenomeInfo, gone: Callabl
         _recordings(root, service, exported.row, dataset, gone)
 
     row, model = exported.row, "flexible wing" if exported.row.kind == "tracks" else "blade-element model"
-    attributes = netcdf_variables.provenance(row, exported.dataset, model, exported.at) | {
-        "title": f"calibration {row.name}",
-        "request": json.dumps(request(views.run(row))),
-    }
-    return netcdf_variables.made(write, attributes)
+    of_run = {"title": f"calibration {row.name}", "request": json.dumps(request(views.run(row)))}
+    return nc.made(write, nc.provenance(row, exported.dataset, model, exported.at) | of_run)
 
 
 def _history(root: Any, database: Database, row: RunRow) -> None:
@@ -64,49 +62,41 @@ def _history(root: Any, database: Database, row: RunRow) -> None:
     square, misfit = ("m2", ("best_mm", "mm")) if row.kind == "tracks" else ("N2", ("best_mn", "mN"))
     counts = {
         "sequence": "number of the generation over all stages",
-        "generation_in_stage": "number of the generation in its stage",
+        "generation": "number of the generation in its stage",
         "evaluations": "individuals evaluated since the run began",
         "failed": "individuals of the generation that failed",
     }
     reals = {
         "best": (square, "fitness of the best individual"),
         "mean": (square, "mean fitness of the individuals that did not fail"),
-        "diversity": (netcdf_variables.NO_UNIT, "diversity of the generation; of Gauss-Newton its largest step"),
+        "diversity": (nc.NO_UNIT, "diversity of the generation; of Gauss-Newton its largest step"),
         misfit[0]: (misfit[1], "misfit of the best individual"),
         "elapsed_seconds": ("s", "computing time since the run began"),
     }
-    whole = {
-        name: netcdf_variables.numbers(root, name, along, netcdf_variables.NO_UNIT, said, kind="i8")
-        for name, said in counts.items()
-    }
-    real = {name: netcdf_variables.numbers(root, name, along, *said) for name, said in reals.items()}
-    stage = netcdf_variables.texts(root, "stage", "generation", "stage of the search")
-    reasons = netcdf_variables.texts(root, "reasons", "generation", "why individuals failed")
+    # The variable "generation" would be the coordinate of the dimension of that name.
+    names = {"generation": "generation_in_stage"}
+    series = {name: nc.numbers(root, name, along, *said) for name, said in reals.items()}
+    for name, said in counts.items():
+        series[name] = nc.numbers(root, names.get(name, name), along, nc.NO_UNIT, said, kind="i8")
+    stage = nc.texts(root, "stage", "generation", "stage of the search")
+    reasons = nc.texts(root, "reasons", "generation", "why individuals failed")
     filled = 0
     for block in blocks(database, row):
         here = slice(filled, filled := filled + len(block))
-        for name, variable in whole.items():
-            field = "generation" if name == "generation_in_stage" else name
-            variable[here] = np.array([getattr(one, field) for one in block])
-        for name, variable in real.items():
-            variable[here] = netcdf_variables.or_nan(getattr(one, name) for one in block)
-        stage[here] = netcdf_variables.text_array(one.stage for one in block)
-        reasons[here] = netcdf_variables.text_array("; ".join(one.reasons) for one in block)
+        for name, variable in series.items():
+            variable[here] = nc.or_nan(getattr(one, name) for one in block)
+        stage[here] = nc.text_array(one.stage for one in block)
+        reasons[here] = nc.text_array("; ".join(one.reasons) for one in block)
 
 
 def _genes(root: Any, genes: Any) -> None:
-    netcdf_variables.texts(root, "gene", "gene", "gene", (gene["name"] for gene in genes))
-    netcdf_variables.texts(root, "gene_unit", "gene", "unit of the gene's values", (gene["unit"] for gene in genes))
-    netcdf_variables.texts(
-        root, "gene_description", "gene", "what the gene is", (gene["description"] for gene in genes)
-    )
+    for name, meaning in (("", "gene"), ("_unit", "unit of the gene's values"), ("_description", "what the gene is")):
+        nc.texts(root, f"gene{name}", "gene", meaning, (gene[name.removeprefix("_") or "name"] for gene in genes))
     for name, units, said in GENE_NUMBERS:
-        values = netcdf_variables.or_nan(gene.get(name) for gene in genes)
-        netcdf_variables.numbers(root, f"gene_{name}", ("gene",), units, said, values)
-    netcdf_variables.flags(
-        root, "gene_searched", "gene", "whether it was searched", (gene["searched"] for gene in genes)
-    )
-    netcdf_variables.flags(
+        values = nc.or_nan(gene.get(name) for gene in genes)
+        nc.numbers(root, f"gene_{name}", ("gene",), units, said, values)
+    nc.flags(root, "gene_searched", "gene", "whether it was searched", (gene["searched"] for gene in genes))
+    nc.flags(
         root, "gene_identifiable", "gene", "whether the data determine it", (gene["identifiable"] for gene in genes)
     )
 
@@ -119,9 +109,7 @@ def _recordings(root: Any, service: Service, row: RunRow, dataset: Dataset, gone
         group = root.create_group(f"{RECORDINGS}/{recording.name}")
         described: Any = views.recording(recording, recording.name in dataset.held_out)
         held_out = {"held_out": "yes" if described["held_out"] else "no"}
-        netcdf_variables.describe(
-            group, held_out | {"rig": described["rig"]} | {name: described[name] for name in CONDITION}
-        )
+        nc.describe(group, held_out | {"rig": described["rig"]} | {name: described[name] for name in CONDITION})
         if row.kind == "tracks":
             _tracks(group, service, row, dataset, recording)
         else:
@@ -131,12 +119,12 @@ def _recordings(root: Any, service: Service, row: RunRow, dataset: Dataset, gone
 def _tracks(group: Any, service: Service, row: RunRow, dataset: Dataset, recording: Recording) -> None:
     how: Json
     group.dimensions = {"time": len(recording.times), "marker": len(recording.markers), "axis": len(AXES)}
-    netcdf_variables.texts(group, "marker", "marker", "marker", recording.markers)
-    netcdf_variables.texts(group, "axis", "axis", "axis of the wing frame: x aft, y outboard, z up", AXES)
-    netcdf_variables.numbers(group, "time_s", ("time",), "s", "time of the frame", recording.times)
+    nc.texts(group, "marker", "marker", "marker", recording.markers)
+    nc.texts(group, "axis", "axis", "axis of the wing frame: x aft, y outboard, z up", AXES)
+    nc.numbers(group, "time_s", ("time",), "s", "time of the frame", recording.times)
     along, where = ("time", "marker", "axis"), {"coordinates": "time_s phase"}
     recorded = views.track_mm(recording.positions)
-    netcdf_variables.numbers(group, "recorded_mm", along, "mm", "recorded position", recorded, **where)
+    nc.numbers(group, "recorded_mm", along, "mm", "recorded position", recorded, **where)
     phase, simulated = np.full(len(recording.times), np.nan), np.full(recorded.shape, np.nan)
     try:
         found = service.engine.compare(store.spec(row), dataset, best_genome.best(row), recording.name)
@@ -146,10 +134,8 @@ def _tracks(group: Any, service: Service, row: RunRow, dataset: Dataset, recordi
         phase, simulated = views.tidy_phase(found.phase), views.track_mm(found.simulated)
         solved = views.numerics(found)
         how = {name: np.nan if value is None else value for name, value in solved.items()}
-    netcdf_variables.numbers(group, "phase", ("time",), netcdf_variables.NO_UNIT, TRACK_PHASE, phase)
-    netcdf_variables.numbers(
-        group, "simulated_mm", along, "mm", "position simulated with the best genome", simulated, **where, **how
-    )
+    nc.numbers(group, "phase", ("time",), nc.NO_UNIT, TRACK_PHASE, phase)
+    nc.numbers(group, "simulated_mm", along, "mm", "position simulated with the best genome", simulated, **where, **how)
 
 
 def _forces(
@@ -174,7 +160,7 @@ def _forces(
     if beats:
         _beats(group, beats)
     if comments:
-        netcdf_variables.describe(group, {"comment": "\n".join(comments)})
+        nc.describe(group, {"comment": "\n".join(comments)})
 
 
 def _beats(group: Any, beats: dict[str, Forces]) -> None:
@@ -182,19 +168,17 @@ def _beats(group: Any, beats: dict[str, Forces]) -> None:
     first = next(iter(beats.values()))
     quantities, phase = tuple(first["recorded_n"]), first["phase"]
     group.dimensions = {"source": len(beats), "quantity": len(quantities), "phase": len(phase)}
-    netcdf_variables.texts(group, "source", "source", "where the coefficients are from", beats)
-    netcdf_variables.texts(
-        group, "quantity", "quantity", "force of the wings on the body: of the stream, or body axes", quantities
-    )
-    netcdf_variables.numbers(group, "phase", ("phase",), netcdf_variables.NO_UNIT, FORCE_PHASE, phase)
+    nc.texts(group, "source", "source", "where the coefficients are from", beats)
+    nc.texts(group, "quantity", "quantity", "force of the wings on the body: of the stream, or body axes", quantities)
+    nc.numbers(group, "phase", ("phase",), nc.NO_UNIT, FORCE_PHASE, phase)
 
     def series(named: ByQuantity) -> list[list[float]]:
         missing = [np.nan] * len(phase)
         return [named.get(quantity, missing) for quantity in quantities]
 
     along = ("quantity", "phase")
-    netcdf_variables.numbers(group, "recorded_n", along, "N", "recorded force, mean beat", series(first["recorded_n"]))
-    netcdf_variables.numbers(
+    nc.numbers(group, "recorded_n", along, "N", "recorded force, mean beat", series(first["recorded_n"]))
+    nc.numbers(
         group,
         "standard_deviation_n",
         along,
@@ -203,4 +187,4 @@ def _beats(group: Any, beats: dict[str, Forces]) -> None:
         series(first["standard_deviation_n"]),
     )
     modelled = [series(beat["modelled_n"]) for beat in beats.values()]
-    netcdf_variables.numbers(group, "modelled_n", ("source", *along), "N", "modelled force", modelled)
+    nc.numbers(group, "modelled_n", ("source", *along), "N", "modelled force", modelled)

@@ -133,9 +133,7 @@ def tidy_phase(phase: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
 
 def _track(positions: npt.NDArray[np.float64]) -> list[list[list[float | None]]]:
     rounded = track_mm(positions)
-    plain = rounded.astype(object)
-    plain[~np.isfinite(rounded)] = None
-    nested: list[list[list[float | None]]] = plain.tolist()
+    nested: list[list[list[float | None]]] = np.where(np.isfinite(rounded), rounded, None).tolist()  # type: ignore[call-overload]
     return nested
 
 

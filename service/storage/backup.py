@@ -85,25 +85,13 @@ def restore(backup: Path, folder: Path, *, keep_keys: bool = False) -> Contents:
         raise BackupError(str(error)) from None
     except OSError as error:
         raise BackupError(f"cannot use the folder {folder}: {error.strerror}") from None
-    try:
+    with closing(lock):
         present = [path.name for path in folder.glob(f"{FILE_NAME}*")]
         if present:
             raise BackupError(
                 f"{folder} holds {', '.join(sorted(present))} already; move that away, or name another folder"
             )
-        brought = _put(backup, target, keep_keys)
-    finally:
-        lock.release()
-    return brought
-
-
-def _check_opens(folder: Path) -> None:
-    """Migrate the database to the newest schema and read every row; DataFolderError or RowError if that fails."""
-    database = Database(folder)
-    try:
-        check_rows(database)
-    finally:
-        database.close()
+        return _put(backup, target, keep_keys)
 
 
 def _put(backup: Path, target: Path, keep_keys: bool) -> Contents:
@@ -122,7 +110,8 @@ def _put(backup: Path, target: Path, keep_keys: bool) -> Contents:
             with _opened(staged, backup, "rw") as copy, copy:
                 revoke_keys(copy)
         try:
-            _check_opens(staged.parent)
+            with closing(Database(staged.parent)) as database:  # migrates it to the newest schema
+                check_rows(database)
         except (DataFolderError, RowError) as error:
             raise BackupError(f"{backup} is not put back: {error}") from None
         staged.replace(target)

@@ -67,7 +67,8 @@ def _keys(database: sqlite3.Connection) -> Iterator[BackupKey]:
     ).fetchall()
     for *shown, digest, revoked in rows:
         key = _key(shown)
-        if key is None or not _is_digest(digest) or not isinstance(revoked, str | None):
+        valid = isinstance(digest, str) and re.fullmatch(r"[0-9a-f]{64}", digest)
+        if key is None or not valid or not isinstance(revoked, str | None):
             raise ContentsError(f"its key {str(shown[0])[:40]!a} is none that wingfit made")
         if revoked is None:
             yield key
@@ -84,10 +85,6 @@ def _key(values: list[Any]) -> BackupKey | None:
     if not isinstance(scopes, list) or not all(scope in get_args(Scope) for scope in scopes):
         return None
     return BackupKey(key_id, name, owner, tuple(scopes), created_at)
-
-
-def _is_digest(value: object) -> bool:
-    return isinstance(value, str) and re.fullmatch(r"[0-9a-f]{64}", value) is not None
 
 
 def _owners(database: sqlite3.Connection) -> Iterator[BackupOwner]:

@@ -44,18 +44,8 @@ def _check(session: Session, table: Table, number: int, read: Callable[[Any], ob
         ) from None
 
 
-def _run(row: RunRow) -> None:
-    views.run(row)
-    store.job(row)
-
-
-def _diagnosis(row: DiagnosisRow) -> None:
-    diagnosis_views.diagnosis(row)
-    store.job(row)
-
-
 _READERS: dict[Table, Callable[[Any], object]] = {
     DatasetRow: views.dataset,
-    RunRow: _run,
-    DiagnosisRow: _diagnosis,
+    RunRow: lambda row: (views.run(row), store.job(row)),
+    DiagnosisRow: lambda row: (diagnosis_views.diagnosis(row), store.job(row)),
 }

@@ -11,11 +11,10 @@ import fcntl
 import os
 import sqlite3
 import threading
-from collections import deque
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Iterator, Sequence
+from contextlib import closing, contextmanager, suppress
 from pathlib import Path
-from typing import IO, Any, ClassVar
+from typing import IO, Any, ClassVar, cast
 from urllib.parse import quote
 
 from alembic import command
@@ -34,7 +33,8 @@ from wingfit.service.storage.disk_space import FULL
 
 FILE_NAME = "wingfit.sqlite3"
 LOCK_NAME = "wingfit.lock"
-BUSY_TIMEOUT_MS = 10_000
+BUSY_SECONDS = 10.0  # that a statement waits for a lock
+WRITER, READER = ("journal_mode=WAL", "synchronous=FULL", "foreign_keys=ON"), ("query_only=ON",)
 READERS = 16
 
 
@@ -98,7 +98,7 @@ class FolderLock:
         self._file.flush()
         self._held.add(self.path)
 
-    def release(self) -> None:
+    def close(self) -> None:
         """Unlock the folder."""
         self._held.discard(self.path)
         self._file.close()
@@ -124,16 +124,17 @@ class Database:
         path = (folder / FILE_NAME).resolve()
         try:
             _close_to_others(path)
-            self._writer = _writer(path)
+            self._writer = _engine(f"sqlite:///{path}", "BEGIN IMMEDIATE", WRITER, poolclass=StaticPool)
             migrate(self._writer)
         except Exception as error:
-            self._lock.release()
+            self._lock.close()
             if isinstance(error, DataFolderError):
                 raise
             raise DataFolderError(f"cannot open the database {path}: {error}") from error
-        self._readers = _readers(path)
-        self._path = path
-        self._bare: deque[sqlite3.Connection] = deque()
+        url = f"sqlite:///file:{quote(str(path))}?mode=ro&uri=true"
+        self._readers = _engine(url, "BEGIN", READER, poolclass=QueuePool, pool_size=READERS, max_overflow=READERS)
+        # Without a limit, because the event loop must not wait for a connection.
+        self._lookers = _engine(url, "BEGIN", READER, poolclass=QueuePool, pool_size=READERS, max_overflow=-1)
         self.version = 0
         """Changes with every write."""
 
@@ -164,23 +165,13 @@ class Database:
         """One consistent snapshot of all rows through a plain connection: for reads that must be fast."""
         if self._closed:
             raise DatabaseClosedError("the service is stopping")
-        try:
-            connection = self._bare.pop()
-        except IndexError:
-            connection = _bare(self._path)
-        connection.execute("BEGIN")
-        try:
-            yield connection
-        finally:
-            connection.execute("ROLLBACK")
-            self._bare.append(connection)
-            if self._closed:
-                self._close_bare()
-
-    def _close_bare(self) -> None:
-        with suppress(IndexError):
-            while True:
-                self._bare.pop().close()
+        with closing(self._lookers.raw_connection()) as pooled:
+            connection = cast(sqlite3.Connection, pooled.driver_connection)
+            connection.execute("BEGIN")
+            try:
+                yield connection
+            finally:
+                connection.execute("ROLLBACK")
 
     def close(self, seconds: float = -1) -> bool:
         """Refuse further reads and writes, finish the current write, unlock the folder.
@@ -194,9 +185,9 @@ class Database:
             if not self._released:
                 self._released = True
                 self._readers.dispose()
-                self._close_bare()
+                self._lookers.dispose()
                 self._writer.dispose()
-                self._lock.release()
+                self._lock.close()
         finally:
             self._guard.release()
         return True
@@ -242,50 +233,16 @@ def migrate(engine: Engine, revision: str = "head") -> None:
         connection.commit()
 
 
-def _writer(path: Path) -> Engine:
-    engine = create_engine(
-        f"sqlite:///{path}",
-        poolclass=StaticPool,
-        connect_args={"check_same_thread": False, "timeout": BUSY_TIMEOUT_MS / 1000},
-    )
-    event.listen(engine, "connect", _prepare_writer)
-    event.listen(engine, "begin", lambda connection: connection.exec_driver_sql("BEGIN IMMEDIATE"))
+def _engine(url: str, begin: str, pragmas: Sequence[str], **pool: Any) -> Engine:
+    """Connections whose transactions start with the statement ``begin``."""
+    engine = create_engine(url, connect_args={"check_same_thread": False, "timeout": BUSY_SECONDS}, **pool)
+
+    def prepare(connection: sqlite3.Connection, _record: Any) -> None:
+        # The driver must not begin transactions itself: schema changes and reads are part of ours.
+        connection.isolation_level = None
+        for pragma in pragmas:
+            connection.execute(f"PRAGMA {pragma}")
+
+    event.listen(engine, "connect", prepare)
+    event.listen(engine, "begin", lambda connection: connection.exec_driver_sql(begin))
     return engine
-
-
-def _readers(path: Path) -> Engine:
-    engine = create_engine(
-        f"sqlite:///{_read_only(path)}&uri=true",
-        poolclass=QueuePool,
-        pool_size=READERS,
-        max_overflow=READERS,
-        connect_args={"check_same_thread": False, "timeout": BUSY_TIMEOUT_MS / 1000},
-    )
-    event.listen(engine, "connect", _prepare_reader)
-    event.listen(engine, "begin", lambda connection: connection.exec_driver_sql("BEGIN"))
-    return engine
-
-
-def _bare(path: Path) -> sqlite3.Connection:
-    connection = sqlite3.connect(_read_only(path), uri=True, check_same_thread=False)
-    _prepare_reader(connection, None)
-    return connection
-
-
-def _read_only(path: Path) -> str:
-    return f"file:{quote(str(path))}?mode=ro"
-
-
-def _prepare_writer(connection: sqlite3.Connection, _record: Any) -> None:
-    # The driver must not begin transactions itself: schema changes and reads are part of ours.
-    connection.isolation_level = None
-    connection.execute("PRAGMA journal_mode=WAL")
-    connection.execute("PRAGMA synchronous=FULL")
-    connection.execute("PRAGMA foreign_keys=ON")
-    connection.execute(f"PRAGMA busy_timeout={BUSY_TIMEOUT_MS}")
-
-
-def _prepare_reader(connection: sqlite3.Connection, _record: Any) -> None:
-    connection.isolation_level = None
-    connection.execute(f"PRAGMA busy_timeout={BUSY_TIMEOUT_MS}")
-    connection.execute("PRAGMA query_only=ON")

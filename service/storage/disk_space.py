@@ -23,7 +23,8 @@ def while_spooling(error: BaseException | None) -> str | None:
     if error.errno in FULL:
         return f"the folder for temporary files of the server, {_temporary()}, is full ({error.strerror}): {REMEDY}"
     if error.errno in UNUSABLE:
-        return f"the server has no folder for temporary files that it can use ({_in_words(error)}): {REMEDY}"
+        place = f", {os.fsdecode(error.filename)}" if isinstance(error.filename, str | bytes) else ""
+        return f"the server has no folder for temporary files that it can use ({error.strerror}{place}): {REMEDY}"
     return None
 
 
@@ -31,21 +32,12 @@ def anywhere(error: BaseException) -> str | None:
     """Message for an error anywhere in a request; None unless the disk is full."""
     if not isinstance(error, OSError):
         return None
-    if _is_without_folder(error):
+    if isinstance(error, FileNotFoundError) and "temporary directory" in str(error.strerror):
         return while_spooling(error)
     if error.errno not in FULL:
         return None
     place = Path(os.fsdecode(error.filename)).parent if isinstance(error.filename, str | bytes) else _temporary()
     return f"the disk of the server is full ({error.strerror}), at {place}: {REMEDY}"
-
-
-def _is_without_folder(error: OSError) -> bool:
-    return isinstance(error, FileNotFoundError) and "temporary directory" in str(error.strerror)
-
-
-def _in_words(error: OSError) -> str:
-    place = f", {os.fsdecode(error.filename)}" if isinstance(error.filename, str | bytes) else ""
-    return f"{error.strerror}{place}"
 
 
 def _temporary() -> str:

@@ -7,30 +7,18 @@ from __future__ import annotations
 
 import os
 import signal
-import threading
+from itertools import count
 from typing import Literal
 
 Place = Literal["commit", "committed", "answer"]
 VARIABLE = "WINGFIT_FAIL_POINT"
 
 
-class _Armed:
-    def __init__(self, text: str) -> None:
-        self.place, _, count = text.partition(":")
-        self._left, self._lock = int(count), threading.Lock()
-
-    def passing(self) -> None:
-        with self._lock:
-            self._left -= 1
-            due = self._left <= 0
-        if due:
-            os.kill(os.getpid(), signal.SIGKILL)
-
-
-_ARMED = _Armed(os.environ[VARIABLE]) if os.environ.get(VARIABLE) else None
+PLACE, _, COUNT = os.environ.get(VARIABLE, "").partition(":")
+_LEFT = count(int(COUNT or 1) - 1, -1)  # passes that are still survived; next() is atomic
 
 
 def passing(place: Place) -> None:
-    """Kill the process if WINGFIT_FAIL_POINT names this point."""
-    if _ARMED is not None and _ARMED.place == place:
-        _ARMED.passing()
+    """Kill the process if WINGFIT_FAIL_POINT names this point, and this is the pass that it counts."""
+    if place == PLACE and next(_LEFT) <= 0:
+        os.kill(os.getpid(), signal.SIGKILL)

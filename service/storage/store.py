@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import base64
-import binascii
 import json
 import logging
+import re
 import secrets
 import sqlite3
 from collections.abc import Mapping
@@ -29,6 +28,7 @@ from wingfit.service.storage.tables import (
     DiagnosisRow,
     FindingRow,
     JobRow,
+    KeyRow,
     OwnedRow,
     ParsedRow,
     RunRow,
@@ -39,12 +39,13 @@ from wingfit.workers.jobs import Job, State, Wish
 LOG = logging.getLogger("wingfit")
 ANSWERS_KEPT = timedelta(days=7)
 MB = 10**6
+BEFORE = "before-"  # beginning of a cursor
 # Value of fields that the first version did not store.
 _SPEC = TypeAdapter(CalibrationSpec)
 BEFORE_METHODS: dict[str, Any] = {"method": "genetic"}
 ACTIVE = tuple(state.value for state in State if not state.final)
 
-Row = TypeVar("Row", bound=OwnedRow)
+Row = TypeVar("Row", bound=OwnedRow | KeyRow)
 Step = TypeVar("Step", bound=StepOfJob)
 
 
@@ -94,21 +95,15 @@ def page(
 
 def cursor_before(number: int) -> str:
     """The cursor to the rows before ``number``."""
-    return base64.urlsafe_b64encode(f"before:{number}".encode()).decode().rstrip("=")
+    return f"{BEFORE}{number}"
 
 
 def number(cursor: str) -> int:
     """The number that a cursor stands for, or a 422."""
-    try:
-        text = base64.b64decode(cursor + "=" * (-len(cursor) % 4), altchars=b"-_", validate=True).decode("ascii")
-        if text.startswith("before:") and text[7:].isdecimal() and len(text) < 26:
-            return int(text[7:])
-    except (binascii.Error, UnicodeError, ValueError):
-        pass
-    raise invalid(
-        "the cursor is not one of this server",
-        [error_item("query.cursor", cursor, "use next_cursor of the last page")],
-    )
+    if re.fullmatch(rf"{BEFORE}[0-9]{{1,18}}", cursor):
+        return int(cursor.removeprefix(BEFORE))
+    item = error_item("query.cursor", cursor, "use next_cursor of the last page")
+    raise invalid("the cursor is not one of this server", [item])
 
 
 # -- datasets --------------------------------------------------------------------------------------------
@@ -199,28 +194,23 @@ def finding(session: Session, diagnosis_id: str) -> dict[str, Any]:
     row = one(session, DiagnosisRow, diagnosis_id)
     body: dict[str, Any] | None = session.scalar(select(FindingRow.body).where(FindingRow.diagnosis_id == diagnosis_id))
     if body is None:
-        raise conflict(
-            f"diagnosis {diagnosis_id} is {row.state}; it has a finding when it has SUCCEEDED", state=row.state
-        )
+        message = f"diagnosis {diagnosis_id} is {row.state}; it has a finding when it has SUCCEEDED"
+        raise conflict(message, state=row.state)
     return body
 
 
 def admitted(session: Session, dataset_id: str, most: int) -> str | None:
     """The owner of a dataset, who will own a job on it; a 429 if ``most`` jobs of that owner have not ended."""
     owner = one(session, DatasetRow, dataset_id).owner
-    count = sum(_unfinished_of(session, table, owner) for table in (RunRow, DiagnosisRow))
+    unfinished = (
+        select(func.count()).select_from(table).where(table.state.in_(ACTIVE), _of(table, owner))
+        for table in (RunRow, DiagnosisRow)
+    )
+    count = sum(session.scalar(query) or 0 for query in unfinished)
     if count >= most:
-        raise ProblemError(
-            429,
-            "too-many",
-            f"{count} jobs have not ended, and {most} are the most at a time; wait for some, or cancel them",
-        )
+        detail = f"{count} jobs have not ended, and {most} are the most at a time; wait for some, or cancel them"
+        raise ProblemError(429, "too-many", detail)
     return owner
-
-
-def _unfinished_of(session: Session, table: type[JobRow], owner: str | None) -> int:
-    active = select(func.count()).select_from(table).where(table.state.in_(ACTIVE), _of(table, owner))
-    return session.scalar(active) or 0
 
 
 def _of(table: type[OwnedRow], owner: str | None) -> ColumnElement[bool]:
@@ -291,11 +281,7 @@ def spec_json(given: CalibrationSpec | DiagnosisSpec) -> dict[str, Any]:
 
 
 # By the part of a location that names the resource.
-_MADE: dict[str, type[OwnedRow]] = {
-    "datasets": DatasetRow,
-    "runs": RunRow,
-    "diagnoses": DiagnosisRow,
-}
+_MADE: dict[str, type[OwnedRow]] = {"datasets": DatasetRow, "runs": RunRow, "diagnoses": DiagnosisRow}
 
 
 @dataclass(frozen=True)
@@ -338,17 +324,7 @@ def earlier_answer(session: Session, repeat: Repeat | None) -> Answer | None:
 def keep_answer(session: Session, repeat: Repeat | None, answer: Answer) -> None:
     """Store an answer in the transaction that creates its resource."""
     if repeat:
-        session.add(
-            AnswerRow(
-                path=repeat.path,
-                key=repeat.key,
-                fingerprint=repeat.fingerprint,
-                status=answer.status,
-                location=answer.location,
-                body=dict(answer.body),
-                created_at=now(),
-            )
-        )
+        session.add(AnswerRow(**vars(repeat), **vars(answer), created_at=now()))
 
 
 def forget_answers(session: Session) -> None:

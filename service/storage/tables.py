@@ -29,6 +29,7 @@ class OwnedRow:
     """
 
     __tablename__: Any
+    __table_args__: Any = {"sqlite_autoincrement": True}  # noqa: RUF012
     number: Mapped[int] = mapped_column(primary_key=True)
     id: Mapped[str] = mapped_column(unique=True)
     owner: Mapped[str | None] = mapped_column(index=True)
@@ -57,7 +58,6 @@ class DatasetRow(OwnedRow, Table):
     """An uploaded dataset, described; ``kind`` is "tracks" or "forces". Its bytes are in :class:`ArchiveRow`."""
 
     __tablename__ = "dataset"
-    __table_args__ = {"sqlite_autoincrement": True}  # noqa: RUF012
 
     description: Mapped[str]
     filename: Mapped[str]
@@ -122,7 +122,6 @@ class RunRow(JobRow, Table):
     """A calibration run."""
 
     __tablename__ = "run"
-    __table_args__ = {"sqlite_autoincrement": True}  # noqa: RUF012
 
     best_mm: Mapped[float | None]
     best_mn: Mapped[float | None]
@@ -134,7 +133,6 @@ class DiagnosisRow(JobRow, Table):
     """A diagnosis; its ``generations`` are steps. ``run_id`` is the run that it started from, while that exists."""
 
     __tablename__ = "diagnosis"
-    __table_args__ = {"sqlite_autoincrement": True}  # noqa: RUF012
 
     run_id: Mapped[str | None] = mapped_column(ForeignKey("run.id", ondelete="SET NULL"), index=True)
     verdict: Mapped[str | None]

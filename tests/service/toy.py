@@ -13,22 +13,21 @@ import signal
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
-from typing import Any, Literal
+from typing import Any, NoReturn
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.forces.estimation import Prediction
 from wingfit.calibration.forces.result import Agreement, ForceComparison, GlobalModel, Source
-from wingfit.calibration.problem import Evaluation, Problem
 from wingfit.calibration.result import Comparison, GeneResult, RecordingResult, Result
 from wingfit.calibration.search import CalibrationSpec, Generation, resolved
 from wingfit.records import Condition, Dataset, FourierDrive, Hinge, Marker, Materials, Recording, Station, Wing
 from wingfit.service.runs.engine import Engine
 from wingfit.sim.model import Solution
 from wingfit.sim.wing.outputs import ConnectorLoad, Motor, Outputs, Section, Strip
-from wingfit.workers.watch import Standing, never
+from wingfit.workers import EvaluatorKind, RunningEvaluator
+from wingfit.workers.watch import Standing
 
 TARGET = {"stiffness": 3.0, "damping": 0.2}
 NOMINAL = {"stiffness": 1.0, "damping": 0.1}
@@ -38,21 +37,13 @@ UNLUCKY, DEADLY = 13, 666
 STUCK_SEED = 14  # of runs whose check hangs in `stuck_server`
 
 
-class NoEvaluator:
+class NoEvaluator(RunningEvaluator):
     """Evaluates nothing: the toy search does without."""
 
-    kind: Literal["in_process"] = "in_process"
-    workers = 1
-    standing = Standing(1)
+    kind: EvaluatorKind = "in_process"
+    workers, standing = 1, Standing(1)
 
-    def evaluate(
-        self,
-        problem: Problem,
-        values: npt.ArrayLike,
-        *,
-        residuals: bool = False,
-        interrupted: Callable[[], bool] = never,
-    ) -> Evaluation:
+    def _misfits(self, *_: Any) -> NoReturn:
         raise AssertionError("the toy search evaluates nothing")
 
     def close(self) -> None:

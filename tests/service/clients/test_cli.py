@@ -136,7 +136,7 @@ def test_effects_are_listed_described_and_included(wingfit: Wingfit, dataset_id:
 def test_the_error_of_a_gene_that_starts_at_zero_is_in_its_unit(capsys: pytest.CaptureFixture[str]) -> None:
     one: Any = {"name": "drive_harmonics.cos2", "nominal": 0.0, "best": 3.4e-5, "unit": "rad", "lower": -0.1}
     one |= {"upper": 0.1, "searched": True, "standard_error_percent": 0.64, "identifiable": True}
-    results.genes([one | {"standard_error": 3.2e-5}])
+    results.print_genes([one | {"standard_error": 3.2e-5}])
     shown = capsys.readouterr().out
     assert "± 3.2e-05 rad" in shown
     assert "not different from zero" in shown

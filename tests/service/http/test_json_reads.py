@@ -156,7 +156,7 @@ def test_streams_of_one_job_share_a_read_and_get_every_change(tmp_path: Path) ->
 
     def look(_session: Session, after: int, _limit: int) -> JobState:
         looks.append(after)
-        return JobState(job(states[min(database.version - first, 2)]), [])
+        return job(states[min(database.version - first, 2)]), []
 
     async def watch() -> list[bytes]:
         return [part async for part in events._stream(Watched("run_1", "generation", look), 0)]
@@ -187,7 +187,7 @@ def test_a_failed_read_is_repeated(tmp_path: Path) -> None:
         looks.append(after)
         if len(looks) == 1:
             raise OSError("the disk did not answer")
-        return JobState(job("SUCCEEDED"), [])
+        return job("SUCCEEDED"), []
 
     async def watch() -> list[bytes]:
         return [part async for part in events._stream(Watched("run_1", "generation", look), 0)]

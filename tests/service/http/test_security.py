@@ -117,7 +117,7 @@ def test_nothing_that_was_sent_or_stored_is_unpickled_or_executed() -> None:
     )
     calls = {(path, ast.unparse(node.func)) for path, node in parsed() if isinstance(node, ast.Call)}
     assert {(path, call) for path, call in calls if risky.fullmatch(call)} == {
-        ("workers/share.py", "pickle.loads"),  # from the process that owns the worker
+        ("workers/ray_cluster.py", "pickle.loads"),  # from the process that owns the worker
         ("workers/processes.py", "pickle.loads"),  # what it wrote itself
         ("sim/kernels/lanes/vector.py", "exec"),  # a text of its own, when it is imported
     }

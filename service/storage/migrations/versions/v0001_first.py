@@ -25,12 +25,6 @@ def upgrade() -> None:
     )
 
 
-def downgrade() -> None:
-    """Drop everything."""
-    for table in ("answer", "generation", "checkpoint", "run", "archive", "dataset"):
-        op.drop_table(table)
-
-
 def _datasets() -> None:
     op.create_table(
         "dataset",
@@ -60,11 +54,7 @@ def _runs() -> None:
         sa.Column("id", sa.String, nullable=False, unique=True),
         sa.Column("name", sa.String, nullable=False),
         sa.Column(
-            "dataset_id",
-            sa.String,
-            sa.ForeignKey("dataset.id", ondelete="RESTRICT"),
-            nullable=False,
-            index=True,
+            "dataset_id", sa.String, sa.ForeignKey("dataset.id", ondelete="RESTRICT"), nullable=False, index=True
         ),
         sa.Column("spec", sa.JSON, nullable=False),
         sa.Column("state", sa.String, nullable=False, index=True),

@@ -15,9 +15,3 @@ def upgrade() -> None:
         op.add_column(table, sa.Column("kind", sa.String, nullable=False, server_default="tracks"))
     for table in ("run", "generation"):
         op.add_column(table, sa.Column("best_mn", sa.Double))
-
-
-def downgrade() -> None:
-    """Drop the columns."""
-    for table, column in (("dataset", "kind"), ("run", "kind"), ("run", "best_mn"), ("generation", "best_mn")):
-        op.drop_column(table, column)

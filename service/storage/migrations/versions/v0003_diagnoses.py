@@ -50,12 +50,6 @@ def upgrade() -> None:
     )
 
 
-def downgrade() -> None:
-    """Drop the tables."""
-    for table in ("step", "finding", "diagnosis"):
-        op.drop_table(table)
-
-
 def _belonging(table: str, *columns: sa.Column[object]) -> None:
     """Create a table whose rows are deleted with their diagnosis."""
     owner = sa.ForeignKey("diagnosis.id", ondelete="CASCADE")

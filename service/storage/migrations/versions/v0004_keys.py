@@ -28,11 +28,3 @@ def upgrade() -> None:
     for table in OWNED:
         op.add_column(table, sa.Column("owner", sa.String))
         op.create_index(f"ix_{table}_owner", table, ["owner"])
-
-
-def downgrade() -> None:
-    """Drop them."""
-    for table in OWNED:
-        op.drop_index(f"ix_{table}_owner", table)
-        op.drop_column(table, "owner")
-    op.drop_table("key")

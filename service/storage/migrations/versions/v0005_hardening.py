@@ -27,12 +27,3 @@ def upgrade() -> None:
         sa.Column("service_seconds", sa.Double, nullable=False),
         sa.Column("wall_time", sa.String, nullable=False),
     )
-
-
-def downgrade() -> None:
-    """Drop them."""
-    op.drop_table("clock")
-    op.drop_table("parsed")
-    for table in JOBS:
-        op.drop_column(table, "ended_at_service_seconds")
-        op.drop_column(table, "starts")
