@@ -196,9 +196,5 @@ def measure(rig: Wing | Vehicle, of: Measure | None) -> float:
         return 1.0
     if of == "mass":
         return rig.wing_mass if isinstance(rig, Vehicle) else wing_mass(rig)
-    if isinstance(rig, Vehicle):
-        places, chords, span = [s.r for s in rig.stations], [s.chord for s in rig.stations], rig.span
-    else:
-        places, chords = [s.y for s in rig.stations], [s.chord for s in rig.stations]
-        span = places[-1] - places[0]
-    return span if of == "span" else float(np.trapezoid(chords, places)) / span
+    places = [s.r for s in rig.stations] if isinstance(rig, Vehicle) else [s.y for s in rig.stations]
+    return rig.span if of == "span" else float(np.trapezoid([s.chord for s in rig.stations], places)) / rig.span

@@ -11,7 +11,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wingfit.records import Condition
 from wingfit.records.array_types import Array, Index
 from wingfit.sim.effects.ports.wing import WingScene
 from wingfit.sim.kernels import LANES
@@ -42,7 +41,7 @@ def from_motion(scene: WingScene, motion: State, crossing: float = 0.0) -> Outpu
         _connector(parts, c, groups, sums)
     _air_and_energies(parts, groups, sums)
     _added_mass_loads(parts, scene, motion, sums)
-    incidence = _incidence(scene.condition)
+    incidence = scene.condition.angle_of_attack if scene.condition.airspeed > 0 else 0.0  # of the stream
     return Outputs(
         phase=np.arange(n) / n, crossing=crossing,
         motors=(_motor(parts, motion, sums, 0), _motor(parts, motion, sums, 1)),
@@ -261,8 +260,3 @@ def _nearest_rotation(mean: Array) -> Array:
     """Rotations [n, 3, 3] nearest to mean rotation matrices: the orthogonal factor of their polar decomposition."""
     U, _, Vt = np.linalg.svd(mean)
     return np.asarray(U @ Vt)
-
-
-def _incidence(condition: Condition) -> float:
-    """Angle of the stream, rad; 0 without wind."""
-    return condition.angle_of_attack if condition.airspeed > 0 else 0.0
