@@ -12,23 +12,9 @@ from __future__ import annotations
 import numpy as np
 
 from wingfit.records.array_types import Array, Mask
-from wingfit.sim.kernels import LANES
+from wingfit.sim.kernels import LANES, arrays
 from wingfit.sim.kernels.air import strip_flow, strip_forces
-from wingfit.sim.kernels.arrays import (
-    AIR,
-    DAMPERS,
-    FRONT_MOTOR,
-    NOW,
-    SHARE,
-    STAGES,
-    START,
-    Lanes,
-    Setting,
-    State,
-    Trace,
-    Wiring,
-    Work,
-)
+from wingfit.sim.kernels.arrays import STAGES, Lanes, Setting, State, Trace, Wiring, Work
 from wingfit.sim.kernels.bodies import inertial, kinetic_and_height, move, track
 from wingfit.sim.kernels.connectors import connect, relative_pose, tangent, twists
 from wingfit.sim.kernels.jit import allocating, kernel
@@ -172,13 +158,13 @@ def record_step(wiring: Wiring, setting: Setting, lanes: Lanes, work: Work, trac
     Not at the stages, where stiff springs are far from their values at the ends of the step.
     """
     n, power = len(wiring.mass), trace.power[t]
-    store1(power, DAMPERS, -load0(work.lost))
-    store1(power, AIR, load0(work.air_power))
+    store1(power, arrays.DAMPERS, -load0(work.lost))
+    store1(power, arrays.AIR, load0(work.air_power))
     for rod in range(2):
         given = load(work.wrench, n + rod, 0) * load(work.V, n + rod, 0)
         for i in range(1, 6):
             given += load(work.wrench, n + rod, i) * load(work.V, n + rod, i)
-        store1(power, FRONT_MOTOR + rod, -given)
+        store1(power, arrays.FRONT_MOTOR + rod, -given)
     trace.rods[t] = work.wrench[n:]
     trace.air[t] = work.air_force
     track(wiring.markers, wiring.carrier, work.R, work.p, trace.tracks[t])
@@ -285,9 +271,9 @@ def _to_stage(work: Work, state: State, stage: int) -> None:
 @kernel
 def _set_clock(clock: Array, turn: float, t: int, stage: int) -> None:
     """Set the drive phase of a stage of step ``t`` for the laws; a step is ``turn`` (rad)."""
-    clock[NOW] = turn * (t + NODES[stage])
-    clock[START] = turn * t
-    clock[SHARE] = turn * SLOPES[stage]
+    clock[arrays.NOW] = turn * (t + NODES[stage])
+    clock[arrays.START] = turn * t
+    clock[arrays.SHARE] = turn * SLOPES[stage]
 
 
 @allocating

@@ -13,9 +13,7 @@ matrix S of a step, l and A are those of :mod:`wingfit.sim.kernels.tangents`.
 
 from __future__ import annotations
 
-import numpy as np
-import numpy.typing as npt
-
+from wingfit.records.array_types import Array, Index
 from wingfit.sim.kernels.jit import kernel
 from wingfit.sim.kernels.lanes.matrices import (
     add_to_block,
@@ -38,9 +36,6 @@ from wingfit.sim.kernels.lanes.matrices import (
     transposed,
 )
 from wingfit.sim.kernels.tangents import moved, turned_left, turned_right
-
-Array = npt.NDArray[np.float64]
-Index = npt.NDArray[np.int64]
 
 
 @kernel
