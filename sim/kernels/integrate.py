@@ -99,7 +99,7 @@ def forces(wiring: Wiring, setting: Setting, lanes: Lanes, work: Work) -> None:
     work.air_power[:] = 0.0
     work.air_force[:] = 0.0
     if len(lanes.pairs):
-        add_momentum(lanes.pairs, lanes.masses, lanes.weighing, setting.gravity, setting.wind, work.R, work.V, w_)
+        add_momentum(lanes, setting, work.R, work.V, w_)
     if len(laws.connector):
         twists(wiring.first, wiring.second, wiring.a, wiring.b, Q, d, work.V, work.twist)
         work.more[:] = 0.0
@@ -129,10 +129,10 @@ def point_forces(lanes: Lanes, work: Work) -> None:
     work.point_wrench[:] = 0.0
     work.point_k[:] = 0.0
     work.point_d[:] = 0.0
-    follow_points(laws.bodies, laws.arms, work.R, work.p, work.V, work.place, work.turn, work.point_twist)
+    follow_points(laws, work)
     for k in range(len(laws.point)):
         call(laws.point[k, 0], work.point_frames[k].ctypes.data, AFTER)
-    add_point_wrenches(laws.bodies, laws.arms, work.R, work.point_wrench, work.wrench)
+    add_point_wrenches(laws, work)
 
 
 @kernel
@@ -172,10 +172,7 @@ def record_step(wiring: Wiring, setting: Setting, lanes: Lanes, work: Work, trac
     kinetic_and_height(wiring.mass, wiring.inertia, work.p, work.V, setting.gravity, energy[0], energy[2])
     energy[1] = work.stored
     if len(lanes.pairs):
-        add_energies(
-            lanes.pairs, lanes.masses, lanes.weighing, setting.gravity, setting.wind, work.R, work.p, work.V,
-            energy[0], energy[2],
-        )  # fmt: skip
+        add_energies(lanes, setting, work, energy[0], energy[2])
     if len(trace.R):
         trace.R[t] = work.R
         trace.p[t] = work.p
@@ -207,14 +204,9 @@ def linearise(wiring: Wiring, setting: Setting, lanes: Lanes, work: Work) -> Non
         work.Q0, work.d0, work.V, hg, work.blocks,
     )  # fmt: skip
     if len(lanes.pairs):
-        add_mass_blocks(
-            lanes.pairs, lanes.masses, lanes.weighing, setting.gravity, setting.wind, work.R0, work.V0, hg, work.blocks
-        )
+        add_mass_blocks(lanes, setting, work.R, work.V, hg, work.blocks)
     if len(lanes.laws.point):
-        add_point_blocks(
-            lanes.laws.bodies, lanes.laws.arms, work.R0, work.V0, work.point_wrench, work.point_k, work.point_d, hg,
-            work.drag, work.blocks,
-        )  # fmt: skip
+        add_point_blocks(lanes.laws, work, hg)
     factor(wiring.order, wiring.start, wiring.below, wiring.products, wiring.product_start, work.blocks)
 
 
@@ -232,9 +224,7 @@ def solve_stage(wiring: Wiring, setting: Setting, lanes: Lanes, work: Work, rods
         place_rod(rod, load(rods, rod - n, 2), hg, lanes.hinge, work.V0, work.lead, r_xi, known)
     add_own_terms(wiring.mass, wiring.inertia, work.drag0, work.V0, 1.0 / hg, work.lead, r_xi, wrench)
     if len(lanes.pairs):
-        add_mass_terms(
-            lanes.pairs, lanes.masses, lanes.weighing, setting.wind, work.R0, work.V0, 1.0 / hg, work.lead, r_xi, wrench
-        )
+        add_mass_terms(lanes, setting, work.R0, work.V0, 1.0 / hg, work.lead, r_xi, wrench)
     if len(lanes.laws.point):
         add_point_terms(lanes.laws.bodies, work.drag, r_xi, wrench)
     tangent(wiring.first, wiring.second, wiring.a, wiring.b, work.against, work.Q0, work.d0, r_xi, wrench)

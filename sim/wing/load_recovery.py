@@ -136,7 +136,7 @@ def _connector(parts: _Parts, c: int, groups: list[tuple[Index, State]], sums: _
 def _air_and_energies(parts: _Parts, groups: list[tuple[Index, State]], sums: _Sums) -> None:
     """Flow and laws of the air for the whole wing, then the forces one strip at a time; and of laws at points."""
     w, here, group = parts
-    work, n = new_work(*parts), len(w.mass)
+    work, n, solid = new_work(*parts), len(w.mass), group._replace(pairs=group.pairs[: group.weighing])
     kinetic, height = np.zeros(LANES), np.zeros(LANES)
     for rows, state in groups:
         count = len(rows)
@@ -161,10 +161,7 @@ def _air_and_energies(parts: _Parts, groups: list[tuple[Index, State]], sums: _S
         sums.held[rows] = np.moveaxis(work.wrench, -1, 0)[:count, :n]
         sums.held_lost[rows], sums.held_stored[rows] = work.lost[:count], work.stored[:count]
         kinetic_and_height(w.mass, w.inertia, work.p, work.V, here.gravity, kinetic, height)
-        add_energies(
-            group.pairs[: group.weighing], group.masses, group.weighing, here.gravity, here.wind,
-            work.R, work.p, work.V, kinetic, height,
-        )  # fmt: skip
+        add_energies(solid, here, work, kinetic, height)
         sums.kinetic[rows], sums.gravitational[rows] = kinetic[:count], height[:count]
 
 
