@@ -139,7 +139,8 @@ class WingSubject(_Rig):
         wing, planform, found = self.model.wing, Planform(self.model.wing), []
         for name in recording.markers:
             x, y, _ = wing.marker(name).position
-            found += [ChannelLocation(name, axis, _station(wing, y), planform.fraction(x, y), x, y) for axis in "xyz"]
+            place = _station(wing, y), float(planform.fraction(x, y)), x, y
+            found += [ChannelLocation(name, axis, *place) for axis in "xyz"]
         return tuple(found)
 
     def beat_start_phase(self, recording: Recording) -> float:

@@ -3,7 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import zip_longest
 from typing import Literal
+
+import numpy as np
+
+from wingfit.records.array_types import Complex
 
 
 @dataclass(frozen=True)
@@ -14,6 +19,12 @@ class FourierSeries:
     cosine: tuple[float, ...]
     sine: tuple[float, ...]
     kind: Literal["fourier"] = "fourier"
+
+    @property
+    def series(self) -> Complex:
+        """Coefficients c_0, ..., c_K of the same series as Re sum_k c_k exp(i k psi)."""
+        pairs = zip_longest(self.cosine, self.sine, fillvalue=0.0)
+        return np.array([self.mean, *(complex(c, -s) for c, s in pairs)], np.complex128)
 
 
 class FourierDrive(FourierSeries):

@@ -8,14 +8,14 @@ from typing import Annotated, Any, Literal, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from wingfit.records.description.quantity import Text, fault, limits
+from wingfit.records.description.quantity import fault, limits, text
 from wingfit.records.limits import MAX_ESTIMATES, MAX_HARMONICS
 
 METRES = "give metres: 0.22, not 220 or 22"
 
 Name = Annotated[
     str,
-    Text(
+    text(
         "[A-Za-z0-9](?:[A-Za-z0-9._-]*[A-Za-z0-9_-])?",
         100,
         "name",
@@ -23,15 +23,17 @@ Name = Annotated[
     ),
 ]
 GeneName = Annotated[
-    str, Text("[A-Za-z][A-Za-z0-9_]*", 100, "gene name", "a gene name starts with a letter: letters, digits and '_'")
+    str,
+    text("[A-Za-z][A-Za-z0-9_]*", 100, "gene name", "a gene name starts with a letter: letters, digits and '_'"),
 ]
 _UNPRINTABLE = r"\x00-\x1f\x7f-\x9f\ud800-\udfff\ufeff\ufffe\uffff"
 Title = Annotated[
-    str, Text(rf"[^{_UNPRINTABLE}]+", 200, "title", "a title is one line of printable text, not empty", portable=False)
+    str,
+    text(rf"[^{_UNPRINTABLE}]+", 200, "title", "a title is one line of printable text, not empty", portable=False),
 ]
 Prose = Annotated[
     str,
-    Text(
+    text(
         rf"(?:[^{_UNPRINTABLE}]|[\t\n])*",
         20_000,
         "free text",

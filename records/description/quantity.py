@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from collections.abc import Callable
 from decimal import Decimal
 from typing import Any
 
-from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic import GetPydanticSchema
 from pydantic_core import PydanticCustomError, core_schema
 
 from wingfit.records.errors import shown
@@ -21,91 +21,55 @@ def fault(message: str) -> PydanticCustomError:
     return PydanticCustomError(FAULT, "{message}", {"message": message})
 
 
-@dataclass(frozen=True)
-class Limits:
-    """A finite number in [low, high] ``unit``; read as a decimal, so that its conversion to SI rounds once.
+def limits(interval: str, description: str, remedy: str = "") -> GetPydanticSchema:
+    """Metadata of a finite number in an interval such as ``"(0, 0.5] m"``; a round bracket excludes the lower limit.
 
-    ``above`` excludes ``low`` itself; ``remedy`` is advice for the usual mistake.
+    The number is read as a decimal, so that its conversion to SI rounds once. Errors name value, limits and unit, and
+    ``remedy``, advice for the usual mistake.
     """
-
-    low: Decimal
-    high: Decimal
-    unit: str
-    text: str
-    remedy: str = ""
-    above: bool = False
-
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
-        """Check by :meth:`check`."""
-        return core_schema.no_info_plain_validator_function(self.check)
-
-    def __get_pydantic_json_schema__(
-        self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
-    ) -> dict[str, Any]:
-        """Describe a number with its limits."""
-        unit = f", {self.unit}" if self.unit else ""
-        return {
-            "type": "number",
-            "description": self.text + unit,
-            "exclusiveMinimum" if self.above else "minimum": float(self.low),
-            "maximum": float(self.high),
-        }
-
-    def check(self, value: Any) -> Decimal:
-        """``value`` as a decimal; a pydantic error names value, limits, unit and remedy."""
-        number = _decimal(value)
-        too_low = number <= self.low if self.above else number < self.low
-        if too_low or number > self.high:
-            interval = f"{'(' if self.above else '['}{_bound(self.low)}, {_bound(self.high)}]"
-            unit = f" {self.unit}" if self.unit else ""
-            remedy = f"; {self.remedy}" if self.remedy else ""
-            raise fault(f"is {shown(number_text(number))}{unit}; it must lie in {interval}{unit}{remedy}")
-        return number
-
-
-def limits(interval: str, text: str, remedy: str = "") -> Limits:
-    """:class:`Limits` from text such as ``"(0, 0.5] m"``; a round bracket excludes the lower limit itself."""
     match = re.fullmatch(r"([(\[])(.+), (.+)\] ?(.*)", interval)
     if match is None:
         raise ValueError(f"the interval is {interval!r}; write it as '[0, 1] m' or '(0, 1] m'")
     bracket, low, high, unit = match.groups()
-    return Limits(Decimal(low), Decimal(high), unit, text, remedy, above=bracket == "(")
+    least, most, above = Decimal(low), Decimal(high), bracket == "("
+
+    def check(value: Any) -> Decimal:
+        number = _decimal(value)
+        if number < least or (above and number == least) or number > most:
+            of_unit, advice = f" {unit}" if unit else "", f"; {remedy}" if remedy else ""
+            inside = f"{bracket}{float(least):g}, {float(most):g}]{of_unit}"
+            raise fault(f"is {shown(number_text(number))}{of_unit}; it must lie in {inside}{advice}")
+        return number
+
+    lower = {"exclusiveMinimum" if above else "minimum": float(least)}
+    described = f"{description}, {unit}" if unit else description
+    return _checked(check, {"type": "number", "description": described, **lower, "maximum": float(most)})
 
 
-@dataclass(frozen=True)
-class Text:
-    """Text of limited length that matches ``pattern``; ``rule`` describes the pattern in messages.
+def text(pattern: str, length: int, description: str, rule: str, *, portable: bool = True) -> GetPydanticSchema:
+    """Metadata of text of at most ``length`` characters that matches ``pattern``, which ``rule`` describes in errors.
 
     A pattern that is not ``portable`` between dialects of regular expressions is omitted from the JSON Schema.
     """
 
-    pattern: str
-    length: int
-    text: str
-    rule: str
-    portable: bool = True
-
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
-        """Check by :meth:`check`."""
-        return core_schema.no_info_plain_validator_function(self.check)
-
-    def __get_pydantic_json_schema__(
-        self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
-    ) -> dict[str, Any]:
-        """Describe a string with its pattern."""
-        pattern = {"pattern": f"^{self.pattern}$"} if self.portable else {}
-        return {"type": "string", "description": self.text, "maxLength": self.length} | pattern
-
-    def check(self, value: Any) -> str:
-        """``value``, if it is admissible text; else a pydantic error."""
+    def check(value: Any) -> str:
         if not isinstance(value, str):
             quoted = f'; put it in quotes: "{value}"' if isinstance(value, (bool, int, Decimal)) else ""
             raise fault(f"is {kind(value)}; it must be text{quoted}")
-        if len(value) > self.length:
-            raise fault(f"has {len(value)} characters; at most {self.length} are allowed: shorten it")
-        if not re.fullmatch(self.pattern, value):
-            raise fault(f"is {shown(value)!r}; {self.rule}")
+        if len(value) > length:
+            raise fault(f"has {len(value)} characters; at most {length} are allowed: shorten it")
+        if not re.fullmatch(pattern, value):
+            raise fault(f"is {shown(value)!r}; {rule}")
         return value
+
+    schema = {"type": "string", "description": description, "maxLength": length}
+    return _checked(check, schema | ({"pattern": f"^{pattern}$"} if portable else {}))
+
+
+def _checked(check: Callable[[Any], object], schema: dict[str, Any]) -> GetPydanticSchema:
+    """Metadata of a field whose value is that returned by ``check``, with ``schema`` as its JSON Schema."""
+    validator = core_schema.no_info_plain_validator_function(check)
+    return GetPydanticSchema(lambda *_: validator, lambda *_: dict(schema))
 
 
 def kind(value: object) -> str:
@@ -130,7 +94,3 @@ def _decimal(value: Any) -> Decimal:
     if not number.is_finite():
         raise fault(f"is {value}; it must be a finite number")
     return number
-
-
-def _bound(value: Decimal) -> str:
-    return f"{float(value):g}"

@@ -2,31 +2,40 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from itertools import compress
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.records import Gene
+from wingfit.records.array_types import Array, Index
 from wingfit.sim.effects.contract import Effect
 from wingfit.sim.effects.ports.observation import Sampling
 
-Array = npt.NDArray[np.float64]
+
+def by_active(
+    effects: Sequence[Effect], genes: tuple[Gene, ...], genomes: Array
+) -> list[tuple[tuple[Effect, ...], list[int]]]:
+    """Groups of ``genomes`` [B, G] in which the same of ``effects`` are on: these effects, and the genomes' indices."""
+    on = np.array([effect.on(genes, genomes) for effect in effects], bool).reshape(len(effects), len(genomes))
+    groups: dict[bytes, list[int]] = {}
+    for k, active in enumerate(on.T):
+        groups.setdefault(active.tobytes(), []).append(k)
+    return [(tuple(compress(effects, on[:, members[0]])), members) for members in groups.values()]
 
 
-def observed(effects: Iterable[Effect], genes: tuple[Gene, ...], genomes: Array, kind: str) -> list[Effect]:
-    """Effects on observations of ``kind`` ("tracks", "forces") that are on in at least one of ``genomes`` [B, G]."""
-    return [e for e in effects if e.observe and kind in e.observed and not e.off(e.values(genes, genomes)).all()]
+def affected(effects: Iterable[Effect], genes: tuple[Gene, ...], genomes: Array) -> Index:
+    """Indices of those of ``genomes`` [B, G] of which an effect changes the observation."""
+    on = [effect.on(genes, genomes) for effect in effects if effect.observe]
+    return np.flatnonzero(np.any(on, axis=0)) if on else np.empty(0, np.intp)
 
 
 def apply(effects: Iterable[Effect], genes: tuple[Gene, ...], genomes: Array, sampling: Sampling) -> None:
     """Change ``sampling`` by each effect in turn, only for those of ``genomes`` [B, G] in which it is on."""
     for effect in effects:
-        values = effect.values(genes, genomes)
-        on = np.flatnonzero(~effect.off(values))
-        if effect.observe is None or not len(on):
+        if effect.observe is None or not len(on := np.flatnonzero(effect.on(genes, genomes))):
             continue
         times, added = sampling.times[on].copy(), sampling.added[on].copy()
         part = Sampling(sampling.rig, sampling.recording, sampling.beat[on], times, added)
-        effect.observe(part, {name: value[on] for name, value in values.items()})
+        effect.observe(part, effect.values(genes, genomes[on]))
         sampling.beat[on], sampling.times[on], sampling.added[on] = part.beat, part.times, part.added

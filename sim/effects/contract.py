@@ -13,9 +13,10 @@ from functools import partial
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.records import Gene, Vehicle, Wing
+from wingfit.records.array_types import Array as Array
+from wingfit.records.array_types import Mask
 from wingfit.records.genes import Scale
 from wingfit.sim.wing.planform import wing_mass
 
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
     from wingfit.sim.effects.ports.vehicle import VehicleScene
     from wingfit.sim.effects.ports.wing import WingScene
 
-Array = npt.NDArray[np.float64]
 Family = Literal["structure", "inertia", "actuation", "aerodynamics", "measurement"]
 Port = Literal["inertia", "connector", "point", "drive", "air", "observation"]
 Power = Literal["conservative", "dissipative", "any"]
@@ -159,9 +159,10 @@ class Effect:
         column = {gene.name: k for k, gene in enumerate(genes)}
         return {p.name: genomes[:, column[f"{self.name}.{p.name}"]] for p in self.parameters}
 
-    def off(self, values: Values) -> npt.NDArray[np.bool_]:
-        """Whether it is switched off, for each individual [B]."""
-        return np.asarray(np.all([values[p.name] == 0.0 for p in self.size], axis=0))
+    def on(self, genes: tuple[Gene, ...], genomes: Array) -> Mask:
+        """Whether it is switched on, in each of ``genomes`` [B, G]."""
+        values = self.values(genes, genomes)
+        return np.asarray(np.any([values[p.name] != 0.0 for p in self.size], axis=0))
 
     def _gene(self, parameter: Parameter, rig: Wing | Vehicle) -> Gene:
         unit = measure(rig, parameter.of)
@@ -195,9 +196,5 @@ def measure(rig: Wing | Vehicle, of: Measure | None) -> float:
         return 1.0
     if of == "mass":
         return rig.wing_mass if isinstance(rig, Vehicle) else wing_mass(rig)
-    if isinstance(rig, Vehicle):
-        places, chords, span = [s.r for s in rig.stations], [s.chord for s in rig.stations], rig.span
-    else:
-        places, chords = [s.y for s in rig.stations], [s.chord for s in rig.stations]
-        span = places[-1] - places[0]
-    return span if of == "span" else float(np.trapezoid(chords, places)) / span
+    places = [s.r for s in rig.stations] if isinstance(rig, Vehicle) else [s.y for s in rig.stations]
+    return rig.span if of == "span" else float(np.trapezoid([s.chord for s in rig.stations], places)) / rig.span

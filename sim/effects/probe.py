@@ -11,8 +11,8 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from wingfit.records.array_types import Array, ArrayLike
 from wingfit.sim.effects.contract import Effect, Parameter, Values, effect_of_air, effect_of_drive
 from wingfit.sim.effects.ports.wing import WingScene
 from wingfit.sim.kernels.arrays import AREA, NOW, PUSH_L, PUSH_M, PUSH_N, SHARE, START
@@ -21,8 +21,6 @@ from wingfit.sim.kernels.lanes.lanewise import cosine_and_sine
 from wingfit.sim.kernels.lanes.vector import load, load0, load1, store
 from wingfit.sim.kernels.laws import strip_port
 from wingfit.sim.wing.structure import Structure
-
-Array = npt.NDArray[np.float64]
 
 LARGEST = 1000.0  # N/m, bound of a gene: far beyond the strength of a wing
 _FURTHEST = 90.0  # deg, bound of the additional angle of a rod
@@ -68,12 +66,12 @@ class Probe:
         """Number of genes that are forces."""
         return len(self.stations) * (1 + 2 * self.harmonics)
 
-    def terms(self, phase: npt.ArrayLike) -> Array:
+    def terms(self, phase: ArrayLike) -> Array:
         """Constant, cosines and sines [..., 1 + 2 harmonics] at drive ``phase`` [...] in beats."""
         turn = 2 * np.pi * np.asarray(phase, float)[..., None] * np.arange(1, self.harmonics + 1)
         return np.concatenate([np.ones((*turn.shape[:-1], 1)), np.cos(turn), np.sin(turn)], axis=-1)
 
-    def hats(self, span: npt.ArrayLike) -> Array:
+    def hats(self, span: ArrayLike) -> Array:
         """Hat functions [..., stations] at fractions of the ``span`` [...]."""
         y = np.asarray(span, float)
         return np.stack([np.interp(y, self.stations, row) for row in np.eye(len(self.stations))], axis=-1)

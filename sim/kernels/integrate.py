@@ -12,23 +12,9 @@ from __future__ import annotations
 import numpy as np
 
 from wingfit.records.array_types import Array, Mask
-from wingfit.sim.kernels import LANES
+from wingfit.sim.kernels import LANES, arrays
 from wingfit.sim.kernels.air import strip_flow, strip_forces
-from wingfit.sim.kernels.arrays import (
-    AIR,
-    DAMPERS,
-    FRONT_MOTOR,
-    NOW,
-    SHARE,
-    STAGES,
-    START,
-    Lanes,
-    Setting,
-    State,
-    Trace,
-    Wiring,
-    Work,
-)
+from wingfit.sim.kernels.arrays import STAGES, Lanes, Setting, State, Trace, Wiring, Work
 from wingfit.sim.kernels.bodies import inertial, kinetic_and_height, move, track
 from wingfit.sim.kernels.connectors import connect, relative_pose, tangent, twists
 from wingfit.sim.kernels.jit import allocating, kernel
@@ -113,7 +99,7 @@ def forces(wiring: Wiring, setting: Setting, lanes: Lanes, work: Work) -> None:
     work.air_power[:] = 0.0
     work.air_force[:] = 0.0
     if len(lanes.pairs):
-        add_momentum(lanes.pairs, lanes.masses, lanes.weighing, setting.gravity, setting.wind, work.R, work.V, w_)
+        add_momentum(lanes, setting, work.R, work.V, w_)
     if len(laws.connector):
         twists(wiring.first, wiring.second, wiring.a, wiring.b, Q, d, work.V, work.twist)
         work.more[:] = 0.0
@@ -143,10 +129,10 @@ def point_forces(lanes: Lanes, work: Work) -> None:
     work.point_wrench[:] = 0.0
     work.point_k[:] = 0.0
     work.point_d[:] = 0.0
-    follow_points(laws.bodies, laws.arms, work.R, work.p, work.V, work.place, work.turn, work.point_twist)
+    follow_points(laws, work)
     for k in range(len(laws.point)):
         call(laws.point[k, 0], work.point_frames[k].ctypes.data, AFTER)
-    add_point_wrenches(laws.bodies, laws.arms, work.R, work.point_wrench, work.wrench)
+    add_point_wrenches(laws, work)
 
 
 @kernel
@@ -172,13 +158,13 @@ def record_step(wiring: Wiring, setting: Setting, lanes: Lanes, work: Work, trac
     Not at the stages, where stiff springs are far from their values at the ends of the step.
     """
     n, power = len(wiring.mass), trace.power[t]
-    store1(power, DAMPERS, -load0(work.lost))
-    store1(power, AIR, load0(work.air_power))
+    store1(power, arrays.DAMPERS, -load0(work.lost))
+    store1(power, arrays.AIR, load0(work.air_power))
     for rod in range(2):
         given = load(work.wrench, n + rod, 0) * load(work.V, n + rod, 0)
         for i in range(1, 6):
             given += load(work.wrench, n + rod, i) * load(work.V, n + rod, i)
-        store1(power, FRONT_MOTOR + rod, -given)
+        store1(power, arrays.FRONT_MOTOR + rod, -given)
     trace.rods[t] = work.wrench[n:]
     trace.air[t] = work.air_force
     track(wiring.markers, wiring.carrier, work.R, work.p, trace.tracks[t])
@@ -186,10 +172,7 @@ def record_step(wiring: Wiring, setting: Setting, lanes: Lanes, work: Work, trac
     kinetic_and_height(wiring.mass, wiring.inertia, work.p, work.V, setting.gravity, energy[0], energy[2])
     energy[1] = work.stored
     if len(lanes.pairs):
-        add_energies(
-            lanes.pairs, lanes.masses, lanes.weighing, setting.gravity, setting.wind, work.R, work.p, work.V,
-            energy[0], energy[2],
-        )  # fmt: skip
+        add_energies(lanes, setting, work, energy[0], energy[2])
     if len(trace.R):
         trace.R[t] = work.R
         trace.p[t] = work.p
@@ -221,14 +204,9 @@ def linearise(wiring: Wiring, setting: Setting, lanes: Lanes, work: Work) -> Non
         work.Q0, work.d0, work.V, hg, work.blocks,
     )  # fmt: skip
     if len(lanes.pairs):
-        add_mass_blocks(
-            lanes.pairs, lanes.masses, lanes.weighing, setting.gravity, setting.wind, work.R0, work.V0, hg, work.blocks
-        )
+        add_mass_blocks(lanes, setting, work.R, work.V, hg, work.blocks)
     if len(lanes.laws.point):
-        add_point_blocks(
-            lanes.laws.bodies, lanes.laws.arms, work.R0, work.V0, work.point_wrench, work.point_k, work.point_d, hg,
-            work.drag, work.blocks,
-        )  # fmt: skip
+        add_point_blocks(lanes.laws, work, hg)
     factor(wiring.order, wiring.start, wiring.below, wiring.products, wiring.product_start, work.blocks)
 
 
@@ -246,9 +224,7 @@ def solve_stage(wiring: Wiring, setting: Setting, lanes: Lanes, work: Work, rods
         place_rod(rod, load(rods, rod - n, 2), hg, lanes.hinge, work.V0, work.lead, r_xi, known)
     add_own_terms(wiring.mass, wiring.inertia, work.drag0, work.V0, 1.0 / hg, work.lead, r_xi, wrench)
     if len(lanes.pairs):
-        add_mass_terms(
-            lanes.pairs, lanes.masses, lanes.weighing, setting.wind, work.R0, work.V0, 1.0 / hg, work.lead, r_xi, wrench
-        )
+        add_mass_terms(lanes, setting, work.R0, work.V0, 1.0 / hg, work.lead, r_xi, wrench)
     if len(lanes.laws.point):
         add_point_terms(lanes.laws.bodies, work.drag, r_xi, wrench)
     tangent(wiring.first, wiring.second, wiring.a, wiring.b, work.against, work.Q0, work.d0, r_xi, wrench)
@@ -285,9 +261,9 @@ def _to_stage(work: Work, state: State, stage: int) -> None:
 @kernel
 def _set_clock(clock: Array, turn: float, t: int, stage: int) -> None:
     """Set the drive phase of a stage of step ``t`` for the laws; a step is ``turn`` (rad)."""
-    clock[NOW] = turn * (t + NODES[stage])
-    clock[START] = turn * t
-    clock[SHARE] = turn * SLOPES[stage]
+    clock[arrays.NOW] = turn * (t + NODES[stage])
+    clock[arrays.START] = turn * t
+    clock[arrays.SHARE] = turn * SLOPES[stage]
 
 
 @allocating

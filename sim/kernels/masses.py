@@ -16,7 +16,8 @@ Both kinds enter as inertia: as explicit forces, air heavier than the wing would
 
 from __future__ import annotations
 
-from wingfit.records.array_types import Array, Index
+from wingfit.records.array_types import Array
+from wingfit.sim.kernels.arrays import Lanes, Setting, Work
 from wingfit.sim.kernels.jit import inlined, kernel
 from wingfit.sim.kernels.lanes.matrices import (
     Nine,
@@ -68,24 +69,22 @@ def _relative(V: Array, R: Array, n: int, wind: Array, air: bool) -> Three:
 
 
 @kernel
-def add_momentum(
-    pairs: Index, masses: Array, weighing: int, gravity: float, wind: Array, R: Array, V: Array, wrench: Array
-) -> None:
+def add_momentum(lanes: Lanes, setting: Setting, R: Array, V: Array, wrench: Array) -> None:
     """Add the gyroscopic terms of the momenta, and the weight of the first ``weighing`` pairs, to the wrenches."""
-    for k in range(weighing):
-        i, j = pairs[k, 0], pairs[k, 1]
-        M, omega = load_block(masses, k), load_vector(V, i, 0)
+    for k in range(lanes.weighing):
+        i, j = lanes.pairs[k, 0], lanes.pairs[k, 1]
+        M, omega = load_block(lanes.masses, k), load_vector(V, i, 0)
         h, p = times_six(M, load_vector(V, j, 0), load_vector(V, j, 3))
         t, s, f = cross(h, omega), cross(p, load_vector(V, i, 3)), cross(p, omega)
         add_wrench(wrench, i, added(t, s), f)
-        t, f = _weight(M, gravity, R, i)
+        t, f = _weight(M, setting.gravity, R, i)
         add_wrench(wrench, i, t, f)
-    for k in range(weighing, len(pairs)):
-        j, N = pairs[k, 1], _across(masses, k)
-        turn, w = load_vector(V, j, 0), _in_body(R, j, wind)
+    for k in range(lanes.weighing, len(lanes.pairs)):
+        j, N = lanes.pairs[k, 1], _across(lanes.masses, k)
+        turn, w = load_vector(V, j, 0), _in_body(R, j, setting.wind)
         a = turn[1] * w[0] - turn[0] * w[1]  # the wind rotates in the frame of the body
         zero = 0.0 * a
-        add_wrench(wrench, pairs[k, 0], (N[2] * a, N[5] * a, zero), (zero, zero, N[8] * a))
+        add_wrench(wrench, lanes.pairs[k, 0], (N[2] * a, N[5] * a, zero), (zero, zero, N[8] * a))
 
 
 @inlined
@@ -101,29 +100,26 @@ def _weight(M: Six, gravity: float, R: Array, i: int) -> tuple[Three, Three]:
 
 
 @kernel
-def add_mass_blocks(
-    pairs: Index, masses: Array, weighing: int, gravity: float, wind: Array, R: Array, V: Array, length: float,
-    blocks: Array,
-) -> None:  # fmt: skip
+def add_mass_blocks(lanes: Lanes, setting: Setting, R: Array, V: Array, length: float, blocks: Array) -> None:
     """Add the masses' part of S, (M / l - dW/dV) (I - l A) - l dW/dxi (:mod:`wingfit.sim.kernels.tangents`)."""
-    for k in range(weighing):
-        i = pairs[k, 0]
-        M, omega, v = load_block(masses, k), load_vector(V, i, 0), load_vector(V, i, 3)
+    for k in range(lanes.weighing):
+        i = lanes.pairs[k, 0]
+        M, omega, v = load_block(lanes.masses, k), load_vector(V, i, 0), load_vector(V, i, 3)
         h, p = times_six(M, omega, v)
         zero = scaled(0.0, M[0])
         own = (scaled(-1.0, skew(h)), scaled(-1.0, skew(p)), scaled(-1.0, skew(p)), zero)
         A = _by_twist(M, omega, v, 1.0 / length)
         A = (plus(A[0], own[0]), plus(A[1], own[1]), plus(A[2], own[2]), A[3])
         add_to_block(blocks, i, _with_motion(A, omega, v, length))
-        turned = scaled(length * gravity, skew((load(R, i, 6), load(R, i, 7), load(R, i, 8))))
+        turned = scaled(length * setting.gravity, skew((load(R, i, 6), load(R, i, 7), load(R, i, 8))))
         add_to_block(blocks, i, (skew_times(_first_moment(M), turned), zero, product(M[3], turned), zero))
-    for k in range(weighing, len(pairs)):
-        j, M = pairs[k, 1], load_block(masses, k)
-        omega, w = load_vector(V, j, 0), _in_body(R, j, wind)
+    for k in range(lanes.weighing, len(lanes.pairs)):
+        j, M = lanes.pairs[k, 1], load_block(lanes.masses, k)
+        omega, w = load_vector(V, j, 0), _in_body(R, j, setting.wind)
         v, factor = load_vector(V, j, 3), 1.0 / length
         A = (scaled(factor, M[0]), scaled(factor, M[1]), scaled(factor, M[2]), scaled(factor, M[3]))
         joined = _with_motion(A, omega, less(v, w), length)
-        add_to_block(blocks, pairs[k, 2], _with_wind(joined, M, omega, w, length))
+        add_to_block(blocks, lanes.pairs[k, 2], _with_wind(joined, M, omega, w, length))
 
 
 @inlined
@@ -158,13 +154,12 @@ def _with_wind(A: Six, M: Six, omega: Three, w: Three, length: float) -> Six:
 
 @kernel
 def add_mass_terms(
-    pairs: Index, masses: Array, weighing: int, wind: Array, R: Array, V: Array, factor: float, lead: Array, X: Array,
-    wrench: Array,
-) -> None:  # fmt: skip
+    lanes: Lanes, setting: Setting, R: Array, V: Array, factor: float, lead: Array, X: Array, wrench: Array
+) -> None:
     """Add M (lead + ``factor`` X) - dW/dV X to the wrenches, as :func:`sim.kernels.tangents.add_own_terms` does."""
-    for k in range(weighing):
-        i, j = pairs[k, 0], pairs[k, 1]
-        M, omega, v = load_block(masses, k), load_vector(V, i, 0), load_vector(V, i, 3)
+    for k in range(lanes.weighing):
+        i, j = lanes.pairs[k, 0], lanes.pairs[k, 1]
+        M, omega, v = load_block(lanes.masses, k), load_vector(V, i, 0), load_vector(V, i, 3)
         x, y = load_vector(X, j, 0), load_vector(X, j, 3)
         u, w = load_vector(lead, j, 0), load_vector(lead, j, 3)
         a, b = times_six(M, extended(u, factor, x), extended(w, factor, y))
@@ -173,9 +168,9 @@ def add_mass_terms(
         h, p = times_six(M, load_vector(V, j, 0), load_vector(V, j, 3))
         x, y = load_vector(X, i, 0), load_vector(X, i, 3)
         add_wrench(wrench, i, less(less(a, cross(h, x)), cross(p, y)), less(b, cross(p, x)))
-    for k in range(weighing, len(pairs)):
-        i, j = pairs[k, 0], pairs[k, 1]
-        N, w = _across(masses, k), _in_body(R, j, wind)
+    for k in range(lanes.weighing, len(lanes.pairs)):
+        i, j = lanes.pairs[k, 0], lanes.pairs[k, 1]
+        N, w = _across(lanes.masses, k), _in_body(R, j, setting.wind)
         x = (load(X, j, 0), load(X, j, 1), load(X, j, 5))
         u = (load(lead, j, 0), load(lead, j, 1), load(lead, j, 5))
         blown = w[0] * x[1] - w[1] * x[0]  # change of the wind in the rotating frame of the body
@@ -185,19 +180,17 @@ def add_mass_terms(
 
 
 @kernel
-def add_energies(
-    pairs: Index, masses: Array, weighing: int, gravity: float, wind: Array, R: Array, p: Array, V: Array,
-    kinetic: Array, potential: Array,
-) -> None:  # fmt: skip
+def add_energies(lanes: Lanes, setting: Setting, work: Work, kinetic: Array, potential: Array) -> None:
     """Add the kinetic energy of all pairs and the potential energy of those with weight."""
-    for k in range(len(pairs)):
-        i, j, air = pairs[k, 0], pairs[k, 1], k >= weighing
-        M, own = load_block(masses, k), _relative(V, R, i, wind, air)
-        h, q = times_six(M, load_vector(V, j, 0), _relative(V, R, j, wind, air))
+    R, V = work.R, work.V
+    for k in range(len(lanes.pairs)):
+        i, j, air = lanes.pairs[k, 0], lanes.pairs[k, 1], k >= lanes.weighing
+        M, own = load_block(lanes.masses, k), _relative(V, R, i, setting.wind, air)
+        h, q = times_six(M, load_vector(V, j, 0), _relative(V, R, j, setting.wind, air))
         omega = load_vector(V, i, 0)
-        work = h[0] * omega[0] + h[1] * omega[1] + h[2] * omega[2] + q[0] * own[0] + q[1] * own[1] + q[2] * own[2]
-        store0(kinetic, load0(kinetic) + 0.5 * work)
+        twice = h[0] * omega[0] + h[1] * omega[1] + h[2] * omega[2] + q[0] * own[0] + q[1] * own[1] + q[2] * own[2]
+        store0(kinetic, load0(kinetic) + 0.5 * twice)
         if not air:
             s = _first_moment(M)
-            height = load(R, i, 6) * s[0] + load(R, i, 7) * s[1] + load(R, i, 8) * s[2] + M[3][8] * load(p, i, 2)
-            store0(potential, load0(potential) + gravity * height)
+            height = load(R, i, 6) * s[0] + load(R, i, 7) * s[1] + load(R, i, 8) * s[2] + M[3][8] * load(work.p, i, 2)
+            store0(potential, load0(potential) + setting.gravity * height)

@@ -13,9 +13,8 @@ matrix S of a step, l and A are those of :mod:`wingfit.sim.kernels.tangents`.
 
 from __future__ import annotations
 
-import numpy as np
-import numpy.typing as npt
-
+from wingfit.records.array_types import Array, Index
+from wingfit.sim.kernels.arrays import Laws, Work
 from wingfit.sim.kernels.jit import kernel
 from wingfit.sim.kernels.lanes.matrices import (
     add_to_block,
@@ -39,51 +38,43 @@ from wingfit.sim.kernels.lanes.matrices import (
 )
 from wingfit.sim.kernels.tangents import moved, turned_left, turned_right
 
-Array = npt.NDArray[np.float64]
-Index = npt.NDArray[np.int64]
+
+@kernel
+def follow_points(laws: Laws, work: Work) -> None:
+    """Set ``place`` [P, 3, W], ``turn`` [P, 9, W] and ``point_twist`` [P, 6, W]: pose and twist of all points."""
+    for k in range(len(laws.bodies)):
+        i = laws.bodies[k]
+        A, b, omega = load_matrix(work.R, i), load_vector(laws.arms, k, 0), load_vector(work.V, i, 0)
+        store_matrix(work.turn, k, A)
+        store_vector(work.place, k, 0, added(load_vector(work.p, i, 0), times(A, b)))
+        store_vector(work.point_twist, k, 0, times(A, omega))
+        store_vector(work.point_twist, k, 3, times(A, added(load_vector(work.V, i, 3), cross(omega, b))))
 
 
 @kernel
-def follow_points(
-    bodies: Index, arms: Array, R: Array, p: Array, V: Array, place: Array, turn: Array, twist: Array
-) -> None:
-    """Position ``place`` [P, 3, W], rotation ``turn`` [P, 9, W] and ``twist`` [P, 6, W] of all points in the world."""
-    for k in range(len(bodies)):
-        i = bodies[k]
-        A, b, omega, v = load_matrix(R, i), load_vector(arms, k, 0), load_vector(V, i, 0), load_vector(V, i, 3)
-        store_matrix(turn, k, A)
-        store_vector(place, k, 0, added(load_vector(p, i, 0), times(A, b)))
-        store_vector(twist, k, 0, times(A, omega))
-        store_vector(twist, k, 3, times(A, added(v, cross(omega, b))))
+def add_point_wrenches(laws: Laws, work: Work) -> None:
+    """Add the wrenches ``point_wrench`` [P, 6, W] at the points, in the world, to those of the bodies."""
+    for k in range(len(laws.bodies)):
+        back = transposed(load_matrix(work.R, laws.bodies[k]))
+        m, f = times(back, load_vector(work.point_wrench, k, 0)), times(back, load_vector(work.point_wrench, k, 3))
+        add_wrench(work.wrench, laws.bodies[k], added(m, cross(load_vector(laws.arms, k, 0), f)), f)
 
 
 @kernel
-def add_point_wrenches(bodies: Index, arms: Array, R: Array, given: Array, wrench: Array) -> None:
-    """Add the wrenches ``given`` [P, 6, W] at the points, in the world, to those of the bodies."""
-    for k in range(len(bodies)):
-        back = transposed(load_matrix(R, bodies[k]))
-        m, f = times(back, load_vector(given, k, 0)), times(back, load_vector(given, k, 3))
-        add_wrench(wrench, bodies[k], added(m, cross(load_vector(arms, k, 0), f)), f)
-
-
-@kernel
-def add_point_blocks(
-    bodies: Index, arms: Array, R: Array, V: Array, given: Array, stiffness: Array, damping: Array, length: float,
-    drag: Array, blocks: Array,
-) -> None:  # fmt: skip
-    """Add the points' part of S, -dW/dV (I - l A) - l dW/dxi, and keep -dW/dV in ``drag`` [P, 36, W].
+def add_point_blocks(laws: Laws, work: Work, length: float) -> None:
+    """Add the points' part of S, -dW/dV (I - l A) - l dW/dxi, to the blocks; keep -dW/dV in ``drag`` [P, 36, W].
 
     Both terms together are E (D + l K + [[X, 0], [Y, 0]]) E^T with (X, Y) = l (D (-omega~ / 2, b~ omega~ / 2 -
     omega~ b~) - (m~, f~)).
     """
-    for k in range(len(bodies)):
-        i = bodies[k]
-        A, b, omega = load_matrix(R, i), load_vector(arms, k, 0), load_vector(V, i, 0)
-        K = turned_left(1.0, A, turned_right(1.0, load_block(stiffness, k), A))
-        D = turned_left(1.0, A, turned_right(1.0, load_block(damping, k), A))
+    for k in range(len(laws.bodies)):
+        i = laws.bodies[k]
+        A, b, omega = load_matrix(work.R, i), load_vector(laws.arms, k, 0), load_vector(work.V, i, 0)
+        K = turned_left(1.0, A, turned_right(1.0, load_block(work.point_k, k), A))
+        D = turned_left(1.0, A, turned_right(1.0, load_block(work.point_d, k), A))
         back = transposed(A)
-        m, f = times(back, load_vector(given, k, 0)), times(back, load_vector(given, k, 3))
-        set_block(drag, k, moved(b, D, b))
+        m, f = times(back, load_vector(work.point_wrench, k, 0)), times(back, load_vector(work.point_wrench, k, 3))
+        set_block(work.drag, k, moved(b, D, b))
         spin = scaled(-0.5, skew(omega))
         slide = plus(scaled(-1.0, skew_times(b, spin)), scaled(-1.0, skew_times(omega, skew(b))))
         X = plus(plus(product(D[0], spin), product(D[1], slide)), scaled(-1.0, skew(m)))
@@ -94,7 +85,7 @@ def add_point_blocks(
             plus(D[2], scaled(length, plus(K[2], Y))),
             plus(D[3], scaled(length, K[3])),
         )
-        add_to_block(blocks, i, moved(b, Z, b))
+        add_to_block(work.blocks, i, moved(b, Z, b))
 
 
 @kernel

@@ -119,7 +119,10 @@ def _settled(subject: Subject, courses: list[Course], numerics: Numerics, with_m
         suspect = [c for c in under_way if c.done and c.reason is None and c.growth > FLUTTER]
         for group in _groups(suspect):
             measure_growth(subject, group, steps)
-            _refuse_flutter(group)
+            for course in group:
+                if course.growth > FLUTTER:  # an extrapolation may find an unstable motion
+                    growth = f"a disturbance of its periodic motion grows {course.growth:.3g}-fold from beat to beat"
+                    course.reason = f"flutters: {growth}"
     return tuple(_beat(subject.structure, course, with_motion) for course in courses)
 
 
@@ -156,15 +159,6 @@ def _judge(course: Course, numerics: Numerics, steps: int, *, last: bool) -> Non
         error, wanted = course.error * 1e3, f"requested {numerics.accuracy * 1e3:g} mm"
         estimate = f"estimated error {error:.3g} mm" if course.changes else "no coarser motion for comparison"
         course.reason = f"not accurate enough with {steps} steps a beat: {estimate}, {wanted}"
-
-
-def _refuse_flutter(group: list[Course]) -> None:
-    """Fail individuals whose periodic motion is unstable, which an extrapolation may find."""
-    for course in group:
-        if course.growth > FLUTTER:
-            course.reason = (
-                f"flutters: a disturbance of its periodic motion grows {course.growth:.3g}-fold from beat to beat"
-            )
 
 
 def _beat(structure: Structure, course: Course, with_motion: bool) -> Beat:

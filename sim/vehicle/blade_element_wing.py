@@ -7,10 +7,9 @@ depend on the motion alone; so a search over coefficients computes the elements 
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Mapping
+from collections.abc import Mapping, Set
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -19,7 +18,7 @@ from wingfit.records import EstimateError, Gene, Recording, Vehicle
 from wingfit.records.array_types import Array, ArrayLike, Index
 from wingfit.records.blas_threads import one_blas_thread
 from wingfit.sim.effects import registry
-from wingfit.sim.effects.apply import apply, observed
+from wingfit.sim.effects.apply import affected, apply, by_active
 from wingfit.sim.effects.contract import Effect
 from wingfit.sim.effects.ports.observation import Sampling
 from wingfit.sim.effects.ports.vehicle import ROTATION_POINT, Setting, VehicleScene
@@ -28,7 +27,7 @@ from wingfit.sim.model import Observation, genome_batch
 from wingfit.sim.vehicle.elements import CURVE_ROWS, PEELED, ROWS, Constants, synthesise, synthesise_at, wing_forces
 from wingfit.sim.vehicle.motion import motion_genes
 from wingfit.sim.vehicle.rows import mirrored
-from wingfit.sim.vehicle.sampling import passed, passing, phases, series_of, turns
+from wingfit.sim.vehicle.sampling import basis_of, passed, phases, series_of
 from wingfit.sim.vehicle.terms import SEARCHED, TERMS, chosen
 
 ADDED_MASS_POINT = 0.5  # d, chords: point whose acceleration the added mass has (Armanini et al. 2016, below Eq. 19)
@@ -113,7 +112,7 @@ class BladeElementWing:
                     weights, rows, added = self._rows_with_effects(effects, batch[block], recording)
                     out[block] = [_sum(w, row) + more for w, row, more in zip(weights, rows, added, strict=True)]
                 else:
-                    weights = self._weights(self._coefficients(batch[block]), len(block))
+                    weights = self._weights(self._values(batch[block], _COEFFICIENTS), len(block))
                     found = self._cached_rows(batch[block], recording)
                     out[block] = [_sum(w, row) for w, row in zip(weights, found, strict=True)]
         return out.transpose(0, 2, 1)
@@ -127,7 +126,7 @@ class BladeElementWing:
             weights, rows, added = self._rows_with_effects(effects, batch, recording)
             parts["effects"] = added[0].T
         else:
-            weights = self._weights(self._coefficients(batch), len(batch))
+            weights = self._weights(self._values(batch, _COEFFICIENTS), len(batch))
             rows = self._rows(batch, recording)
         for name, weight, row in zip(self._active, weights[0], rows[0], strict=True):
             term = _ROWS[name][0]
@@ -141,15 +140,15 @@ class BladeElementWing:
             raise ValueError(f"recording {recording.name!r} holds tracks; a vehicle is compared with forces")
         batch = genome_batch(self.genes, genomes)
         beat = self.beat(batch, recording)
-        affected, sampling = self._observed(batch, beat, recording)
-        beat[affected] = sampling.beat
-        basis, wanted = self._basis(recording)
+        changed, sampling = self._observed(batch, beat, recording)
+        beat[changed] = sampling.beat
+        basis, wanted = basis_of(recording, self._harmonics)
         axes = ["xz".index(axis) for axis in recording.forces]
         series = series_of(beat[:, :, axes].transpose(0, 2, 1), self._harmonics, recording)[:, :, wanted]
         series = np.ascontiguousarray(series)
         channels = np.empty((len(batch), len(recording.times), len(axes)))
         synthesise(basis, series, channels)
-        for k, times, added in zip(affected, sampling.times, sampling.added, strict=True):
+        for k, times, added in zip(changed, sampling.times, sampling.added, strict=True):
             if not np.array_equal(times, recording.times):
                 synthesise_at(phases(recording, times), series[k], channels[k])
             channels[k] += passed(added, recording)
@@ -158,21 +157,16 @@ class BladeElementWing:
 
     # -- effects -----------------------------------------------------------------------------------------------
 
-    def _by_active_effects(self, batch: Array) -> list[tuple[tuple[Effect, ...], Index]]:
-        """Indices of individuals grouped by the effects on the vehicle that are on."""
-        acting = [effect for effect in self.chosen if effect.vehicle]
-        on = [~effect.off(effect.values(self.genes, batch)) for effect in acting]
-        groups: dict[tuple[Effect, ...], list[int]] = {}
-        for k in range(len(batch)):
-            groups.setdefault(tuple(e for e, each in zip(acting, on, strict=True) if each[k]), []).append(k)
-        return [(effects, np.array(members)) for effects, members in groups.items()]
+    def _by_active_effects(self, batch: Array) -> list[tuple[tuple[Effect, ...], list[int]]]:
+        """Groups of individuals by the effects on the vehicle that are on."""
+        return by_active([effect for effect in self.chosen if effect.vehicle], self.genes, batch)
 
     def _rows_with_effects(
         self, effects: tuple[Effect, ...], batch: Array, recording: Recording
     ) -> tuple[Array, Array, Array]:
         """With ``effects`` on: weights [B, rows] and forces [B, rows, 2, n] of active rows; added forces [B, 2, n]."""
-        moving = {} if recording.motion else self._moving(batch)
-        scene = self._scene(moving | self._coefficients(batch), len(batch), recording)
+        moving = {} if recording.motion else self._values(batch, self._motion_names)
+        scene = self._scene(moving | self._values(batch, _COEFFICIENTS), len(batch), recording)
         for effect in effects:
             if effect.vehicle:
                 effect.vehicle(scene, effect.values(self.genes, batch))
@@ -181,30 +175,23 @@ class BladeElementWing:
 
     def _observed(self, batch: Array, beat: Array, recording: Recording) -> tuple[Index, Sampling]:
         """Individuals for which an effect on the observation is on, and the balance's observation of their ``beat``."""
-        effects = observed(self.chosen, self.genes, batch, "forces")
-        on = [~effect.off(effect.values(self.genes, batch)) for effect in effects]
-        affected = np.flatnonzero(np.any(on, axis=0)) if on else np.empty(0, np.intp)
-        times, added = (np.zeros((len(affected), *shape)) for shape in (recording.times.shape, recording.values.shape))
-        sampling = Sampling(self.vehicle, recording, beat[affected], times + recording.times, added)
-        apply(effects, self.genes, batch[affected], sampling)
-        return affected, sampling
+        changed = affected(self.chosen, self.genes, batch)
+        times, added = (np.zeros((len(changed), *shape)) for shape in (recording.times.shape, recording.values.shape))
+        sampling = Sampling(self.vehicle, recording, beat[changed], times + recording.times, added)
+        apply(self.chosen, self.genes, batch[changed], sampling)
+        return changed, sampling
 
     # -- rows: forces of each term for a coefficient of one ----------------------------------------------------
 
-    def _coefficients(self, batch: Array) -> dict[str, Array]:
-        """Coefficients [B] of the active terms, by name."""
-        return {gene.name: batch[:, k] for k, gene in enumerate(self.genes) if gene.name in _COEFFICIENTS}
+    def _values(self, batch: Array, names: Set[str]) -> dict[str, Array]:
+        """Genes [B] called ``names`` of ``batch`` [B, G], in the order of the model."""
+        return {gene.name: batch[:, k] for k, gene in enumerate(self.genes) if gene.name in names}
 
     def _weights(self, coefficients: Mapping[str, Array], count: int) -> Array:
         """Coefficients [B, rows] of the rows, for ``count`` individuals."""
         zero, one = np.zeros(count), np.ones(count)
-
-        def value(name: str) -> Array:
-            return coefficients.get(name, zero)
-
-        lever = ROTATION_POINT - self.vehicle.pitch_axis
-        scale = {row: value(name) if name else one for row, (_, name) in _ROWS.items()}
-        scale["rotation"] = scale["rotation"] * lever
+        scale = {row: coefficients.get(name, zero) if name else one for row, (_, name) in _ROWS.items()}
+        scale["rotation"] = scale["rotation"] * (ROTATION_POINT - self.vehicle.pitch_axis)
         scale["clap_and_peel"] = -scale["clap_and_peel"]  # theta_fling' = -theta_w'
         return np.stack([scale[row] for row in self._active], axis=1)
 
@@ -217,10 +204,6 @@ class BladeElementWing:
     def _cache(self) -> WeakKeyDictionary[Recording, OrderedDict[bytes, Array]]:
         return WeakKeyDictionary()
 
-    def _moving(self, batch: Array) -> dict[str, Array]:
-        """Genes [B] of the wings' motion, in the order of the model."""
-        return {gene.name: batch[:, k] for k, gene in enumerate(self.genes) if gene.name in self._motion_names}
-
     @cached_property
     def _motion_names(self) -> frozenset[str]:
         return frozenset(gene.name for gene in motion_genes(self.vehicle.motion))
@@ -228,7 +211,7 @@ class BladeElementWing:
     def _cached_rows(self, batch: Array, recording: Recording) -> list[Array]:
         """Forces of each active row [rows, 2, n] of every individual; those of recent motions are cached."""
         cached = self._cache.setdefault(recording, OrderedDict())
-        motions = np.stack(list(self._moving(batch).values()) or [np.zeros(len(batch))], axis=1)
+        motions = np.stack(list(self._values(batch, self._motion_names).values()) or [np.zeros(len(batch))], axis=1)
         keys = [motion.tobytes() for motion in motions]
         new = {key: row for row, key in enumerate(keys) if key not in cached}
         found = dict(zip(new, self._rows(batch[list(new.values())], recording), strict=True)) if new else {}
@@ -240,7 +223,7 @@ class BladeElementWing:
 
     def _rows(self, batch: Array, recording: Recording) -> Array:
         """Forces of each active row [B, rows, 2, n] of all wings, for the motions that ``batch`` [B, G] prescribes."""
-        moving = {} if recording.motion else self._moving(batch)
+        moving = {} if recording.motion else self._values(batch, self._motion_names)
         found = self._wings(self._scene(moving, len(batch) if moving else 1, recording))
         return np.repeat(found, len(batch), axis=0) if len(found) < len(batch) else found
 
@@ -291,18 +274,6 @@ class BladeElementWing:
     @property
     def _harmonics(self) -> int:
         return (self.instants - 1) // 2
-
-    def _basis(self, recording: Recording) -> tuple[Array, Index]:
-        """Cosines and sines [K, T] of the harmonics that the low-pass passes, and their indices in a series."""
-        wanted = passing(recording, self._harmonics)
-        if self._last_basis.get("recording") is not recording:
-            basis = turns(wanted, self._harmonics, recording)
-            self._last_basis.update(recording=recording, basis=basis)
-        return self._last_basis["basis"], wanted
-
-    @cached_property
-    def _last_basis(self) -> dict[str, Any]:
-        return {}  # of the last recording only, since those of long recordings are large
 
 
 # The term to which each row of the elements belongs, and its coefficient, if any.

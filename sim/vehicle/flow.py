@@ -9,15 +9,9 @@ import numpy as np
 
 from wingfit.records.array_types import Array
 from wingfit.sim.kernels import LANES
+from wingfit.sim.vehicle import stations
 from wingfit.sim.vehicle.elements import FORWARD, Side
-from wingfit.sim.vehicle.stations import (
-    Stations,
-    station_circulation,
-    station_forces,
-    station_gust,
-    station_turns,
-    station_velocities,
-)
+from wingfit.sim.vehicle.stations import Stations
 
 
 @dataclass
@@ -75,7 +69,7 @@ class StationedWings:
     def turns(self) -> tuple[Array, Array]:
         """Cosine and sine of the wing's pitch at the stations, [B, n, 8] each."""
         cosine, sine = np.empty((2, *self.turning.shape, LANES))
-        station_turns(self.sides[0][0], cosine, sine)
+        stations.station_turns(self.sides[0][0], cosine, sine)
         return cosine, sine
 
     @cached_property
@@ -88,14 +82,14 @@ class StationedWings:
         flow = Flow(*np.empty((4, len(self.sides), *self.turning.shape, LANES)))
         for k, (rows, side) in enumerate(self.sides):
             rows[:, FORWARD] = forward
-            station_velocities(rows, side, self.places.r, *self.turns, flow.along[k], flow.normal[k])
+            stations.station_velocities(rows, side, self.places.r, *self.turns, flow.along[k], flow.normal[k])
         self._circulate(flow)
         return flow
 
     def gust(self, flow: Flow, air: Array) -> None:
         """Update ``flow`` and its circulation for ``air`` [sides, B, n, 8] that moves along r zeta' (m/s)."""
         for k, moved in enumerate(air):
-            station_gust(*self.turns, moved, flow.along[k], flow.normal[k])
+            stations.station_gust(*self.turns, moved, flow.along[k], flow.normal[k])
         self._circulate(flow)
 
     def forces(self, flow: Flow) -> Array:
@@ -104,7 +98,7 @@ class StationedWings:
         circulation = flow.circulation + self._turned(self.fling)
         for k, (rows, side) in enumerate(self.sides):
             moving = (flow.along[k], flow.normal[k], flow.speed[k], circulation[k])
-            station_forces(rows, side, *self.turns, *moving, self.places, self.density, self.drag, out)
+            stations.station_forces(rows, side, *self.turns, *moving, self.places, self.density, self.drag, out)
         out *= self.alike
         return out
 
@@ -117,5 +111,6 @@ class StationedWings:
         """Set speed and quasi-steady circulation from the velocities."""
         places = self.places
         for k in range(len(self.sides)):
-            velocity, found = (flow.along[k], flow.normal[k]), (flow.speed[k], flow.circulation[k])
-            station_circulation(*velocity, self.turning, self.lift, places.twist, places.chord, self.loading, *found)
+            velocity, wing = (flow.along[k], flow.normal[k]), (places.twist, places.chord, self.loading)
+            found = flow.speed[k], flow.circulation[k]
+            stations.station_circulation(*velocity, self.turning, self.lift, *wing, *found)

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from itertools import zip_longest
 
 import numpy as np
 
@@ -81,7 +80,7 @@ def angles_of(
 def flap_series(flap: Flap, values: Mapping[str, Array], count: int, instants: int) -> Complex:
     """Series [B, K + 1] of the flap angle: Re sum_k series_k exp(2 pi i k t*)."""
     if isinstance(flap, FourierFlap):
-        return np.tile(_series(flap.mean, flap.cosine, flap.sine), (count, 1))
+        return np.tile(flap.series, (count, 1))
     k = np.arange(min(HARMONICS, (instants - 1) // 2) + 1)
     own = (("A", flap.amplitude), ("eta", flap.bias), ("delta", flap.split))
     amplitude, bias, split = (_column(values, name, value) for name, value in own)
@@ -120,7 +119,7 @@ def split_cycle_series(delta: Array, harmonics: int) -> Complex:
 def _pitch(pitch: Pitch, values: Mapping[str, Array], flap: Array, frequency: float, instants: int) -> Array:
     """theta_w at the pitch station and its first two derivatives [B, 3, n] (Eq. 17)."""
     if isinstance(pitch, FourierPitch):
-        series = np.tile(_series(pitch.mean, pitch.cosine, pitch.sine), (len(flap), 1))
+        series = np.tile(pitch.series, (len(flap), 1))
         return _derivatives(series, frequency, instants, 2)
     own = {"C_theta0": pitch.constant, "C_theta1": pitch.flap, "C_theta2": pitch.flap_rate}
     c0, c1, c2, c3 = (_column(values, n, v) for n, v in (*own.items(), ("C_theta3", pitch.flap_rate_squared)))
@@ -154,11 +153,6 @@ def _peel(pitch_rate: Array, t_star: Array, width: float, latest: float) -> Arra
     weight[~fling.any(axis=1) | (t_star[start] >= latest)] = 0.0
     weight[:, 0] *= 0.5  # discontinuous at t* = 0: the mean of both sides
     return np.asarray(weight)
-
-
-def _series(mean: float, cosine: tuple[float, ...], sine: tuple[float, ...]) -> Complex:
-    pairs = zip_longest(cosine, sine, fillvalue=0.0)
-    return np.array([mean, *(complex(c, -s) for c, s in pairs)], np.complex128)
 
 
 def _derivatives(series: Complex, frequency: float, instants: int, orders: int) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -26,26 +27,24 @@ def series_of(forces: Array, harmonics: int, recording: Recording) -> Array:
     return np.concatenate([spectrum.real, -spectrum.imag[..., 1:]], axis=-1)
 
 
-def passing(recording: Recording, harmonics: int) -> Index:
-    """Indices, in the series of :func:`series_of`, of the harmonics up to the last that the low-pass passes."""
-    k = np.arange(harmonics + 1)
-    if recording.low_pass:
-        rate = sampling_rate(recording)
-        passed = gain(recording.low_pass, rate, k * recording.condition.flap_frequency) > _NEGLIGIBLE
-        k = k[: int(np.flatnonzero(passed)[-1]) + 1]
-    return np.concatenate([k, harmonics + k[1:]])
-
-
 def phases(recording: Recording, times: Array) -> Array:
     """Phase (rad) of the beat at ``times`` (s)."""
     return np.asarray(2 * np.pi * recording.condition.flap_frequency * times)
 
 
-def turns(places: Index, harmonics: int, recording: Recording) -> Array:
-    """Cosines, then sines [K, T] at the recording's instants, for the indices ``places`` of a series."""
-    psi = phases(recording, recording.times)
-    cosines, sines = places[places <= harmonics], places[places > harmonics] - harmonics
-    return np.concatenate([np.cos(cosines[:, None] * psi), np.sin(sines[:, None] * psi)])
+@lru_cache(maxsize=1)  # of the last recording only, since those of long recordings are large
+def basis_of(recording: Recording, harmonics: int) -> tuple[Array, Index]:
+    """Cosines, then sines [K, T] at the recording's instants of the harmonics that its low-pass passes.
+
+    Also their indices [K] in the series of :func:`series_of`.
+    """
+    k = np.arange(harmonics + 1)
+    if recording.low_pass:
+        rate = sampling_rate(recording)
+        passed = gain(recording.low_pass, rate, k * recording.condition.flap_frequency) > _NEGLIGIBLE
+        k = k[: int(np.flatnonzero(passed)[-1]) + 1]
+    angles = k[:, None] * phases(recording, recording.times)
+    return np.concatenate([np.cos(angles), np.sin(angles[1:])]), np.concatenate([k, harmonics + k[1:]])
 
 
 def passed(added: Array, recording: Recording) -> Array:

@@ -25,11 +25,11 @@ from wingfit.records import (
     SplitCycleFlap,
     Vehicle,
     WingMotion,
-    save_dataset,
 )
 from wingfit.records.array_types import Array
 from wingfit.records.blas_threads import one_blas_thread
 from wingfit.sim.vehicle.blade_element_wing import BladeElementWing
+from wingfit.sim.virtual_rigs import save_with_truth
 
 AIR = (101_325.0, 293.15)  # Pa, K: assumed for the tunnel
 DRAG = {"C_D0": 0.0, "C_Dpi2": 2.0}
@@ -178,11 +178,9 @@ def campaign(
 
 def write_campaign(path: Path, seed: int = 1, balance: Balance = EXAMPLE) -> Path:
     """Write the small campaign to ``path`` (folder, .zip or .nc); returns the path of the true coefficients."""
-    save_dataset(campaign(seed, balance, held_out=HELD_OUT), path)
-    truth_path = path.with_name(path.stem + ".truth.json")
     truth = {trial.name: DRAG | trial.coefficients for trial in TRIALS}
-    truth_path.write_text(json.dumps({"seed": seed, "coefficients": truth}, indent=2) + "\n", encoding="utf-8")
-    return truth_path
+    dataset = campaign(seed, balance, held_out=HELD_OUT)
+    return save_with_truth(dataset, {"seed": seed, "coefficients": truth}, path)
 
 
 def read_truth(path: Path) -> dict[str, dict[str, float]]:

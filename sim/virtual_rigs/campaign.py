@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -28,12 +28,12 @@ from wingfit.records import (
     Rod,
     Station,
     Wing,
-    save_dataset,
 )
 from wingfit.records.array_types import Array, Mask
 from wingfit.records.blas_threads import one_blas_thread
 from wingfit.records.dataset import Rig
 from wingfit.sim.solver.numerics import Numerics
+from wingfit.sim.virtual_rigs import save_with_truth
 from wingfit.sim.wing.flexible_wing import FlexibleWing
 
 # Settings for the true wing: far more accurate than in a calibration, periodic to 2 micrometres.
@@ -91,8 +91,10 @@ def tunnel(lag: float, frequency: float, airspeed: float) -> Condition:
 VACUUM = tuple(vacuum(p, lag, f) for p in (1000.0, 100.0, 10.0) for lag in _LAGS for f in _FREQUENCIES)
 WIND_TUNNEL = tuple(tunnel(lag, f, v) for lag in _LAGS for f in _FREQUENCIES for v in _SPEEDS)
 
-# The small campaign: (condition, held out). The held-out ones differ in frequency, lag, pressure or speed.
-SMALL: tuple[tuple[Condition, bool], ...] = (
+# Conditions of the campaign of the thesis and of a small one, and whether each is held out.
+FULL = tuple((condition, k % 4 == 3) for k, condition in enumerate((*VACUUM, *WIND_TUNNEL)))
+# Those held out differ from the others in frequency, lag, pressure or speed.
+SMALL = (
     (vacuum(10.0, _LAGS[0], 2.0), False),
     (vacuum(10.0, _LAGS[1], 3.0), False),
     (vacuum(10.0, _LAGS[2], 4.0), False),
@@ -215,14 +217,6 @@ def _gaps(shape: tuple[int, ...], tracking: Tracking, rng: np.random.Generator) 
     return lost
 
 
-def _plan(small: bool) -> Iterator[tuple[Condition, bool]]:
-    if small:
-        yield from SMALL
-        return
-    for k, condition in enumerate((*VACUUM, *WIND_TUNNEL)):
-        yield condition, k % 4 == 3
-
-
 def campaign(
     *,
     division: str = "24",
@@ -234,7 +228,7 @@ def campaign(
     """Record a campaign; returns it with the true genome. ``small``: ten recordings, else all 72 of the thesis."""
     model = FlexibleWing(robird_wing(), division, numerics=REFERENCE)
     truth = true_genome(model, seed)
-    plan, recordings, held_out = list(_plan(small)), [], []
+    plan, recordings, held_out = SMALL if small else FULL, [], []
     for k, (condition, hidden) in enumerate(plan):
         rng = np.random.default_rng([seed, 2, k])
         recordings.append(record(model, truth, condition, tracking or Tracking(), rng))
@@ -256,8 +250,4 @@ def write_campaign(
 ) -> Path:
     """Write a campaign to ``path`` (folder, .zip or .nc); returns the path of the true genome next to it."""
     dataset, truth = campaign(division=division, small=small, seed=seed, progress=progress)
-    save_dataset(dataset, path)
-    truth_path = path.with_name(path.stem + ".truth.json")
-    known = {"division": division, "seed": seed, "genome": truth.as_dict()}
-    truth_path.write_text(json.dumps(known, indent=2) + "\n", encoding="utf-8")
-    return truth_path
+    return save_with_truth(dataset, {"division": division, "seed": seed, "genome": truth.as_dict()}, path)

@@ -26,10 +26,8 @@ class RodDrive:
     @classmethod
     def of(cls, drive: Drive, lag: float, lanes: int) -> RodDrive:
         """The drive of a wing whose rear rod lags by ``lag`` (rad); the same for all ``lanes``."""
-        own = drive if isinstance(drive, FourierDrive) else _four_bar_series(drive)
-        k = max(len(own.cosine), len(own.sine))
-        series = np.array([own.mean, *(_padded(own.cosine, k) - 1j * _padded(own.sine, k))], np.complex128)
-        both = np.stack([series, series * np.exp(-1j * lag * np.arange(k + 1))], axis=1)
+        series = drive.series if isinstance(drive, FourierDrive) else _four_bar_series(drive)
+        both = np.stack([series, series * np.exp(-1j * lag * np.arange(len(series)))], axis=1)
         return cls(np.repeat(both[:, :, None], lanes, axis=2))
 
     def lengthened(self, harmonics: int) -> None:
@@ -97,16 +95,10 @@ def four_bar_angle(linkage: FourBarDrive, psi: ArrayLike) -> Array:
 
 
 @lru_cache(maxsize=64)
-def _four_bar_series(linkage: FourBarDrive) -> FourierDrive:
-    """The rocker angle as a Fourier series, exact to round-off for usual linkages (coefficients decrease fast)."""
+def _four_bar_series(linkage: FourBarDrive) -> Complex:
+    """Coefficients of the rocker angle, exact to round-off for usual linkages, where they decrease fast."""
     psi = 2 * np.pi * np.arange(_SAMPLES) / _SAMPLES
-    angle = four_bar_angle(linkage, psi)
-    coefficients = np.fft.rfft(angle) / _SAMPLES
-    head = coefficients[1 : _HARMONICS + 1]
-    return FourierDrive(float(coefficients[0].real), tuple(2 * head.real), tuple(-2 * head.imag))
-
-
-def _padded(values: tuple[float, ...], length: int) -> Array:
-    out = np.zeros(length)
-    out[: len(values)] = values
-    return out
+    series = np.fft.rfft(four_bar_angle(linkage, psi))[: _HARMONICS + 1] / _SAMPLES
+    series[0] = series[0].real
+    series[1:] *= 2
+    return np.asarray(series)

@@ -14,7 +14,7 @@ import numpy as np
 from wingfit.records import Condition, Gene, Recording, Wing
 from wingfit.records.array_types import Array, ArrayLike, Complex, Index
 from wingfit.records.blas_threads import one_blas_thread
-from wingfit.sim.effects.apply import apply, observed
+from wingfit.sim.effects.apply import affected, apply, by_active
 from wingfit.sim.effects.contract import Effect
 from wingfit.sim.effects.ports.observation import Sampling
 from wingfit.sim.effects.ports.wing import WingScene
@@ -27,7 +27,7 @@ from wingfit.sim.solver.settle import Course, Subject
 from wingfit.sim.solver.simulate import Beat, periodic_beats, settled_course
 from wingfit.sim.wing.alignment import REFERENCE_HARMONICS, recorded_crossing, reference_columns, upstroke_crossing
 from wingfit.sim.wing.division import Division
-from wingfit.sim.wing.genes import FACTOR, lanes, wing_genes
+from wingfit.sim.wing.genes import AERODYNAMIC, FACTOR, STRUCTURAL, lanes, wing_genes
 from wingfit.sim.wing.structure import Structure, build
 
 Key = TypeVar("Key")
@@ -35,6 +35,7 @@ Value = TypeVar("Value")
 
 MAX_SHIFT = 0.05  # rad, about 3 degrees of the beat
 _DEFINITION = ("wing", "division", "bounds_factor", "numerics", "effects", "probe", "near")
+_OWN_GENES = len(STRUCTURAL + AERODYNAMIC)  # the other genes are those of effects
 _MAX_STARTS = 256
 # Solutions used as warm starts, by wing and condition; shared by models that differ only in their effects.
 _STARTS: OrderedDict[tuple[bytes, Condition], Course | None] = OrderedDict()
@@ -89,8 +90,7 @@ class FlexibleWing:
 
     def beside(self, genome: ArrayLike) -> FlexibleWing:
         """The same wing with the periodic motion of ``genome`` [G], without effects, as warm start."""
-        own = len(self.genes) - sum(len(effect.parameters) for effect in self.chosen)
-        return self._share_structure(replace(self, near=tuple(np.asarray(genome, float)[:own].tolist())))
+        return self._share_structure(replace(self, near=tuple(np.asarray(genome, float)[:_OWN_GENES].tolist())))
 
     def _share_structure(self, other: FlexibleWing) -> FlexibleWing:
         """``other``, which has the same wing and division, with the structures that have been built already."""
@@ -131,7 +131,7 @@ class FlexibleWing:
 
     def switched_on(self, genome: Array) -> tuple[Effect, ...]:
         """The effects on the wing itself, not on the observation, that are on in ``genome`` [G]."""
-        return tuple(e for e in self.chosen if e.wing and not e.off(e.values(self.genes, genome[None]))[0])
+        return tuple(e for e in self.chosen if e.wing and e.on(self.genes, genome[None])[0])
 
     @one_blas_thread
     def beats(self, genomes: ArrayLike, recording: Recording, *, with_motion: bool = False) -> tuple[Beat, ...]:
@@ -146,31 +146,22 @@ class FlexibleWing:
     def _beats(self, batch: Array, recording: Recording, with_motion: bool) -> tuple[list[Beat], Index]:
         """A beat of each distinct wing, and the index of the wing of each individual [B]."""
         first, wing = _distinct(self._acting(batch, [effect for effect in self.chosen if effect.wing]))
-        wings = batch[first]
-        groups: dict[tuple[str, ...], list[int]] = {}
-        for k, one in enumerate(wings):
-            groups.setdefault(tuple(e.name for e in self.switched_on(one)), []).append(k)
-        found: dict[int, Beat] = {}
-        keys = (
-            {k: self._key(wings[k], recording.condition) for k in groups.get((), ())}
-            if self.near and not with_motion
-            else {}
-        )
-        found.update({k: _BEATS[key] for k, key in keys.items() if key in _BEATS})
-        for rows in ([k for k in rows if k not in found] for rows in groups.values()):
-            if not rows:
-                continue
-            subject = self.subject(self.switched_on(wings[rows[0]]), recording.condition)
-            near = self._start_near(recording.condition) if self.near else None
-            beats = periodic_beats(subject, wings[rows], self.numerics, with_motion=with_motion, near=near)
-            found.update(zip(rows, beats, strict=True))
-        for k, key in keys.items():
-            _remember(_BEATS, key, found[k], _MAX_BEATS)
+        wings, found = batch[first], dict[int, Beat]()
+        for effects, rows in by_active([effect for effect in self.chosen if effect.wing], self.genes, wings):
+            reused = self.near and not effects and not with_motion
+            keys = {k: self._key(wings[k], recording.condition) for k in rows} if reused else {}
+            found |= {k: _BEATS[key] for k, key in keys.items() if key in _BEATS}
+            if new := [k for k in rows if k not in found]:
+                subject = self.subject(effects, recording.condition)
+                near = self._start_near(recording.condition) if self.near else None
+                beats = periodic_beats(subject, wings[new], self.numerics, with_motion=with_motion, near=near)
+                found.update(zip(new, beats, strict=True))
+            for k, key in keys.items():
+                _remember(_BEATS, key, found[k], _MAX_BEATS)
         return [found[k] for k in range(len(wings))], wing
 
     def _key(self, genome: Array, condition: Condition) -> tuple[bytes, Condition, bytes]:
-        own = len(self.genes) - sum(len(effect.parameters) for effect in self.chosen)
-        return self._plain_key, condition, genome[:own].tobytes()
+        return self._plain_key, condition, genome[:_OWN_GENES].tobytes()
 
     def _start_near(self, condition: Condition) -> Course | None:
         """The solution for ``near`` under ``condition``; None if it fails."""
@@ -190,15 +181,13 @@ class FlexibleWing:
 
     def _acting(self, batch: Array, effects: Sequence[Effect]) -> Array:
         """``batch`` [B, G] with zeros for genes of other effects and of effects that are off."""
-        own = len(self.genes) - sum(len(effect.parameters) for effect in self.chosen)
         plain = np.zeros_like(batch)
-        plain[:, :own] = batch[:, :own]
+        plain[:, :_OWN_GENES] = batch[:, :_OWN_GENES]
         place = {gene.name: k for k, gene in enumerate(self.genes)}
         for effect in effects:
-            on = ~effect.off(effect.values(self.genes, batch))
-            for parameter in effect.parameters:
-                column = place[f"{effect.name}.{parameter.name}"]
-                plain[on, column] = batch[on, column]
+            columns = [place[f"{effect.name}.{parameter.name}"] for parameter in effect.parameters]
+            cells = np.ix_(np.flatnonzero(effect.on(self.genes, batch)), np.array(columns))
+            plain[cells] = batch[cells]
         return plain
 
     def beat(self, genome: ArrayLike, recording: Recording, *, with_motion: bool = False) -> Beat:
@@ -243,19 +232,16 @@ class FlexibleWing:
         columns = [names.index(name) for name in recording.markers]
         series = np.stack([_series(beat.tracks[:, columns].reshape(len(beat.tracks), -1)) for beat in beats])[wing]
         times, added = np.tile(recording.times, (len(batch), 1)), np.zeros((len(batch), *recording.values.shape))
-        effects = observed(self.chosen, self.genes, batch, "tracks")
-        if effects:
-            on = [~effect.off(effect.values(self.genes, batch)) for effect in effects]
-            changed = np.flatnonzero(np.any(on, axis=0))
-            grids = {k: _on_grid(beats[k].tracks) for k in dict.fromkeys(wing[changed].tolist())}
-            for start in range(0, len(changed), LANES):  # blocks that stay in the cache
-                block = changed[start : start + LANES]
-                beat = np.stack([grids[k] for k in wing[block].tolist()])
-                sampling = Sampling(self.wing, recording, beat, times[block], added[block])
-                apply(effects, self.genes, batch[block], sampling)
-                shown = sampling.beat[:, :, columns].reshape(*sampling.beat.shape[:2], -1)
-                series[block] = [_series(one) for one in shown]
-                times[block], added[block] = sampling.times, sampling.added
+        changed = affected(self.chosen, self.genes, batch)
+        grids = {k: _on_grid(beats[k].tracks) for k in dict.fromkeys(wing[changed].tolist())}
+        for start in range(0, len(changed), LANES):  # blocks that stay in the cache
+            block = changed[start : start + LANES]
+            beat = np.stack([grids[k] for k in wing[block].tolist()])
+            sampling = Sampling(self.wing, recording, beat, times[block], added[block])
+            apply(self.chosen, self.genes, batch[block], sampling)
+            shown = sampling.beat[:, :, columns].reshape(*sampling.beat.shape[:2], -1)
+            series[block] = [_series(one) for one in shown]
+            times[block], added[block] = sampling.times, sampling.added
         return series, times, added
 
 

@@ -43,11 +43,8 @@ NO_LAWS = Laws(
 )  # fmt: skip
 
 STRUCTURAL = tuple(row[0] for row in _STRUCTURE)
-AERODYNAMIC = (
-    *(row[0] for row in _AERODYNAMICS),
-    *(f"L_{k}" for k in range(1, QUARTERS + 1)),
-    *(f"ID_{k}" for k in range(1, QUARTERS + 1)),
-)
+_WEIGHTS = tuple(f"{prefix}_{k}" for prefix in ("L", "ID") for k in range(1, QUARTERS + 1))
+AERODYNAMIC = (*(row[0] for row in _AERODYNAMICS), *_WEIGHTS)
 
 
 def group(name: str) -> Group:
@@ -71,14 +68,11 @@ def wing_genes(estimates: Mapping[str, float], factor: float = FACTOR) -> tuple[
                 f"estimate of gene {name!r} is {value:g} {unit}; it must lie in "
                 f"[{typical / UNIT_SLIP:g}, {typical * UNIT_SLIP:g}] {unit}: check its unit"
             )
-    return tuple(_gene(name, unit, estimates.get(name, default), text, factor) for name, unit, default, text in rows)
-
-
-def _gene(name: str, unit: str, nominal: float, text: str, factor: float) -> Gene:
-    share = {"L_1": "L", "L_2": "L", "L_3": "L", "L_4": "L"}.get(name)
-    if name.startswith("ID_") and name[3:].isdigit():
-        share = "ID"
-    return Gene(name, unit, nominal, nominal / factor, nominal * factor, "log", text, share)
+    genes = []
+    for name, unit, default, text in rows:
+        nominal, shared = estimates.get(name, default), name.rpartition("_")[0] if name[-1].isdigit() else None
+        genes.append(Gene(name, unit, nominal, nominal / factor, nominal * factor, "log", text, shared))
+    return tuple(genes)
 
 
 def lanes(structure: Structure, genes: tuple[Gene, ...], genomes: Array) -> Lanes:

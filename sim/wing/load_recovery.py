@@ -11,7 +11,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wingfit.records import Condition
 from wingfit.records.array_types import Array, Index
 from wingfit.sim.effects.ports.wing import WingScene
 from wingfit.sim.kernels import LANES
@@ -42,7 +41,7 @@ def from_motion(scene: WingScene, motion: State, crossing: float = 0.0) -> Outpu
         _connector(parts, c, groups, sums)
     _air_and_energies(parts, groups, sums)
     _added_mass_loads(parts, scene, motion, sums)
-    incidence = _incidence(scene.condition)
+    incidence = scene.condition.angle_of_attack if scene.condition.airspeed > 0 else 0.0  # of the stream
     return Outputs(
         phase=np.arange(n) / n, crossing=crossing,
         motors=(_motor(parts, motion, sums, 0), _motor(parts, motion, sums, 1)),
@@ -137,7 +136,7 @@ def _connector(parts: _Parts, c: int, groups: list[tuple[Index, State]], sums: _
 def _air_and_energies(parts: _Parts, groups: list[tuple[Index, State]], sums: _Sums) -> None:
     """Flow and laws of the air for the whole wing, then the forces one strip at a time; and of laws at points."""
     w, here, group = parts
-    work, n = new_work(*parts), len(w.mass)
+    work, n, solid = new_work(*parts), len(w.mass), group._replace(pairs=group.pairs[: group.weighing])
     kinetic, height = np.zeros(LANES), np.zeros(LANES)
     for rows, state in groups:
         count = len(rows)
@@ -162,10 +161,7 @@ def _air_and_energies(parts: _Parts, groups: list[tuple[Index, State]], sums: _S
         sums.held[rows] = np.moveaxis(work.wrench, -1, 0)[:count, :n]
         sums.held_lost[rows], sums.held_stored[rows] = work.lost[:count], work.stored[:count]
         kinetic_and_height(w.mass, w.inertia, work.p, work.V, here.gravity, kinetic, height)
-        add_energies(
-            group.pairs[: group.weighing], group.masses, group.weighing, here.gravity, here.wind,
-            work.R, work.p, work.V, kinetic, height,
-        )  # fmt: skip
+        add_energies(solid, here, work, kinetic, height)
         sums.kinetic[rows], sums.gravitational[rows] = kinetic[:count], height[:count]
 
 
@@ -261,8 +257,3 @@ def _nearest_rotation(mean: Array) -> Array:
     """Rotations [n, 3, 3] nearest to mean rotation matrices: the orthogonal factor of their polar decomposition."""
     U, _, Vt = np.linalg.svd(mean)
     return np.asarray(U @ Vt)
-
-
-def _incidence(condition: Condition) -> float:
-    """Angle of the stream, rad; 0 without wind."""
-    return condition.angle_of_attack if condition.airspeed > 0 else 0.0

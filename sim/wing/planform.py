@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -64,9 +65,9 @@ class Planform:
         """x at a fraction of the chord, m."""
         return float(self.leading_edge(y) + fraction * self.chord(y))
 
-    def fraction(self, x: float, y: float) -> float:
-        """Fraction of the chord at a point, clipped to [0, 1]."""
-        return float(np.clip((x - self.leading_edge(y)) / self.chord(y), 0.0, 1.0))
+    def fraction(self, x: ArrayLike, y: ArrayLike) -> Array:
+        """Fraction of the chord at points (``x``, ``y``), clipped to [0, 1]."""
+        return np.asarray(np.clip((np.asarray(x, float) - self.leading_edge(y)) / self.chord(y), 0.0, 1.0))
 
     def panels(self, division: Division) -> list[Panel]:
         """Panels in the order of the bodies: strips of equal width, bodies of equal chord."""
@@ -82,15 +83,13 @@ class Planform:
         return np.linspace(self._y[0], self._y[-1], len(division.bodies) + 1)
 
 
-def carriers(planform: Planform, panels: list[Panel], x: Array, y: Array) -> Index:
-    """Indices of the panels that contain the points (``x``, ``y``) [N]; edges belong to the outer and rear panel."""
+def carriers(panels: Sequence[Panel], y: Array, fraction: Array) -> Index:
+    """Indices of the panels at ``y`` [N] (m) and fractions of the chord [N]; edges belong to the next panel."""
     edges = np.unique([panel.y0 for panel in panels])
     strip = np.clip(np.searchsorted(edges, y, side="right") - 1, 0, len(edges) - 1)
     first = np.searchsorted([panel.y0 for panel in panels], edges)
-    count = np.diff(np.append(first, len(panels)))
-    fraction = np.clip((x - planform.leading_edge(y)) / planform.chord(y), 0.0, 1.0)
-    along = np.minimum((fraction * count[strip]).astype(np.int64), count[strip] - 1)
-    return np.asarray(first[strip] + along, np.int64)
+    count = np.diff(np.append(first, len(panels)))[strip]
+    return np.asarray(first[strip] + np.minimum((fraction * count).astype(np.int64), count - 1), np.int64)
 
 
 @one_blas_thread
@@ -102,7 +101,7 @@ def bodies(planform: Planform, panels: list[Panel]) -> list[Body]:
         length = math.hypot(rod.x_tip - rod.x_root, rod.y_tip - rod.y_root)
         t = (np.arange(_ROD_CELLS) + 0.5) / _ROD_CELLS
         x, y = rod.x_root + t * (rod.x_tip - rod.x_root), rod.y_root + t * (rod.y_tip - rod.y_root)
-        for number, *place in zip(carriers(planform, panels, x, y), x, y, strict=True):
+        for number, *place in zip(carriers(panels, y, planform.fraction(x, y)), x, y, strict=True):
             lumps[number].append((linear * length / _ROD_CELLS, np.array([*place, 0.0])))
     markers = planform.wing.markers
     for marker, number in zip(markers, marker_carriers(planform, panels, markers), strict=True):
@@ -145,5 +144,5 @@ def _body(planform: Planform, panel: Panel, lumps: list[tuple[float, Array]]) ->
 
 def marker_carriers(planform: Planform, panels: list[Panel], markers: tuple[Marker, ...]) -> Index:
     """Indices of the bodies that carry the markers."""
-    places = np.array([marker.position for marker in markers])
-    return carriers(planform, panels, places[:, 0], places[:, 1])
+    x, y, _ = np.array([marker.position for marker in markers]).T
+    return carriers(panels, y, planform.fraction(x, y))

@@ -80,7 +80,7 @@ def probed(model: FlexibleWing, genome: ArrayLike, recording: Recording, probe: 
     beat = near.beat(base[0], recording, with_motion=True)
     if beat.reason is not None or beat.motion is None:
         raise ValueError(f"the wing cannot be simulated under {recording.name!r}: {beat.reason}")
-    aim = MOVES * _span(model)
+    aim = MOVES * model.wing.span
     numerics = replace(model.numerics, steps=len(beat.tracks), periodic=CLOSE * aim, max_beats=_MOST_BEATS)
     probing = replace(near, numerics=numerics, probe=probe)
     sizes = np.repeat(_sizes(model, probe), 1 + 2 * probe.harmonics)
@@ -101,17 +101,13 @@ def probed(model: FlexibleWing, genome: ArrayLike, recording: Recording, probe: 
     return Probed(np.moveaxis(found, 0, -1), start, motion)
 
 
-def _span(model: FlexibleWing) -> float:
-    return model.wing.stations[-1].y - model.wing.stations[0].y
-
-
 def _sizes(model: FlexibleWing, probe: Probe) -> Array:
     """Initial loads: forces [stations] (N/m), then moments (N) if the probe has any, and rotations of the rods (deg).
 
     Forces are larger near the root, where their lever is small; moments are those of a force times the chord.
     """
     weight = sum(body.mass for body in model.structure.bodies) * _GRAVITY
-    forces = _INITIAL_LOAD * weight / _span(model) / np.maximum(np.array(probe.stations), 0.1)
+    forces = _INITIAL_LOAD * weight / model.wing.span / np.maximum(np.array(probe.stations), 0.1)
     edges = model.structure.planform.strips(model.structure.division)
     chord = float(np.mean(model.structure.planform.chord(edges)))
     turning = np.full(len(forces), forces.min() * chord)

@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from wingfit.records.array_types import Array, Mask
 from wingfit.sim.wing.structure import SPANWISE_MODULUS, Structure
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -26,9 +24,9 @@ class Joints:
         reach: [C, 2]: where that wing begins and ends, as fractions of the span from root to tip.
     """
 
-    along_span: npt.NDArray[np.bool_]
+    along_span: Mask
     part: Array
-    within: npt.NDArray[np.bool_]
+    within: Mask
     reach: Array
 
     @classmethod

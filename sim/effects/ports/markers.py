@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.records import Wing
+from wingfit.records.array_types import Index
 from wingfit.sim.effects.contract import Array, Values, place
 
 PLACE = place(0.7, 0.5)
 _NEAR = 0.05  # of the span: distance at which a neighbour has the weight exp(-1/2)
 
 
-def nearest(wing: Wing, values: Values) -> npt.NDArray[np.intp]:
+def nearest(wing: Wing, values: Values) -> Index:
     """Markers [B, M] of ``wing``, sorted by their distance at rest from the places PLACE [B].
 
     A fault affects one marker and never a mixture, so the observation jumps where the place comes nearer to another

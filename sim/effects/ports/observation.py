@@ -6,11 +6,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.records import Recording, Vehicle, Wing
-
-Array = npt.NDArray[np.float64]
+from wingfit.records.array_types import Array, Complex
+from wingfit.records.dataset import STANDARD_GRAVITY
 
 
 @dataclass
@@ -47,12 +46,17 @@ class Sampling:
             raise ValueError(f"wing {self.rig.name!r} has recordings of tracks, not of forces: remove the fault")
         return self.rig
 
+    def along_axes(self, x: Array, z: Array) -> Array:
+        """Forces [B, C] in N along the axes of the recording, from ``x`` and ``z`` [B] in weights of the vehicle."""
+        weight = self.vehicle.mass * STANDARD_GRAVITY
+        return weight * np.stack([x if axis == "x" else z for axis in self.recording.forces], axis=1)
+
     @property
     def kind(self) -> str:
         """Kind of the recording: "tracks" or "forces"."""
         return self.recording.kind
 
-    def filtered(self, gain: npt.NDArray[np.complex128]) -> None:
+    def filtered(self, gain: Complex) -> None:
         """Multiply harmonic k of the beat by ``gain`` [B, K + 1] (K + 1 = n // 2 + 1); gain[:, 0] acts on the mean."""
         n = self.beat.shape[1]
         spectrum = np.fft.rfft(self.beat, axis=1)

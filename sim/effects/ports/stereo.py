@@ -9,11 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from wingfit.records.array_types import Array
 from wingfit.sim.effects.contract import Parameter, Values
-
-Array = npt.NDArray[np.float64]
 
 PLACES = (
     Parameter("x", "m", -1.0, 2.0, 0.5, "x of the point that both cameras aim at, at height z = 0", "chord"),

@@ -8,9 +8,9 @@ from functools import cached_property
 from typing import Literal, get_args
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.records import Condition, Vehicle, WingMotion
+from wingfit.records.array_types import Array, Complex
 from wingfit.sim.atmosphere import density
 from wingfit.sim.kernels import LANES
 from wingfit.sim.vehicle.elements import PROJECTION, Side
@@ -19,9 +19,6 @@ from wingfit.sim.vehicle.motion import Angles, angles_of, flap_series
 from wingfit.sim.vehicle.rows import mirrored, motion_rows, set_side, uppers
 from wingfit.sim.vehicle.states import followed
 from wingfit.sim.vehicle.stations import Stations, span_sums, stations
-
-Array = npt.NDArray[np.float64]
-Complex = npt.NDArray[np.complex128]
 
 ROTATION_POINT = 0.75  # Eq. 4
 # Stages of a scene, in order: each reads what the stages before have changed.
@@ -116,7 +113,7 @@ class VehicleScene:
 
     # -- for effects of the drive ------------------------------------------------------------------------------
 
-    def add_harmonic(self, k: int, coefficient: npt.NDArray[np.complex128]) -> None:
+    def add_harmonic(self, k: int, coefficient: Complex) -> None:
         """Add Re coefficient exp(2 pi i k t*), ``coefficient`` [B] in rad, to the flap angle."""
         if self.flap.shape[1] <= k:
             self.flap = np.pad(self.flap, ((0, 0), (0, k + 1 - self.flap.shape[1])))

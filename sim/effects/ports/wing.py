@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-import numpy.typing as npt
 
 from wingfit.records import Condition
+from wingfit.records.array_types import Array, Index
 from wingfit.sim.atmosphere import density
 from wingfit.sim.kernels import LANES
 from wingfit.sim.kernels.arrays import Lanes, Laws, Setting
@@ -15,9 +15,8 @@ from wingfit.sim.kernels.lanes.memory import aligned
 from wingfit.sim.kernels.laws import Law, address
 from wingfit.sim.solver.scene import setting
 from wingfit.sim.wing.drive import RodDrive
+from wingfit.sim.wing.planform import carriers
 from wingfit.sim.wing.structure import Structure
-
-Array = npt.NDArray[np.float64]
 
 _SEA_LEVEL, _LEAST_SCALE = 1.2, 1e-3  # kg/m^3; fraction
 _LEAST_STROKE = 0.01  # rad, for a drive that does not move
@@ -63,19 +62,15 @@ class WingScene:
         """2 pi times the flap frequency, rad/s."""
         return 2 * np.pi * self.condition.flap_frequency
 
-    def body_at(self, station: Array, fraction: Array) -> tuple[npt.NDArray[np.int64], Array]:
+    def body_at(self, station: Array, fraction: Array) -> tuple[Index, Array]:
         """Bodies [W] under places of the wing, and the places [W, 3] relative to their centres of mass, m.
 
         ``station``: fraction of the span from root to tip, ``fraction``: of the chord from the leading edge.
         """
-        planform, division = self.structure.planform, self.structure.division
-        edges = planform.strips(division)
-        y = edges[0] + station * (edges[-1] - edges[0])
+        planform, wing = self.structure.planform, self.structure.wing
+        y = wing.stations[0].y + station * wing.span
         x = planform.leading_edge(y) + fraction * planform.chord(y)
-        strip = np.clip(np.searchsorted(edges, y, side="right") - 1, 0, len(division.bodies) - 1)
-        count = np.array(division.bodies)[strip]
-        along = np.minimum((fraction * count).astype(np.int64), count - 1)
-        body = np.array([division.index(int(s), int(k)) for s, k in zip(strip, along, strict=True)], np.int64)
+        body = carriers(self.structure.panels, y, fraction)
         centre = np.array([self.structure.bodies[n].centre for n in body])
         return body, np.stack([x, y, np.zeros_like(x)], axis=1) - centre
 

@@ -66,8 +66,7 @@ def test_genes_are_off_and_within_bounds(name: str, kind: str) -> None:
     assert [g.name for g in genes] == [f"{name}.{p.name}" for p in effect.parameters] == list(typical)
     for gene in genes:
         gene.check(typical[gene.name])
-    values = effect.values(genes, np.array([[g.nominal for g in genes], list(typical.values())]))
-    assert effect.off(values).tolist() == [True, False]
+    assert effect.on(genes, np.array([[g.nominal for g in genes], list(typical.values())])).tolist() == [False, True]
 
 
 @pytest.mark.parametrize(

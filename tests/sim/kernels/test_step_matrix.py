@@ -216,13 +216,8 @@ def assembled(case: Case, lane: int) -> Array:
         w.first, w.second, w.lower, w.upper, w.a, w.b, group.stiffness, group.damping, group.coupling,
         work.more, work.more_k, work.more_d0, work.Q, work.d, work.V, LENGTH, work.blocks,
     )  # fmt: skip
-    add_mass_blocks(
-        group.pairs, group.masses, group.weighing, here.gravity, here.wind, work.R, work.V, LENGTH, work.blocks
-    )
-    add_point_blocks(
-        group.laws.bodies, group.laws.arms, work.R, work.V, work.point_wrench, work.point_k, work.point_d, LENGTH,
-        work.drag, work.blocks,
-    )  # fmt: skip
+    add_mass_blocks(group, here, work.R, work.V, LENGTH, work.blocks)
+    add_point_blocks(group.laws, work, LENGTH)
     found, blocks = np.zeros((n + 2, 6, n + 2, 6)), work.blocks[..., lane].reshape(-1, 6, 6)
     for k in range(n):
         found[k, :, k] = blocks[k]

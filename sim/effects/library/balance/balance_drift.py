@@ -6,14 +6,13 @@ import numpy as np
 
 from wingfit.sim.effects.contract import Parameter, Values, fault_of_forces
 from wingfit.sim.effects.ports.observation import Sampling
-from wingfit.sim.effects.ports.weights import along_axes
 
 
 def _observe(sampling: Sampling, values: Values) -> None:
     since = (sampling.times - sampling.times[:, :1])[:, :, None]
     warm = -np.expm1(-since / values["time"][:, None, None])
-    steady = along_axes(sampling, values["x"], values["z"])
-    thermal = along_axes(sampling, values["thermal_x"], values["thermal_z"])
+    steady = sampling.along_axes(values["x"], values["z"])
+    thermal = sampling.along_axes(values["thermal_x"], values["thermal_z"])
     sampling.added += since * steady[:, None] + warm * thermal[:, None]
 
 

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from wingfit.sim.effects.contract import Parameter, Values, fault_of_forces
 from wingfit.sim.effects.ports.observation import Sampling
-from wingfit.sim.effects.ports.weights import along_axes
 
 
 def _observe(sampling: Sampling, values: Values) -> None:
-    sampling.added += along_axes(sampling, values["x"], values["z"])[:, None]
+    sampling.added += sampling.along_axes(values["x"], values["z"])[:, None]
 
 
 EFFECT = fault_of_forces(
