@@ -21,9 +21,10 @@ import numpy.typing as npt
 from benchmarks.common.machine import commit, cpu
 from benchmarks.estimators import estimators
 from benchmarks.physics.delfly_tables import closest_law_percent, fling_ends, lift_by_root_pitch, tables_law
+from benchmarks.physics.missing_interval import missing_interval
 from wingfit.calibration.estimates.likelihood import Estimate, estimate, iterate
 from wingfit.calibration.evaluator import Evaluator
-from wingfit.calibration.forces.agreement import agreements, missing_interval
+from wingfit.calibration.forces.agreement import agreements
 from wingfit.calibration.forces.global_model import at, fit_global
 from wingfit.calibration.forces.result import Agreement, GlobalModel, LocalEstimate, Quantity
 from wingfit.calibration.problem import Problem, base_genome

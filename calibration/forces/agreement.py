@@ -1,4 +1,4 @@
-"""How modelled forces agree with recorded ones: mean beats, differences, spectra, and where in the beat a misfit lies.
+"""How modelled forces agree with recorded ones: mean beats, differences and spectra.
 
 A model's forces come from ``Model.observe``, which samples and low-passes them like the recording; everything here then
 does the same to both.
@@ -13,11 +13,8 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.signal import periodogram
 
-from wingfit.calibration.estimates.linearised import free_genes, linearise, unit_at
-from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.forces.result import Agreement, ForceComparison, Quantity, Source
 from wingfit.calibration.forces.split_beats import Cut, pieces
-from wingfit.calibration.problem import Problem
 from wingfit.records import Recording
 from wingfit.records.array_types import Array
 from wingfit.records.blas_threads import one_blas_thread
@@ -25,15 +22,6 @@ from wingfit.sim.vehicle.lift_drag import lift_drag
 
 POINTS = 200  # of a mean beat
 SEGMENT_BEATS = 4  # per piece of a spectrum: the harmonics of the beat fall on every fourth line
-SHARE = 0.9
-"""Share of the excess squared misfit for which :func:`located` makes its interval answer.
-
-The excess outside may then be a tenth: with more, the ringing of the low-pass, which smears every event over the
-beat, counts as misfit too; with less, the interval shrinks to the core of the event.
-"""
-SIGNIFICANCE = 0.01
-FEWEST_BEATS = 5  # for the scatter between beats to say what noise explains
-FLIPS = 999
 CONSTANT = 1e-9  # of the largest force of a recording: what varies less is constant, but for rounding
 
 
@@ -153,92 +141,6 @@ def spectrum(recording: Recording, forces: Array) -> tuple[Array, dict[Quantity,
         frequency, power = periodogram(values[samples], fs=rate, detrend="constant", axis=1)
         density[name] = power.mean(axis=0)
     return frequency, density
-
-
-@one_blas_thread
-def located(
-    recording: Recording, residual: Array, sensitivities: Array | None = None, quantity: Quantity = "x"
-) -> tuple[float, float] | None:
-    """Find where in the beat a model misses physics.
-
-    ``residual`` [n] is the modelled minus the recorded mean beat, N, and ``sensitivities`` [n, F] its derivatives by
-    the coefficients that were fitted. The answer is the shortest interval of the beat (t*) without which the model,
-    fitted anew to the rest of the beat, has no more than 1 - SHARE of the excess left there: of the squared misfit less
-    what the scatter between beats leaves in a mean of so many. The new fit is needed because one to the whole beat
-    lets its coefficients make up for what is missing, and so carries the misfit into parts of the beat where the model
-    is right. Without ``sensitivities`` it is the shortest interval that holds SHARE of the excess.
-
-    The interval may run over the end of the beat: then its end is above 1. None where the misfit is not significant:
-    beats are taken as exchangeable about their mean, their deviations get random signs, and the mean square of FLIPS
-    such means must reach that of the residual in at most SIGNIFICANCE of the cases (a wild bootstrap, Wu 1986). None
-    also with fewer than FEWEST_BEATS beats, too few to decide.
-    """
-    samples = whole_beats(recording, points=len(residual)).samples[quantity]
-    if len(samples) < FEWEST_BEATS or not _significant(samples, residual):
-        return None
-    noise = samples.var(axis=0, ddof=1) / len(samples)
-    slopes = np.empty((len(residual), 0)) if sensitivities is None else sensitivities
-    return _shortest(residual, slopes, noise)
-
-
-@one_blas_thread
-def missing_interval(problem: Problem, evaluator: Evaluator, recording: int = 0) -> tuple[float, float] | None:
-    """Find where in the beat the model of ``problem`` misses physics, at the problem's base genome.
-
-    On the first fitted axis of its recording number ``recording``; see :func:`located`.
-    """
-    genes, record = free_genes(problem), problem.recordings[recording]
-    unit = unit_at(genes, np.array([problem.base[gene.name] for gene in genes]))
-    linear = linearise(problem, evaluator, unit)
-    axis = record.forces.index(problem.axes[0] if problem.axes else "x")
-    name = record.forces[axis]
-
-    def mean_beat(channel: Array) -> Array:
-        whole = np.zeros_like(record.values)
-        whole[:, axis] = channel
-        return whole_beats(record, whole).mean[name]
-
-    residual = mean_beat(linear.residuals[recording][:, axis])
-    slopes = [mean_beat(slope) for slope in linear.sensitivities[recording][:, axis].T]
-    return located(record, residual, np.stack(slopes, axis=1), name)
-
-
-def _significant(samples: Array, residual: Array) -> bool:
-    beats = len(samples)
-    deviations = (samples - samples.mean(axis=0)) * np.sqrt(beats / (beats - 1))
-    signs = np.random.default_rng(0).choice([-1.0, 1.0], size=(FLIPS, beats))
-    by_noise = np.mean((signs @ deviations / beats) ** 2, axis=1)
-    return bool(1 + np.sum(by_noise >= np.mean(residual**2)) <= SIGNIFICANCE * (FLIPS + 1))
-
-
-def _shortest(residual: Array, slopes: Array, noise: Array) -> tuple[float, float] | None:
-    """Shortest cyclic interval outside of which a new fit leaves at most 1 - SHARE of the excess; None without excess.
-
-    ``residual`` and ``noise`` (its variance) [n], ``slopes`` [n, F].
-    """
-    n, basis = len(residual), np.linalg.qr(slopes)[0]
-    terms = np.concatenate([basis, residual[:, None]], axis=1)
-    products = np.einsum("tp,tq->tpq", terms, terms)
-    summed = np.concatenate([np.zeros((1, *products.shape[1:])), np.cumsum(np.tile(products, (2, 1, 1)), axis=0)])
-    heard = np.concatenate([[0.0], np.cumsum(np.tile(noise, 2))])
-    starts = np.arange(n)
-    excess = _left(summed[n][None])[0] - heard[n]
-    if excess <= 0:
-        return None
-    for length in range(1, n):
-        outside = _left(summed[n] - (summed[starts + length] - summed[starts]))
-        excess_outside = outside - (heard[n] - (heard[starts + length] - heard[starts]))
-        start = int(excess_outside.argmin())
-        if excess_outside[start] <= (1 - SHARE) * excess:
-            return start / n, (start + length) / n
-    return None
-
-
-def _left(products: Array) -> Array:
-    """Squares [K] that a fit leaves, from sums of products [K, F + 1, F + 1] of basis and, last, residual."""
-    inner, cross, square = products[:, :-1, :-1], products[:, :-1, -1], products[:, -1, -1]
-    solved = np.einsum("kpq,kq->kp", np.linalg.pinv(inner, rcond=1e-9, hermitian=True), cross)
-    return np.asarray(square - np.einsum("kp,kp->k", cross, solved))
 
 
 def _percent(rmse: float, beat: Array, least: float) -> float:

@@ -32,7 +32,7 @@ GUARDED: tuple[Callable[..., object], ...] = (
     alignment.recorded_crossing, balance.record, loads.simulate_outputs, planform.bodies, campaign.record,
     BladeElementWing.beat, BladeElementWing.observe, FlexibleWing.beats, FlexibleWing.observe,
     estimation.summarise_forces, estimation.compare_forces, estimation.predict,
-    agreement.agreements, agreement.comparison, agreement.located, agreement.missing_interval,
+    agreement.agreements, agreement.comparison,
     evaluator.run_unit, global_model.fit_global, global_model.at, likelihood.iterate, likelihood.estimate,
     harmonic.noise_distance, summary.summarise, result.judge, result.compare, search.calibrate,
     uncertainty.standing, uncertainty.uncertainty,
