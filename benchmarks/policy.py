@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 import hashlib
 import json
+import statistics
 import sys
 import tempfile
 import time
@@ -27,6 +28,8 @@ SEED = 8  # of the concealed suite
 FACTORS = {"halved": 0.5, "doubled": 2.0}
 PROBABILITIES = ("single", "listed", "possible", "predicted_weight")
 """Fractions, whose odds are halved and doubled: a probability of 1.7 means nothing."""
+FAINT = 0.35  # of the concealed strength: so weak that verdicts are close to the thresholds
+FAINT_NAME = "-faint"
 RIGHT = {"null": "adequate", "unlisted": "unnamed"}
 
 
@@ -51,7 +54,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.policy", description=__doc__)
     parser.add_argument("--json", action="store_true", help="end with one line that holds everything as JSON")
     parser.add_argument("--jobs", type=int, default=2, help="processes at once")
-    parser.add_argument("--wings", type=int, default=1, help="wings in the sample, the fastest first; vehicles are all")
+    parser.add_argument("--wings", type=int, default=1, help="wings in the sample, the fastest first")
     parser.add_argument(
         "--keep",
         type=Path,
@@ -71,10 +74,12 @@ def main() -> None:
 
 
 def sample(wings: int) -> list[Trial]:
-    """All vehicles of the quick concealed suite, and as many of its wings, coarse models first."""
+    """Vehicles of the quick concealed suite, at their strength and fainter, and as many wings, coarse models first."""
     trials = plan(SEED, quick=True)
+    vehicles = [one for one in trials if not one.build.division]
+    faint = [replace(one, name=f"{one.name}{FAINT_NAME}", target=FAINT * one.target) for one in vehicles if one.hidden]
     coarse = sorted((one for one in trials if one.build.division), key=lambda one: len(one.build.division))
-    return [one for one in trials if not one.build.division] + coarse[:wings]
+    return [*vehicles, *faint, *coarse[:wings]]
 
 
 def varied(name: str, factor: float) -> float:
@@ -104,10 +109,15 @@ def changes(trials: list[Trial], folders: Folders, jobs: int, only: list[str]) -
         rows[name][how] = {
             trial.name: f"{old} -> {new}" for trial, old, new in zip(trials, before, after, strict=True) if old != new
         }
+    right = [
+        _right(one, folders, found)
+        for one, found in zip(trials, before, strict=True)
+        if not one.name.endswith(FAINT_NAME)
+    ]
     idle = [name for name, row in rows.items() if not any(row[how] for how in FACTORS)]
     return {
         "trials": {one.name: f"{one.group}: {said}" for one, said in zip(trials, before, strict=True)},
-        "right": sum(_right(one, folders, found) for one, found in zip(trials, before, strict=True)),
+        "right_percent": round(100 * statistics.mean(right)),
         "thresholds": list(rows.values()),
         "change_nothing": idle,
     }
@@ -142,7 +152,10 @@ def _right(trial: Trial, folders: Folders, said: Said) -> bool:
 
 
 def _print(table: dict[str, Any]) -> None:
-    print(f"{len(table['trials'])} trials, {table['right']} right with the policy as it is", file=sys.stderr)
+    print(
+        f"{len(table['trials'])} trials, {table['right_percent']} % of the strong ones right with the policy as it is",
+        file=sys.stderr,
+    )
     for row in table["thresholds"]:
         parts = [f"{how}: {len(row[how])} changed" for how in FACTORS]
         print(f"{row['name']:18} {row['value']:6g}  {', '.join(parts)}")
