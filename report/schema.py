@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from typing import Any
 
+from wingfit.records.description.schema import as_text, untitled
 from wingfit.report.finding_file import ADAPTER, FORMAT_VERSION
 
 
 def finding_schema() -> dict[str, Any]:
     """JSON Schema (2020-12) of what :func:`finding_json` makes."""
-    schema = _untitled(ADAPTER.json_schema(mode="serialization"))
+    schema = untitled(ADAPTER.json_schema(mode="serialization"))
     required = [*schema["required"], "format_version"]  # fields with a default are always written
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
@@ -24,17 +24,8 @@ def finding_schema() -> dict[str, Any]:
 
 
 def schema_text() -> str:
-    """Write the schema as it is published in docs/schemas/finding.schema.json."""
-    return json.dumps(finding_schema(), indent=2, ensure_ascii=False) + "\n"
-
-
-def _untitled(schema: Any) -> Any:
-    """Drop the titles that pydantic derives from field names; they repeat the names."""
-    if isinstance(schema, list):
-        return [_untitled(item) for item in schema]
-    if not isinstance(schema, dict):
-        return schema
-    return {key: _untitled(item) for key, item in schema.items() if not (key == "title" and isinstance(item, str))}
+    """The text of the published schema, docs/schemas/finding.schema.json."""
+    return as_text(finding_schema())
 
 
 if __name__ == "__main__":

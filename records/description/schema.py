@@ -17,23 +17,28 @@ def dataset_schema() -> dict[str, Any]:
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "$id": f"urn:wingfit:schema:dataset:{FORMAT_VERSION}",
-        **_untitled(TypeAdapter[object](DatasetFile).json_schema()),
+        **untitled(TypeAdapter[object](DatasetFile).json_schema()),
         "title": f"wingfit dataset.yaml, format {FORMAT_VERSION}",
     }
 
 
 def schema_text() -> str:
     """The text of the published schema, docs/schemas/dataset.schema.json."""
-    return json.dumps(dataset_schema(), indent=2, ensure_ascii=False) + "\n"
+    return as_text(dataset_schema())
 
 
-def _untitled(schema: Any) -> Any:
+def as_text(schema: dict[str, Any]) -> str:
+    """``schema`` as indented JSON."""
+    return json.dumps(schema, indent=2, ensure_ascii=False) + "\n"
+
+
+def untitled(schema: Any) -> Any:
     """``schema`` without the titles that pydantic derives from key names."""
     if isinstance(schema, list):
-        return [_untitled(item) for item in schema]
+        return [untitled(item) for item in schema]
     if not isinstance(schema, dict):
         return schema
-    return {key: _untitled(item) for key, item in schema.items() if not (key == "title" and isinstance(item, str))}
+    return {key: untitled(item) for key, item in schema.items() if not (key == "title" and isinstance(item, str))}
 
 
 if __name__ == "__main__":
