@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import lsq_linear
+import scipy
 
 from wingfit.records.array_types import Array, Float
 
@@ -40,7 +40,7 @@ class Quadratic:
         """
         factor = np.linalg.cholesky(self.curvature + np.diag(damping))
         aim = -np.linalg.solve(factor, self.slope if slope is None else slope)
-        return np.asarray(lsq_linear(factor.T, aim, (-unit, 1.0 - unit), method="bvls").x)
+        return np.asarray(scipy.optimize.lsq_linear(factor.T, aim, (-unit, 1.0 - unit), method="bvls").x)
 
     def decrease(self, steps: Float[Array, "S F"]) -> Float[Array, " S"]:
         """Decrease [S] of the cost that the quadratic predicts for ``steps`` [S, F]."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import qmc
+import scipy
 
 from wingfit.records.array_types import Array, Float
 
@@ -78,4 +78,5 @@ def remaining(fields: Float[Array, "S N"], residual: Float[Array, " N"], multipl
 
 def spread(count: int, size: int) -> Float[Array, "count size"]:
     """``count`` points [count, size] spread evenly over the unit box."""
-    return np.asarray(qmc.Halton(size, scramble=False).random(count + 1)[1:])  # the first of all is a corner
+    points = scipy.stats.qmc.Halton(size, scramble=False).random(count + 1)
+    return np.asarray(points[1:])  # the first of all is a corner

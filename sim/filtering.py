@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.signal import butter, sosfiltfilt, sosfreqz
+import scipy
 
 from wingfit.records import LowPass, Recording
 from wingfit.records.array_types import Array, ArrayLike
@@ -55,7 +55,7 @@ def low_passed(recording: Recording, low_pass: LowPass) -> Recording:
     sections = _sections(low_pass, sampling_rate(recording), f"recording {recording.name!r}")
     # The padding must be longer than the impulse response of the filter.
     pad = min(len(recording.times) - 1, int(3 * low_pass.order * sampling_rate(recording) / low_pass.cutoff))
-    values = np.ascontiguousarray(sosfiltfilt(sections, recording.values, axis=0, padlen=pad))
+    values = np.ascontiguousarray(scipy.signal.sosfiltfilt(sections, recording.values, axis=0, padlen=pad))
     frequency, rate = recording.condition.flap_frequency, sampling_rate(recording)
     if len(values) * frequency >= MIN_BEATS_TO_TRIM * rate:
         lost = round(min(END_PERIODS / low_pass.cutoff, 1.0 / frequency) * rate)
@@ -69,7 +69,9 @@ def gain(low_pass: LowPass, rate: float, frequency: ArrayLike) -> Array:
     Above half the rate there is nothing to filter: a model's harmonics there would be aliases, and get none.
     """
     f = np.asarray(frequency, float)
-    response = sosfreqz(_sections(low_pass, rate, "the recording"), worN=np.minimum(f, 0.5 * rate), fs=rate)[1]
+    response = scipy.signal.sosfreqz(
+        _sections(low_pass, rate, "the recording"), worN=np.minimum(f, 0.5 * rate), fs=rate
+    )[1]
     return np.where(f < 0.5 * rate, np.abs(response) ** 2, 0.0)
 
 
@@ -79,4 +81,4 @@ def _sections(low_pass: LowPass, rate: float, what: str) -> Array:
             f"a low-pass at {low_pass.cutoff:g} Hz does not fit {what}, sampled at {rate:g} Hz; "
             f"the cutoff must lie in (0, {0.5 * rate:g}) Hz"
         )
-    return np.asarray(butter(low_pass.order, low_pass.cutoff, fs=rate, output="sos"))
+    return np.asarray(scipy.signal.butter(low_pass.order, low_pass.cutoff, fs=rate, output="sos"))

@@ -11,8 +11,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from scipy import interpolate, linalg
-from scipy.spatial.transform import Rotation
+import scipy
 
 from wingfit.records import Condition, LowPass, Recording
 from wingfit.records.array_types import Array, Index, Mask
@@ -212,7 +211,7 @@ def _bridges(known: Mask, longest: int) -> list[_Bridge]:
             near = rows[np.abs(rows - before) <= 4 * (longest + 1)]
             if len(near) < 4:
                 continue
-            spline = interpolate.CubicSpline(near, np.eye(len(near)))
+            spline = scipy.interpolate.CubicSpline(near, np.eye(len(near)))
             found += [_Bridge(int(frame), near, spline(frame)) for frame in range(before + 1, after)]
     return found
 
@@ -236,7 +235,7 @@ def _attitude(smooth: list[Array]) -> tuple[Array, Array, Array]:
     q, dq, ddq = (s[:, 3:] / size for s in smooth)
     w, v = q[:, :1], q[:, 1:]
     R, known = np.full((len(q), 3, 3), np.nan), np.isfinite(w[:, 0])
-    R[known] = Rotation.from_quat(q[known], scalar_first=True).as_matrix()
+    R[known] = scipy.spatial.transform.Rotation.from_quat(q[known], scalar_first=True).as_matrix()
     # omega = 2 conj(q) dq/dt; the derivative of conj(q) adds only to the scalar part.
     rate, turning = (2 * (w * d[:, 1:] - d[:, :1] * v - np.cross(v, d[:, 1:])) for d in (dq, ddq))
     return R, rate, turning
@@ -298,7 +297,7 @@ def _admissible(values: Array) -> Array:
 
 def _toeplitz(correlation: Array, size: int) -> Array:
     """Correlation matrix [size, size]."""
-    return np.asarray(linalg.toeplitz(np.pad(correlation, (0, size))[:size]))
+    return np.asarray(scipy.linalg.toeplitz(np.pad(correlation, (0, size))[:size]))
 
 
 def _deviation(

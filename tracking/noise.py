@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import optimize
+import scipy
 
 from wingfit.records.array_types import Array
 
@@ -98,7 +98,7 @@ def estimate(times: Array, design: Array, values: Array) -> Noise:
     start = min(grid, key=cost)
     bounds = [(0.0, 0.999), (lowest, highest)]
     options = {"maxiter": 30, "xatol": 0.02, "fatol": 0.02}
-    found = optimize.minimize(cost, start, method="Nelder-Mead", bounds=bounds, options=options)
+    found = scipy.optimize.minimize(cost, start, method="Nelder-Mead", bounds=bounds, options=options)
     share, time = float(found.x[0]), float(np.exp(found.x[1]))
     variance = _restricted(blocks, share, time, scale)[1]
     return Noise(float(np.sqrt((1 - share) * variance)), float(np.sqrt(share * variance)), time)

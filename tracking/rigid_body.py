@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy
 
 from wingfit.records.array_types import Array, Mask
 from wingfit.records.blas_threads import one_blas_thread
@@ -171,7 +171,7 @@ def quaternions(rotation: Array) -> Array:
     q = np.full((len(rotation), 4), np.nan)
     fitted = np.isfinite(rotation[:, 0, 0])
     if fitted.any():
-        found = Rotation.from_matrix(rotation[fitted]).as_quat(scalar_first=True)
+        found = scipy.spatial.transform.Rotation.from_matrix(rotation[fitted]).as_quat(scalar_first=True)
         flips = np.cumprod(np.sign(np.append(1.0, np.sum(found[1:] * found[:-1], axis=1))))
         q[fitted] = found * flips[:, None]
     return q

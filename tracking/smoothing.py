@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy import linalg, special, stats
+import scipy
 
 from wingfit.records.array_types import Array, Index
 from wingfit.records.blas_threads import one_blas_thread
@@ -149,7 +149,9 @@ def basis(phase: Array, harmonics: int, derivative: int = 0, frequency: float = 
 
 def _turn(harmonics: int, phase: float) -> Array:
     angles = 2 * np.pi * phase * np.arange(1, harmonics + 1)
-    return np.asarray(linalg.block_diag(1.0, *([[np.cos(a), np.sin(a)], [-np.sin(a), np.cos(a)]] for a in angles)))
+    return np.asarray(
+        scipy.linalg.block_diag(1.0, *([[np.cos(a), np.sin(a)], [-np.sin(a), np.cos(a)]] for a in angles))
+    )
 
 
 def _most_harmonics(phase: Array) -> int:
@@ -204,7 +206,7 @@ def _between_beats(phase: Array, linear: LinearFit, group: Index, beats: int) ->
         pair = slice(2 * k - 1, 2 * k + 1)
         ratio = float(observed[pair].sum() / np.diag(covariance)[pair].sum())
         free = 2 * (beats - 1)
-        if stats.chi2.sf(ratio * free, free) < _UNLIKELY / (len(covariance) // 2):
+        if scipy.stats.chi2.sf(ratio * free, free) < _UNLIKELY / (len(covariance) // 2):
             scale[pair] = np.sqrt(ratio)
             raised.append(f"{k} ({np.sqrt(ratio):.1f} times)")
     if not raised:
@@ -232,7 +234,7 @@ def _lost(wide: LinearFit, used: int, frequency: float) -> Array:
         square = float(np.sum((bound * k**d) ** 2))
         if law is not None:
             power = 2 * (law[1] - d)
-            square += law[0] ** 2 * float(special.zeta(power, k[-1] + 1)) if power > 1 else float("inf")
+            square += law[0] ** 2 * float(scipy.special.zeta(power, k[-1] + 1)) if power > 1 else float("inf")
         lost[d] = rate * np.sqrt(square / 2)
     return lost
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from scipy import optimize, stats
+import scipy
 
 from wingfit.records import FourierFlap, FourierPitch, PassivePitch, WingMotion
 from wingfit.records.array_types import Array
@@ -216,7 +216,7 @@ def flap_frequency(times: Array, flap: Array) -> Frequency:
         return np.asarray(np.sum(X * y[:, None], axis=0))
 
     width = 0.5 / span
-    best = optimize.minimize_scalar(
+    best = scipy.optimize.minimize_scalar(
         cost, bounds=(first - width, first + width), method="bounded", options={"xatol": 1e-9 * first}
     )
     hertz = float(best.x)
@@ -226,7 +226,7 @@ def flap_frequency(times: Array, flap: Array) -> Frequency:
     joint = least_squares(t, np.column_stack([B, slope * (t - middle)]), y)
     moving, scatter = joint.coefficients[1:-1], joint.covariance[1:-1, 1:-1]
     size = float(moving @ np.linalg.solve(scatter, moving)) / len(moving)
-    p_value = len(t) * float(stats.f.sf(size, len(moving), max(len(t) - len(moving) - 2, 1)))
+    p_value = len(t) * float(scipy.stats.f.sf(size, len(moving), max(len(t) - len(moving) - 2, 1)))
     if p_value > _SIGNIFICANCE:
         raise ValueError(
             f"no significant flap frequency: the strongest period, {hertz:.4g} Hz, is explained by noise of "
@@ -281,7 +281,7 @@ def closest(flap: PeriodicFit) -> tuple[float, float]:
         return float(flap.at(np.array(phase), 1))
 
     near = (guess - 1 / 720, guess + 1 / 720)
-    phase = float(optimize.brentq(rate, *near)) if rate(near[0]) < 0 < rate(near[1]) else guess
+    phase = float(scipy.optimize.brentq(rate, *near)) if rate(near[0]) < 0 < rate(near[1]) else guess
     bend = float(flap.at(np.array(phase), 2))
     error = float(np.hypot(flap.error_at(np.array(phase), 1), flap.lost[1]))
     return phase % 1.0, error * flap.frequency / max(bend, 1e-12)

@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import signal
+import scipy
 
 from wingfit.records import LowPass
 from wingfit.records.array_types import Array
@@ -52,8 +52,8 @@ def kernels(low_pass: LowPass, rate: float) -> Kernels:
         rule = f"with samples at {rate:g} Hz it must be above 0 and at most {0.45 * rate:g} Hz"
         raise ValueError(f"cut-off {low_pass.cutoff:g} Hz; {rule}: choose a lower cut-off or record faster")
     frequency = np.fft.rfftfreq(_LENGTH, 1 / rate)
-    sections = signal.butter(low_pass.order, low_pass.cutoff, fs=rate, output="sos")
-    gain = np.abs(signal.sosfreqz(sections, frequency, fs=rate)[1]) ** 2
+    sections = scipy.signal.butter(low_pass.order, low_pass.cutoff, fs=rate, output="sos")
+    gain = np.abs(scipy.signal.sosfreqz(sections, frequency, fs=rate)[1]) ** 2
     full = np.stack([np.fft.irfft(gain * (2j * np.pi * frequency) ** d, _LENGTH) for d in range(3)])
     full = np.fft.fftshift(full[:, (-np.arange(_LENGTH)) % _LENGTH], axes=1)  # as weights of x[i + j]
     middle = _LENGTH // 2

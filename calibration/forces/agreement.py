@@ -10,8 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import CubicSpline
-from scipy.signal import periodogram
+import scipy
 
 from wingfit.calibration.forces.result import Agreement, ForceComparison, Quantity, Source
 from wingfit.calibration.forces.split_beats import Cut, pieces
@@ -73,7 +72,7 @@ def whole_beats(recording: Recording, forces: Array | None = None, points: int =
     phase = np.arange(points) / points
     values = recording.values if forces is None else forces
     seen = recording.valid.all(axis=1)
-    spline = CubicSpline(recording.times[seen], values[seen], axis=0)
+    spline = scipy.interpolate.CubicSpline(recording.times[seen], values[seen], axis=0)
     instants = (cut.gapless[:, None] + phase) / recording.condition.flap_frequency
     named = quantities(recording, spline(instants.ravel()))
     return Beats(phase, {name: value.reshape(instants.shape) for name, value in named.items()})
@@ -138,7 +137,7 @@ def spectrum(recording: Recording, forces: Array) -> tuple[Array, dict[Quantity,
     rate = (len(recording.times) - 1) / (recording.times[-1] - recording.times[0])
     frequency, density = np.empty(0), {}
     for name, values in quantities(recording, forces).items():
-        frequency, power = periodogram(values[samples], fs=rate, detrend="constant", axis=1)
+        frequency, power = scipy.signal.periodogram(values[samples], fs=rate, detrend="constant", axis=1)
         density[name] = power.mean(axis=0)
     return frequency, density
 

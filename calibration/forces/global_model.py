@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import brentq
+import scipy
 
 from wingfit.calibration.forces.result import GlobalGene, GlobalModel, LocalEstimate
 from wingfit.records import Condition
@@ -168,7 +168,7 @@ def _scatter2(design: Array, local: Array, variance: Array) -> float:
     if surplus(0.0) <= 0:
         return 0.0
     above = float(np.sum((local - local.mean()) ** 2)) + float(variance.max())
-    return float(brentq(surplus, 0.0, above, xtol=1e-12 * above))
+    return float(scipy.optimize.brentq(surplus, 0.0, above, xtol=1e-12 * above))
 
 
 def _left_out(k: int, design: Array, local: Array, errors: Array, identified: Mask, weighted: bool) -> float | None:

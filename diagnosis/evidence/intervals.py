@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.stats import t as student
+import scipy
 
 from wingfit.calibration.estimates.linearised import free_genes
 from wingfit.diagnosis.evidence.fit import PRIOR_SD, Fit
@@ -17,7 +17,7 @@ CONFIDENCE = 0.9
 
 def standard_errors(freedom: float = np.inf) -> float:
     """Half-width of a CONFIDENCE interval in standard errors, for errors known with ``freedom`` degrees of freedom."""
-    return float(student.ppf(0.5 + CONFIDENCE / 2, freedom))
+    return float(scipy.special.stdtrit(freedom, 0.5 + CONFIDENCE / 2))
 
 
 def covariance(data: WhitenedData, fit: Fit) -> Float[Array, "F F"]:

@@ -10,7 +10,7 @@ the filter, and its error is twice as large. The significance of the pulse is te
 from __future__ import annotations
 
 import numpy as np
-from scipy.stats import chi2
+import scipy
 
 from wingfit.diagnosis.evidence.context import FitContext
 from wingfit.diagnosis.evidence.fit import Fit
@@ -39,7 +39,7 @@ def locate_pulse(context: FitContext, fit: Fit) -> Interval | None:
     best = int(np.argmax(gains))
     low_passed_pulse = _pulses(context, phase[best], low_passed=True)
     decrease = explained(nuisance.project_out(low_passed_pulse), residual)
-    by_noise = float(chi2.isf(FALSE_ALARM_PROBABILITY / INSTANTS, len(low_passed_pulse)))
+    by_noise = float(scipy.stats.chi2.isf(FALSE_ALARM_PROBABILITY / INSTANTS, len(low_passed_pulse)))
     if decrease < max(MIN_EXPLAINED * float(residual @ residual), by_noise):
         return None
     beyond = max(float(whitened @ whitened) - decrease - len(whitened), 0.0)

@@ -7,7 +7,7 @@ variance s.
 from __future__ import annotations
 
 import numpy as np
-from scipy.optimize import minimize
+import scipy
 
 from wingfit.records.array_types import Array, Bool, Float, Index, Int, Mask
 
@@ -92,7 +92,10 @@ def _first_order(lines: Array, mean: Array, advance: float, harmonics: int) -> A
         return float(np.sum(np.log(density) + mean / density) + 1e-3 * np.sum(x**2))
 
     level = np.log(max(float(mean.mean()), 1e-300) / 2)
-    best = min((minimize(cost, [m, level, level], method="Nelder-Mead") for m in (-1.0, 1.5)), key=lambda r: r.fun)
+    best = min(
+        (scipy.optimize.minimize(cost, [m, level, level], method="Nelder-Mead") for m in (-1.0, 1.5)),
+        key=lambda r: r.fun,
+    )
     return model(best.x, np.arange(harmonics + 1, dtype=float))
 
 

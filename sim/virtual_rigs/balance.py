@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from scipy.signal import bilinear, butter, lfilter, sosfiltfilt
+import scipy
 
 from wingfit.records import (
     ChordStation,
@@ -194,19 +194,19 @@ def _by_beat(at: Array, memory: float, rng: np.random.Generator) -> Array:
     first = math.floor(at[0]) - 1
     beats = math.ceil(at[-1]) - first + 2
     white = rng.standard_normal(beats)
-    values = lfilter([math.sqrt(1 - memory**2)], [1.0, -memory], white)
+    values = scipy.signal.lfilter([math.sqrt(1 - memory**2)], [1.0, -memory], white)
     return np.asarray(np.interp(at, first + 0.5 + np.arange(beats), values))
 
 
 def _measured(force: Array, axis: int, balance: Balance, rng: np.random.Generator) -> Array:
     """The measured force [T] along an axis: the true one with resonance, drift and white noise."""
     b, a = _resonator(balance.resonance[axis], balance.damping, balance.rate)
-    spring_force = lfilter(b, a, force - force[0]) + force[0]  # at rest under the first force
-    rattle = lfilter(b, a, rng.standard_normal(len(force)))
+    spring_force = scipy.signal.lfilter(b, a, force - force[0]) + force[0]  # at rest under the first force
+    rattle = scipy.signal.lfilter(b, a, rng.standard_normal(len(force)))
     rattle *= balance.rattle / max(float(rattle.std()), 1e-300)
     slow = math.exp(-1 / (balance.rate * balance.drift_time))
     start = [slow * rng.standard_normal()]  # stationary from the beginning
-    drift, _ = lfilter([math.sqrt(1 - slow**2)], [1.0, -slow], rng.standard_normal(len(force)), zi=start)
+    drift, _ = scipy.signal.lfilter([math.sqrt(1 - slow**2)], [1.0, -slow], rng.standard_normal(len(force)), zi=start)
     white = balance.sensor * rng.standard_normal(len(force))
     return np.asarray(force + balance.participation * (spring_force - force) + rattle + balance.drift * drift + white)
 
@@ -214,7 +214,7 @@ def _measured(force: Array, axis: int, balance: Balance, rng: np.random.Generato
 def _resonator(frequency: float, damping: float, rate: float) -> tuple[Array, Array]:
     """Digital filter from the force on a damped oscillator to the force that its spring passes on."""
     omega = 2 * math.pi * frequency
-    b, a = bilinear([omega**2], [1.0, 2 * damping * omega, omega**2], fs=rate)
+    b, a = scipy.signal.bilinear([omega**2], [1.0, 2 * damping * omega, omega**2], fs=rate)
     return np.asarray(b), np.asarray(a)
 
 
@@ -222,4 +222,4 @@ def _decimation_filtered(forces: Array, every: int) -> Array:
     """Zero-phase anti-aliasing filter of ``forces`` [T, C] for decimation by ``every``."""
     if every == 1:
         return forces
-    return np.asarray(sosfiltfilt(butter(6, 0.8 / every, output="sos"), forces, axis=0))
+    return np.asarray(scipy.signal.sosfiltfilt(scipy.signal.butter(6, 0.8 / every, output="sos"), forces, axis=0))

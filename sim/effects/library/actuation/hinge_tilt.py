@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy
 
 from wingfit.sim.effects.contract import Parameter, Values, effect_of_drive
 from wingfit.sim.effects.ports.wing import WingScene
@@ -12,7 +12,9 @@ _FROM_TO = "from the described axis to the true one"
 
 
 def _wing(scene: WingScene, values: Values) -> None:
-    tilt = Rotation.from_rotvec(np.stack([np.zeros_like(values["y"]), values["y"], values["z"]], axis=1))
+    tilt = scipy.spatial.transform.Rotation.from_rotvec(
+        np.stack([np.zeros_like(values["y"]), values["y"], values["z"]], axis=1)
+    )
     axes = scene.lanes.hinge[:3].T  # as effects before have them
     scene.lanes.hinge[:3] = tilt.apply(axes).T
 
