@@ -267,8 +267,7 @@ def test_swapped_markers_do_not_change_the_scale() -> None:
 
 @pytest.mark.parametrize(("speed", "fine"), [(99.0, True), (101.0, False)])
 def test_speeds_above_those_of_a_dataset_are_refused(speed: float, fine: bool) -> None:
-    limits = VehicleRecordingFile.model_fields["airspeed_m_s"].metadata
-    assert any(getattr(limit, "high", None) == 100 for limit in limits), limits
+    assert VehicleRecordingFile.model_json_schema()["properties"]["airspeed_m_s"]["maximum"] == 100
     tracks = seen_from(np.outer(times(120), [0, speed, 0]), np.broadcast_to(LEVEL, (120, 3, 3)))
     if fine:
         free_flight(times(120), tracks, BODY, FILTER)
