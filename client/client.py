@@ -301,9 +301,10 @@ class Client(DiagnosisCalls, KeyCalls):
         outputs: Sequence[str] | None = None,
         effects: Sequence[str] = (),
     ) -> Loads:
-        """Simulate a genome for its loads, where ``condition`` may change the recording's.
+        """Simulate the loads of a genome under the condition of a recording, changed by ``condition``.
 
-        Its names: flap_frequency_hz, phase_lag_deg, pressure_mbar, temperature_c, airspeed_m_s, angle_of_attack_deg.
+        Keys of ``condition``: flap_frequency_hz, phase_lag_deg, pressure_mbar, temperature_c, airspeed_m_s,
+        angle_of_attack_deg.
         """
         loads = True if outputs is None else list(outputs)
         wing = {"division": division, "accuracy_mm": accuracy_mm, "outputs": loads}

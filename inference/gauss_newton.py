@@ -49,7 +49,7 @@ class Quadratic:
 
 @dataclass(frozen=True)
 class Trials:
-    """Points [S, F] that one damping each leads to, with the decrease of the cost that was predicted and that came.
+    """Points [S, F] reached with one damping each, with the predicted and the actual decrease of the cost.
 
     ``decrease`` is -inf for a point that cannot be simulated.
     """
@@ -65,13 +65,14 @@ class Trials:
         return cls(units, predicted, before - np.where(failed, np.inf, after))
 
     def best(self, least_gain: float = 0.0) -> int | None:
-        """The point with the largest decrease among those with more than ``least_gain`` of what was predicted.
+        """Index of the point with the largest decrease of the cost; None where no point qualifies.
 
-        At a bound a step may be round-off alone: one whose predicted decrease is not positive does not count.
+        Its decrease must exceed ``least_gain`` times the predicted one, and the predicted one must be positive: at a
+        bound, a step may be round-off alone.
         """
         good = (self.predicted > 0.0) & (self.decrease > least_gain * self.predicted)
         return int(np.argmax(np.where(good, self.decrease, -np.inf))) if good.any() else None
 
     def gain(self, k: int) -> float:
-        """Decrease that came over the decrease that was predicted."""
+        """Actual decrease of the cost at point ``k``, divided by the predicted one."""
         return float(self.decrease[k] / self.predicted[k])

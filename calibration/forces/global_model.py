@@ -142,7 +142,11 @@ def _gene(name: str, estimates: Sequence[LocalEstimate], design: Array, weighted
 
 
 def _fit(design: Array, local: Array, errors: Array, weighted: bool) -> tuple[Array, float | None]:
-    """Coefficients of the law, and its scatter where that can be estimated."""
+    """Fit the law to a coefficient's ``local`` estimates, one for each condition, with standard ``errors``.
+
+    Returns the coefficients of the law, and the scatter of the estimates about it beyond their errors (None where that
+    cannot be estimated). ``design`` has one row for each condition.
+    """
     conditions, coefficients = design.shape
     if not weighted or conditions - coefficients < FREE_FOR_SCATTER or not np.isfinite(errors).all():
         return _weighted(design, local, np.ones(conditions)), None

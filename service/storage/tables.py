@@ -130,7 +130,7 @@ class RunRow(JobRow, Table):
 
 
 class DiagnosisRow(JobRow, Table):
-    """A diagnosis; its ``generations`` are steps. ``run_id`` is the run that it started from, while that exists."""
+    """A diagnosis. ``generations`` counts its steps; ``run_id`` is the run it began with, None once deleted."""
 
     __tablename__ = "diagnosis"
 

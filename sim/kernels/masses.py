@@ -135,7 +135,7 @@ def _by_twist(M: Six, omega: Three, v: Three, factor: float) -> Six:
 
 @inlined
 def _with_motion(A: Six, omega: Three, v: Three, length: float) -> Six:
-    """A (I - l A_j), A_j being that of body j: I - l A_j = [[I + l omega~ / 2, 0], [l v~, I]]."""
+    """A (I - l A_j) for a body j with the twist (omega, v): I - l A_j = [[I + l omega~ / 2, 0], [l v~, I]]."""
     half = 0.5 * length
     return (
         plus(A[0], plus(scaled(half, times_skew(A[0], omega)), scaled(length, times_skew(A[1], v)))),

@@ -26,10 +26,10 @@ _SIGNIFICANT = 1e-2  # relative to the largest singular value, for the estimatio
 
 @dataclass
 class Secants:
-    """Secant information on the beat's map, from successive beats of one individual.
+    """The latest beats of one individual, and the secants (differences of successive beats) between them.
 
-    Coordinates are relative to the pose ``about``; twists are divided by ``angular_rate`` (rad/s) of the beat, so that
-    all coordinates are in metres. ``window`` is the number of secants that are stored.
+    At most ``window`` secants are stored. Coordinates are relative to the pose ``about`` and in metres: rotations are
+    multiplied by a length, and velocities are divided by ``angular_rate`` (rad/s) of the beat.
     """
 
     about: State

@@ -61,7 +61,7 @@ def track_noise(noise: Noise, frames: int, markers: int, rng: np.random.Generato
 def coloured(colour: Colour, memory: float, shape: tuple[int, ...], rng: np.random.Generator) -> Array:
     """Noise along the first axis of ``shape``, with expected variance one.
 
-    For "shake" only the part that is not common.
+    For "shake", this is only the part that differs between markers.
     """
     if colour == "pink":
         return _pink(shape, rng)

@@ -49,7 +49,10 @@ def strip_matrix(structure: Structure, strip: int) -> Array:
 def _strip_matrix(
     stations: tuple[Station, ...], y0: float, y1: float, centres: tuple[tuple[float, float], ...]
 ) -> Array:
-    """As :func:`strip_matrix`, from planform, ends of the strip and centres of mass of its bodies (m); read-only."""
+    """The matrix of :func:`strip_matrix`, for the strip from ``y0`` to ``y1`` (m); cached and read-only.
+
+    ``centres`` [n]: x and y of the centres of mass of the strip's bodies, m.
+    """
     count = len(centres)
     total = np.zeros((6 * count, 6 * count))
     nodes, weights = np.polynomial.legendre.leggauss(4)

@@ -67,8 +67,8 @@ EFFECT = fault_of_tracks(
     "2 (1 - s)^3 smoothing = s (1 + s),   alpha = 1 - s^2,   beta = 2 (1 - s)^2,   gamma = beta^2 / (2 alpha)",
     source="Kalata (1984), The tracking index, and Bar-Shalom, Li and Kirubarajan (2001), Estimation with Applications "
     "to Tracking and Navigation, sections 6.3.3 and 6.5: Kalman filter of constant acceleration in steady state",
-    signature="higher harmonics are smaller, and late in the order of the frames (which is early in the beat if the "
-    "strobe is faster than the wing), alike at all flap frequencies with equally many frames per apparent beat",
+    signature="higher harmonics are too small and lag in the order of the frames (in the beat they lead, if the strobe "
+    "is faster than the wing), by amounts that depend only on the number of frames per apparent beat",
     confused_with=("camera_desync", "rolling_shutter"),
     observe=_observe,
 )
