@@ -117,7 +117,7 @@ class WingSubject(_Rig):
         return model.beside(genome) if isinstance(model, FlexibleWing) else model
 
     def finer_subjects(self) -> tuple[WingSubject, ...]:
-        """More strips with as many bodies along the chord; then more strips with the next even number of these.
+        """Models with more strips and the same chordwise bodies, then with the next even number of chordwise bodies.
 
         Strips alone do not show the chordwise bending that a discretisation omits, which is most of the error of a
         coarse one (Robird wing with 4 bodies: 4 to 6 mm, in 8 strips no less; with 24 bodies 1 mm), except where the
@@ -193,7 +193,7 @@ class VehicleSubject(_Rig):
         return model
 
     def finer_subjects(self) -> tuple[VehicleSubject, ...]:
-        """Twice as many elements and instants; empty where the forces change less than FORCE_TOLERANCE, or too many."""
+        """A model with twice as many elements and instants; none if its forces differ little or it is too large."""
         return self._finer
 
     @cached_property

@@ -76,7 +76,7 @@ def differences(
 
 
 def _slopes(base: Array, neighbours: Array, failed: Mask, width: Array) -> Array:
-    """[..., K] of one output, known at the point [...] and at its neighbours [K, ...] or [2 K, ...]."""
+    """Slopes [..., K] of one output by K genes, from its values at the base point and at K or 2 K neighbours."""
     values = np.where(failed.reshape(-1, *[1] * base.ndim), base, neighbours)
     down = values[len(width) :] if len(values) > len(width) else base
     change = np.where(np.isfinite(base), values[: len(width)] - down, 0.0)

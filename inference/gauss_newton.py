@@ -25,7 +25,7 @@ class Quadratic:
 
     @classmethod
     def of(cls, whitened: Sequence[tuple[Array, Array]]) -> Quadratic:
-        """Of 1/2 the sum of squares of whitened residuals [N] with sensitivities [N, F], summed over recordings."""
+        """Half the sum of squares; ``whitened`` has (residual [N], sensitivities [N, F]) of each recording."""
         return cls(
             np.asarray(sum(steep.T @ steep for _, steep in whitened), float),
             np.asarray(sum(steep.T @ white for white, steep in whitened), float),
@@ -60,7 +60,7 @@ class Trials:
 
     @classmethod
     def of(cls, units: Array, predicted: Array, before: float, after: Array, reasons: Sequence[str | None]) -> Trials:
-        """From the costs ``before`` the step and ``after`` it [S], and why individuals failed."""
+        """Trials at ``units`` [S, F] with costs ``before`` and ``after`` [S] the step; ``reasons`` say which failed."""
         failed = np.array([reason is not None for reason in reasons], bool)
         return cls(units, predicted, before - np.where(failed, np.inf, after))
 

@@ -26,7 +26,7 @@ class Nuisance:
 
     @classmethod
     def of(cls, slopes: Float[Array, "N F"]) -> Nuisance:
-        """From whitened sensitivities [N, F]."""
+        """The test for a model with the whitened sensitivities ``slopes`` [N, F]."""
         basis, power, _ = np.linalg.svd(slopes, full_matrices=False)
         return cls(basis[:, power > DEPENDENT * power.max(initial=0.0)])
 

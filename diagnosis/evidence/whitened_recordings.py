@@ -99,10 +99,10 @@ class WhitenedData:
         return min(self.policy.effective_samples * len(self.recordings), self.policy.max_effective_samples)
 
     def deviance(self, coefficients: Float[Array, "*B D"]) -> Float[Array, "*B"]:
-        """Minus twice the log-likelihood [...] of coefficients [..., D]: noise plus a model error of unknown size.
+        """Minus twice the log-likelihood [...] of residual coefficients [..., D], for noise plus a model error.
 
-        The chi-squared beyond its expectation D is a model's error, of which only ``effective_samples`` are
-        independent, not as many as there are samples; its logarithm counts (a Student-like likelihood).
+        The chi-squared beyond its expectation D is attributed to an error of the model. Of this error only
+        ``effective_samples`` are independent, and its size is unknown, so its logarithm counts (as in Student's t).
         """
         beyond = self._chi_squared_excess(coefficients)
         whole = ((coefficients / self.scale) ** 2).sum(axis=-1)

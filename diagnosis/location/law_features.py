@@ -28,7 +28,7 @@ class Feature:
 
 @dataclass(frozen=True)
 class Window:
-    """A part of the wing or beat: ``field`` [stations, instants] is 1 inside, 0 outside. No ``words`` for the whole."""
+    """A part of the wing or beat. ``field`` [stations, instants] is 1 inside; ``words`` names it, "" for the whole."""
 
     words: str
     field: Callable[[StationMotion], Array]

@@ -23,10 +23,11 @@ _RODS = (((1.0, 1.0),), ((1.0, 0.0),), ((0.0, 1.0),), ((1.0, 0.0), (0.0, 1.0))) 
 
 
 class LoadFamily(NamedTuple):
-    """A family of loads (forces and moments) along the span; ``places``: centre, width and chord location, if any.
+    """A family of loads (forces and moments) along the span.
 
-    ``shapes``: K of them, [Z, stations] each; a load is their sum with independent sizes. ``share``: prior probability
-    of each. ``drive_error``: turns of the two rods, which follow the stations.
+    Each load of the family is a sum of the K ``shapes`` [Z, stations], with independent sizes. ``places`` has the
+    centre, width and chord location of each load, None where it has none. ``share`` is the prior probability of each
+    load. With ``drive_error``, the columns after the stations are rotations of the two rods.
     """
 
     shapes: tuple[Array, ...]

@@ -26,7 +26,7 @@ MAX_CONDITIONS_IF_CERTAIN = 8  # conditions
 
 
 def rival_refits(weights: HypothesisWeights) -> list[Refit]:
-    """Hypotheses that are still probable, most probable first; a single one with the next; else empty."""
+    """The probable hypotheses, most probable first; a single one together with the next one; empty if none is."""
     order = np.argsort(-weights.probabilities, kind="stable")
     rivals = [k for k in order if weights.probabilities[k] >= MIN_PROBABILITY]
     return [weights.refits[k] for k in (order[:2] if len(rivals) == 1 else rivals)[:MAX_RIVALS]]

@@ -68,7 +68,7 @@ def decide(weights: HypothesisWeights) -> Decision:
 
 
 def _common_subset(possible: Sequence[Refit]) -> Refit | None:
-    """The hypothesis contained in all others: it is missing whether or not more is. None where there is none."""
+    """The hypothesis whose effects all other ``possible`` hypotheses include as well; None if there is none."""
     return next((one for one in possible if all(set(one.names) <= set(other.names) for other in possible)), None)
 
 

@@ -40,7 +40,7 @@ def beat_scores(
 
 
 def beat_score_covariance(scores: Float[Array, "B F"], samples_used: float, absorbed: float) -> Float[Array, "F F"]:
-    """Covariance [F, F] of the sum of all scores of a recording, from those of its B whole beats [B, F].
+    """Covariance [F, F] of the sum of all scores of a recording, from the ``scores`` [B, F] of its B whole beats.
 
     A fit to this recording alone makes its scores add up to zero, as if their mean had been taken off; of what the
     taper sums, that loses the share sum_k taper_k (B - |k|) / B^2. Of a fit to several recordings this one bears the

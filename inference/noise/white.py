@@ -55,5 +55,5 @@ class Noise:
 
 
 def whitened_sensitivity(noise: Noise, sensitivity: Float[Array, "T C F"]) -> Float[Array, "T C F"]:
-    """[T, C, F] of the whitened residuals from that of the residuals."""
+    """Sensitivities of the whitened residuals, from ``sensitivity`` of the residuals by F genes."""
     return np.asarray(np.einsum("tcf,cd->tdf", sensitivity, noise.whitening, optimize=True))

@@ -48,7 +48,7 @@ class RodDrive:
 
 @lru_cache(maxsize=64)
 def _angles(phases: bytes, both: bytes) -> Array:
-    """[T, 2, 5] at phases [T] of the series [K + 1, 2] of both rods. Cached, since batches use few of them."""
+    """Angles of both rods and their first four derivatives by phase [T, 2, 5], at T phases; cached for batches."""
     series = np.frombuffer(both, np.complex128).reshape(-1, 2)
     turn = _turns(phases, len(series))
     order = (1j * np.arange(len(series))) ** np.arange(5)[:, None]

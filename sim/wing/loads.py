@@ -67,7 +67,7 @@ def _fine(model: FlexibleWing) -> FlexibleWing:
 
 
 def crossing(model: FlexibleWing, recording: Recording, tracks: Array) -> float:
-    """Drive phase (beats) of the upstroke crossing of ``tracks`` [n, M, 3]; 0 where there is none.
+    """Drive phase (beats) at which simulated ``tracks`` [n, M, 3] cross the mid-stroke upwards; 0 if they never do.
 
     From the same markers as for the recording, so that both phases agree; from all reference markers without data.
     """

@@ -72,7 +72,10 @@ def _strip_matrix(
 
 
 def _normal_motion(y: float, middle: float, centre: tuple[float, float]) -> list[tuple[int, float, float]]:
-    """Per twist component of a body: its index, and the normal velocity at span ``y``, at mid-chord and per x."""
+    """Normal velocity of a wing section due to each twist component of its body.
+
+    Returns (index of the component, velocity at mid-chord, its change per metre along x), at span ``y``.
+    """
     return [(0, y - centre[1], 0.0), (1, centre[0] - middle, -1.0), (5, 1.0, 0.0)]
 
 
