@@ -42,9 +42,10 @@ def child_environment(**more: str) -> Iterator[None]:
 
 
 def lower_priority() -> None:
-    """Lower the priority of this thread, and of what it starts, so that the API has priority."""
-    with suppress(OSError):  # it is lower already
-        os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), NICENESS)
+    """Raise the niceness of this thread, and of what it starts, to at least ``NICENESS``: the API has priority."""
+    this = threading.get_native_id()
+    with suppress(OSError):  # on systems that know no niceness of threads
+        os.setpriority(os.PRIO_PROCESS, this, max(NICENESS, os.getpriority(os.PRIO_PROCESS, this)))
 
 
 @dataclass(frozen=True)

@@ -74,7 +74,7 @@ async def export_run(
 
 
 async def _while_awaited(request: Request, make: Callable[[Callable[[], bool]], bytes]) -> bytes:
-    """Run ``make`` in a thread and return its result; its argument tells whether the client has disconnected."""
+    """Run ``make`` in a thread and return its result. Its argument, a function, says whether the client has left."""
     gone = threading.Event()
     making = asyncio.ensure_future(run_in_threadpool(make, gone.is_set))
     while not making.done():
