@@ -56,7 +56,7 @@ def _observe(sampling: Sampling, values: Values) -> None:
     sampling.filtered(response(values["smoothing"], order * step))
 
 
-_TEXT = "position noise that the filter assumes, over its acceleration noise times the frame time squared"
+_TEXT = "position noise divided by (acceleration noise times frame time squared), as the filter assumes them"
 
 EFFECT = fault_of_tracks(
     name="tracker_lag",
@@ -68,7 +68,8 @@ EFFECT = fault_of_tracks(
     source="Kalata (1984), The tracking index, and Bar-Shalom, Li and Kirubarajan (2001), Estimation with Applications "
     "to Tracking and Navigation, sections 6.3.3 and 6.5: Kalman filter of constant acceleration in steady state",
     signature="higher harmonics are smaller, and late in the order of the frames (which is early in the beat if the "
-    "strobe is faster than the wing), alike at all flap frequencies with equally many frames per apparent beat",
+    "strobe is faster than the wing), alike at all flap frequencies at which an apparent beat has the same number of "
+    "frames",
     confused_with=("camera_desync", "rolling_shutter"),
     observe=_observe,
 )
