@@ -82,7 +82,7 @@ class Fitted:
 
     @property
     def local(self) -> LocalEstimate:
-        """As input of the global model."""
+        """The estimate in the form that the global model is fitted to."""
         found, name = self.estimate, self.recording.name
         bounds = dict(zip(found.free, np.sqrt(np.diag(found.uncertainty.covariance)).tolist(), strict=True))
         return LocalEstimate(name, (name,), found.values, bounds, (), (), found.uncertainty.cost, True, ())
@@ -209,7 +209,7 @@ def mean_lift(fitted: list[Fitted]) -> tuple[float, float]:
 
 
 def widest(ranges: list[tuple[float, float] | None]) -> list[float] | None:
-    """From the earliest start to the latest end; None if one of them is not located."""
+    """Smallest interval that contains all ``ranges``; None if one of them is None."""
     known = [one for one in ranges if one is not None]
     return [min(r[0] for r in known), max(r[1] for r in known)] if len(known) == len(ranges) else None
 

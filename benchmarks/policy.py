@@ -83,7 +83,7 @@ def sample(wings: int) -> list[Trial]:
 
 
 def varied(name: str, factor: float) -> float:
-    """The value of a threshold at so many times its value, of a fraction at so many times its odds."""
+    """The threshold ``name`` times ``factor``; for a threshold that is a fraction, its odds are multiplied instead."""
     value = float(getattr(POLICY, name))
     if name not in PROBABILITIES:
         return value * factor

@@ -70,7 +70,7 @@ def drawn(state: Distribution, seed: int, stage: str, size: int) -> Array:
 
 
 def learnt(state: Distribution, unit: Array, fitness: Array, distance: Array, tolerance: float) -> Distribution:
-    """The distribution after a generation ``unit`` [size, F]; a generation of which too many failed only narrows it."""
+    """The distribution after a generation ``unit`` [size, F]; it only narrows if more than half of these failed."""
     scores = [finite(f) for f in fitness]
     good = [f for f in scores if f < FAILED]
     first = int(np.argmin(scores))
@@ -95,7 +95,7 @@ def learnt(state: Distribution, unit: Array, fitness: Array, distance: Array, to
 
 
 def _strategy(state: Distribution, size: int) -> Any:
-    """DEAP's strategy in the state."""
+    """DEAP's strategy object for generations of ``size`` individuals, set to ``state``."""
     strategy = cma.Strategy(state.centroid, state.sigma, lambda_=size, cmatrix=np.array(state.covariance))
     strategy.ps, strategy.pc = np.array(state.step_path), np.array(state.path)
     strategy.update_count = state.updates

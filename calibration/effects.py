@@ -20,12 +20,12 @@ def effect_of(gene: str) -> Effect | None:
 
 
 def sizes(effect: Effect) -> tuple[str, ...]:
-    """Genes of which zero switches ``effect`` off."""
+    """The sizes of ``effect``: it is switched off when all these genes are zero."""
     return tuple(f"{effect.name}.{parameter.name}" for parameter in effect.size)
 
 
 def is_size(gene: str) -> bool:
-    """Whether zero of a gene helps to switch an effect off."""
+    """Whether a gene is a size of an effect, which is switched off when all its sizes are zero."""
     effect = effect_of(gene)
     return effect is not None and gene in sizes(effect)
 

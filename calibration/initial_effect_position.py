@@ -1,9 +1,10 @@
 """The initial place of an effect that is switched off when Gauss-Newton starts.
 
-At size zero the genes that say where an effect acts, and how, have no slope: nothing would move them until the size
-has moved, and a place that is far off may push that back to zero. But there they have no meaning either, so they may be
-moved for nothing: to where a small size, all other genes adapting, would lower the misfit most. The size stays zero,
-and the start simulates to what it did.
+While the size of an effect is zero, the misfit does not depend on the genes that say where and how the effect acts. So
+Gauss-Newton cannot move them, and from a wrong place it may keep the size at zero. Therefore, before the first
+iteration, they are set to the place at which a small size would lower the misfit most after all other genes have
+adapted.
+The size stays zero, so the simulation of the start does not change.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ SMALL = 0.02  # of a size's box
 
 
 def placed(problem: Problem, evaluator: Evaluator, unit: Array) -> tuple[Array, int]:
-    """Start [F] in unit coordinates with effects at zero moved to the best place, and the individuals evaluated."""
+    """Start [F] in unit coordinates, with effects of size zero at their best place; number of individuals evaluated."""
     effects = _movable(problem, unit)
     if not effects:
         return unit, 0
@@ -47,7 +48,7 @@ def placed(problem: Problem, evaluator: Evaluator, unit: Array) -> tuple[Array, 
 
 @dataclass(frozen=True)
 class _Weighed:
-    """Whitened residuals at the start [N], and what the other genes can do to them."""
+    """Whitened residuals [N] at the start, and the changes of them that the other genes can make."""
 
     noise: list[Noise]
     white: Array
@@ -64,7 +65,7 @@ class _Weighed:
         return cls(noise, white, Nuisance.of(np.concatenate(slopes)))
 
     def gains(self, evaluation: Evaluation, limits: tuple[Array, Array]) -> list[float]:
-        """Decrease of the sum of squares by each place, a block of S individuals with multiples within ``limits``."""
+        """Decrease of the sum of squares at each place; each has S individuals in ``evaluation``, one per size."""
         parts = zip(self.noise, residuals_of(evaluation), strict=True)
         after = np.concatenate([n.whitened(v).reshape(len(v), -1) for n, v in parts], axis=1)
         blocks = (after - self.white).reshape(-1, len(limits[0]), len(self.white))

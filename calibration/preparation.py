@@ -99,13 +99,13 @@ def _stages(mode: Mode | None, free: tuple[str, ...], recordings: tuple[Recordin
 
 
 def as_fitted(spec: CalibrationSpec, recording: Recording) -> Recording:
-    """``recording`` as it is fitted: forces low-passed, unless they have been or are not to be."""
+    """``recording`` as it is fitted: forces are low-passed, unless they already are or ``spec`` asks for no filter."""
     through = fitted_through(spec, recording)
     return recording if through in (None, recording.low_pass) else low_passed(recording, through)
 
 
 def fitted_through(spec: CalibrationSpec, recording: Recording) -> LowPass | None:
-    """The filter through which forces go before they are fitted, or have gone; None for tracks, and where none is."""
+    """The low-pass of the fitted forces, applied before or after recording; None for tracks and unfiltered forces."""
     if recording.kind == "tracks" or spec.low_pass == 0 or recording.low_pass is not None:
         return recording.low_pass
     return LowPass(spec.low_pass or default_cutoff(recording.condition.flap_frequency))

@@ -191,7 +191,7 @@ class _Run:
         self, genome: dict[str, float], evaluated: int, progress: float, stage: str, index: int,
         best: float, mean: float, diversity: float, distance: float, reasons: list[str],
     ) -> Generation:  # fmt: skip
-        """A generation as it is shown; the state has moved on."""
+        """Update the state with a finished generation, and return the report on it."""
         state = self.state
         state.found[self.stage.name] = dict(genome)
         state.evaluations += evaluated

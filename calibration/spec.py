@@ -70,7 +70,7 @@ class CalibrationSpec:
 
 
 def resolved(spec: CalibrationSpec, dataset: Dataset) -> CalibrationSpec:
-    """``spec`` with mode and method decided; ValueError for one that there is not, or not for this dataset."""
+    """``spec`` with mode and method decided; ValueError for one that does not exist or does not fit the dataset."""
     wing = dataset.kind == "tracks"
     mode, method = spec.mode or ("staged" if wing else "local"), spec.method or ("genetic" if wing else "gauss_newton")
     for what, value, known in (("mode", mode, get_args(Mode)), ("method", method, get_args(Method))):

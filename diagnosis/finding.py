@@ -201,7 +201,7 @@ class RecordingMisfit:
 
 @dataclass(frozen=True)
 class Overlay:
-    """One channel over one beat: recorded mean beat (samples at their phases) and simulations before and after."""
+    """One channel over one beat: the recording, and the simulation before and after the diagnosis added effects."""
 
     recording: str
     channel: str

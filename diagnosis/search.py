@@ -239,7 +239,10 @@ def _nominal_from_best(state: SearchState) -> Refit | None:
 
 
 def _refits(state: SearchState, at_least: Refit | None) -> Steps:
-    """Refit single suspects, then some from the estimates and several together while the residual is not explained."""
+    """Refit suspects one at a time; if no refit explains the residual, refit from other starts and in combinations.
+
+    If ``at_least`` is given and no single refit is clearly better than it, there are no further refits.
+    """
     yield from _single_refits(state)
     yield 0.72, "continuing the best refits"
     if _continue_best(state):

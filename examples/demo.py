@@ -115,7 +115,7 @@ def keep(url: str) -> NoReturn:
 
 
 def true_values(path: Path) -> dict[str, float]:
-    """The true genome of the recordings, with shares normalised as in the results."""
+    """The true genome of the recordings; as in the results, the genes that are shares of one quantity sum to 1."""
     from wingfit.sim.virtual_rigs.campaign import read_truth  # imported late, because it compiles kernels
 
     return read_truth(path).normalised()

@@ -296,7 +296,7 @@ class VehicleBench(Bench[Array, Weighing]):
         return replace(quality, **smaller)
 
     def least(self, quality: Weighing) -> float:  # noqa: ARG002
-        """A third: the mean of nine times as many beats."""
+        """A third of the noise, which the mean over nine times as many beats would have."""
         return 1 / 3
 
     def ideal(self, quality: Weighing) -> Weighing:

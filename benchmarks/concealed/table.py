@@ -64,7 +64,7 @@ def at(marks: Iterable[Mark], d: int) -> list[Mark]:
 
 
 def seen(marks: Iterable[Mark]) -> list[Mark]:
-    """Scores of trials that are strong enough to count."""
+    """Scores of the trials whose hidden effect is strong enough to count: its strength is at least ``WEAK``."""
     return [one for one in marks if one.strength >= WEAK]
 
 

@@ -224,7 +224,7 @@ DEATHS: dict[str, Callable[[Server, Cluster | None, np.random.Generator], bool |
 
 
 def _quiet(server: Server, ledger: Ledger, expected: dict[str, Json]) -> int:
-    """Let everything end undisturbed and check it; the number of jobs that do not end."""
+    """Let all jobs end undisturbed and check their results; returns the number of jobs that do not end."""
     with httpx.Client(base_url=f"http://127.0.0.1:{server.port}", timeout=60.0) as http:
 
         def fetch(path: str) -> Json | None:
@@ -254,7 +254,7 @@ def _quiet(server: Server, ledger: Ledger, expected: dict[str, Json]) -> int:
 
 
 def _diagnoses(ledger: Ledger, fetch: Callable[[str], Json | None], expected: Json, deadline: float) -> int:
-    """The same for diagnoses."""
+    """Wait for the diagnoses and check their findings; returns the number of those that do not end."""
     left = [diagnosis for diagnosis, state in ledger.diagnoses.items() if state is None]
     while left and time.monotonic() < deadline:
         for diagnosis in list(left):

@@ -1,7 +1,8 @@
 """The same wing in Exudyn (Gerstmayr, *Exudyn - a C++-based Python package for flexible multibody systems*, 2024).
 
-Rigid bodies with Tait-Bryan angles, one six-axis spring-damper per connector, both driving rods bodies whose angle is
-constrained to the drive's; generalised alpha, modified Newton, sparse solver, one thread. Needs the extra ``peers``.
+The bodies are rigid and have Tait-Bryan angles; each connector is a six-axis spring-damper. The two driving rods are
+bodies too, with their angles constrained to those of the drive. The integrator is the generalised-alpha method with a
+modified Newton iteration and a sparse solver, on one thread. Needs the extra ``peers``.
 """
 
 from __future__ import annotations

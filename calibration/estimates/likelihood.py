@@ -52,13 +52,13 @@ class Step:
     Attributes:
         index: number of the iteration, from 0.
         values: of the free genes after it.
-        cost: Eq. 22 before it, with R of then.
+        cost: Eq. 22 before the iteration, with the R estimated in it.
         fitness: sum of squares after it (:attr:`wingfit.calibration.problem.Misfit.squares`).
         distance: misfit after it, m or N.
         step: largest move of a gene, unit coordinates.
-        gain: decrease of the cost over the decrease promised; 0 when no step was better.
+        gain: decrease of the cost over the decrease that the linearised problem predicts; 0 if no step was better.
         evaluations: individuals evaluated in it.
-        reasons: of those that failed.
+        reasons: why individuals failed.
         converged: whether this is the last.
     """
 
@@ -101,7 +101,7 @@ class _State:
 
 @dataclass(frozen=True)
 class _Move:
-    """A step taken or, where nothing was better, not taken."""
+    """The outcome of one iteration: the best step or, if no step lowers the cost, the unchanged genome."""
 
     unit: Array
     step: float
@@ -165,7 +165,7 @@ def estimate(problem: Problem, evaluator: Evaluator, start: Mapping[str, float])
 
 
 def at_bounds(genes: list[Gene], values: Mapping[str, float]) -> tuple[str, ...]:
-    """Remarks on genes that the box stopped; a size of zero is no stop, but an effect's absence."""
+    """Remarks on genes whose values are at a bound, except sizes of zero: they mean that an effect is absent."""
     genes = [gene for gene in genes if values[gene.name] != 0.0 or not is_size(gene.name)]
     found = np.array([values[gene.name] for gene in genes])
     return tuple(

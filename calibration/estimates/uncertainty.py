@@ -185,12 +185,12 @@ class _Part:
         return np.asarray(np.einsum("tcp,tcq->pq", self.sensitivity, self.sensitivity, optimize=True))
 
     def from_beat_to_beat(self, bread: Array) -> Array:
-        """Covariance [F, F] of the sum of scores, from their series of beats."""
+        """Covariance [F, F] of the sum of scores, estimated from their scatter between beats."""
         absorbed = float(np.trace(bread @ self.information)) / len(bread)
         return beat_score_covariance(self.scores, self.used, absorbed)
 
     def block(self) -> Block:
-        """For the correlations of samples."""
+        """The residuals and sensitivities from which the correlation between samples is estimated."""
         white, forces = self.white, self.record.kind == "forces"
         if forces:
             white = without_mean_beat(self.record, white, len(self.scores))
@@ -213,7 +213,7 @@ def _from_samples(parts: list[_Part], bread: Array) -> Array:
 
 
 def _slopes(genes: list[Gene], values: Array) -> tuple[Array, Array]:
-    """Per unit coordinate: change of each value, and the same relative to the value."""
+    """Derivatives [F] of the values by their unit coordinates, and the same derivatives relative to the values."""
     width = np.array([np.log(g.upper / g.lower) if g.scale == "log" else g.upper - g.lower for g in genes])
     log = np.array([gene.scale == "log" for gene in genes])
     size = np.where(log, 1.0, np.maximum(np.abs(values), SMALL * width))
@@ -221,7 +221,7 @@ def _slopes(genes: list[Gene], values: Array) -> tuple[Array, Array]:
 
 
 def _share_map(genes: list[Gene], base: Genome) -> Array:
-    """From the logarithms of weights to those of the normalised shares, which are what people compare.
+    """Matrix [F, F] from relative changes of the weights to relative changes of the normalised shares.
 
     The sum of a group runs over all its weights, also those that are not searched.
     """

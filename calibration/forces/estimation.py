@@ -282,7 +282,7 @@ def _misfit_remark(judged: _Judged, everywhere: list[_Compared]) -> str | None:
 
 
 def _rms(some: list[_Compared], order: tuple[Source, ...]) -> float | None:
-    """RMS difference over all samples of the recordings, each beside the first source in ``order`` that it has.
+    """RMS difference over all samples; each recording is compared with the first source in ``order`` that it has.
 
     None where no recording has the fitted axes.
     """
@@ -300,9 +300,9 @@ def _left_out(
     nominal: Genome,
     estimates: list[LocalEstimate],
 ) -> tuple[tuple[Agreement, ...], tuple[str, ...]]:
-    """Agreements with each fitted recording of the law fitted without it, none where the rest is too little.
+    """For each fitted recording, how a global model that was fitted without this recording agrees with it.
 
-    Also remarks on these laws.
+    There is none where the other recordings do not determine a global model. Also remarks on these models.
     """
     found: list[Agreement] = []
     remarks: list[str] = []

@@ -176,7 +176,7 @@ def _scatter2(design: Array, local: Array, variance: Array) -> float:
 
 
 def _left_out(k: int, design: Array, local: Array, errors: Array, identified: Mask, weighted: bool) -> float | None:
-    """Relative error at condition ``k`` of the law fitted without it; None where the rest determines no law."""
+    """Relative error, at condition ``k``, of the law fitted to the other conditions; None if they determine no law."""
     rest = identified.copy()
     rest[k] = False
     if rest.sum() < design.shape[1] or not _independent(design[rest]):
@@ -186,7 +186,7 @@ def _left_out(k: int, design: Array, local: Array, errors: Array, identified: Ma
 
 
 def _sizes(local: Array) -> Array:
-    """What errors are relative to: the coefficients, where they are not so small that nothing could be relative."""
+    """Denominators of relative errors: the sizes of the coefficients, but at least SMALL times their RMS."""
     least = SMALL * float(np.sqrt(np.mean(local**2)))
     return np.maximum(np.abs(local), least if least > 0 else 1.0)
 

@@ -5,8 +5,9 @@ ends. Each file is read by a new process, so that a file cannot affect the next 
 the internal storage format (:mod:`wingfit.records.files.parsed`), which the caller checks again.
 
 ``python -m wingfit.records.files.confined JSON`` (label and limits) reads the file from standard input and writes the
-storage format to standard output or, with the exit status ``FAULTS``, a list of faults as JSON. Other statuses than 0
-are failures: ``READ_FAILED`` or a signal while it read, 1 (that of the interpreter) before.
+storage format to standard output. If the file has faults, it writes a list of them as JSON instead, and its exit
+status is ``FAULTS``. Any other status than 0 means that the process failed: a status in ``DISK_FULL`` if there was no
+room for the output, ``READ_FAILED`` or a signal while it read, and 1, the interpreter's own, before it read.
 """
 
 from __future__ import annotations

@@ -128,7 +128,10 @@ def _check_forces(recording: Recording, vehicle: Vehicle, where: str, faults: Fa
 
 
 def _unit(weights: float) -> str:
-    """The likely unit of a force of so many weights: the one that makes it about one weight."""
+    """The likely unit of a force that, read in newtons, is ``weights`` times the weight of the vehicle.
+
+    Read in the right unit, the force is about one weight.
+    """
     if weights < 1:
         return "a much larger unit"
     if weights > ABSURD:

@@ -38,7 +38,10 @@ JobState = tuple[Run | Diagnosis, Sequence[GenerationEvent | StepEvent]]
 
 
 class Watched(NamedTuple):
-    """A job to watch: its id, the event name of its steps, and ``read(session, after, limit)``, which reads it."""
+    """A job to watch: its ``id``, the name of the events of its steps, and the function that reads both.
+
+    ``read(session, after, limit)`` returns the job and at most ``limit`` of its steps after sequence number ``after``.
+    """
 
     id: str
     step: str

@@ -44,7 +44,7 @@ class Engine:
         return base_genome(search.model_for(dataset, spec), values).as_dict()
 
     def genes(self, spec: CalibrationSpec, dataset: Dataset, genome: Mapping[str, float]) -> tuple[GeneResult, ...]:
-        """Standing of the genes while the search runs: no errors of estimation yet."""
+        """The genes with their values in ``genome`` while the search runs, so without standard errors."""
         ready = search.prepare(spec, dataset)
         model, searched = ready.model, ready.searched
         nominal, best = base_genome(model).normalised(), base_genome(model, genome).normalised()

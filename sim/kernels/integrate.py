@@ -182,7 +182,10 @@ def record_step(wiring: Wiring, setting: Setting, lanes: Lanes, work: Work, trac
 
 @allocating
 def linearise(wiring: Wiring, setting: Setting, lanes: Lanes, work: Work) -> None:
-    """Assemble and factor the step's matrix S at its start (``wingfit.sim.kernels.tangents``)."""
+    """Assemble and factor the matrix S of the equations of all stages of a step, at the start of the step.
+
+    S is defined in ``wingfit.sim.kernels.tangents``.
+    """
     hg = setting.step * GAMMA
     work.Q0[:] = work.Q
     work.d0[:] = work.d

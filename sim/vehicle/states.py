@@ -114,10 +114,11 @@ def steady_attachment(
 
 @kernel
 def separate(attached: Array, share: Array, rotation: Array, circulation: Array) -> None:
-    """Multiply ``circulation`` [sides, B, n, 8] by 1 - share (1 - ((1 + sqrt X) / 2)^2), ``share`` [B].
+    """Reduce ``circulation``, in place, where the flow is ``attached`` on only a fraction X of the chord.
 
-    Kirchhoff's law for the lift of a flow that is ``attached`` on the fraction X of the chord. It concerns the angle of
-    attack, so the circulation of ``rotation`` [B, n, 8] is not reduced.
+    By Kirchhoff's law, the lift is then K = ((1 + sqrt X) / 2)^2 times that of attached flow. The law concerns the
+    angle of attack, so the part ``rotation`` of the circulation is kept, and the rest is multiplied by
+    1 - share (1 - K). ``attached`` and ``circulation`` [sides, B, n, 8]; ``rotation`` [B, n, 8]; ``share`` [B].
     """
     for k in range(len(attached)):
         for b in range(len(share)):

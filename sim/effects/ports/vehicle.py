@@ -183,7 +183,10 @@ class VehicleScene:
     # -- for the model -----------------------------------------------------------------------------------------
 
     def rows(self, half_step: float) -> Array:
-        """Motion [B, 14, n] of elements of which the first has ``half_step`` of the twist at the pitch station."""
+        """Motion [B, 14, n] of the wing's elements, as the kernels read it.
+
+        The first element has the fraction ``half_step`` of the twist at the pitch station.
+        """
         return motion_rows(self.angles, self.forward(self.inflow), self.setting.motion.root_pitch, half_step)
 
     def each_side(self, rows: Array) -> Iterator[Side]:

@@ -108,7 +108,7 @@ def weigh(
 def _measured(
     forces: Array, vehicle: Vehicle, air: Condition, weighing: Weighing, hidden: Concealed, rng: np.random.Generator
 ) -> Array:
-    """[T, 2] in N at the recording's rate."""
+    """What the balance shows: forces [T, 2] in N along x and z, at the recording's rate."""
     fine, frequency = weighing.rate * _FINER, air.flap_frequency
     kept = math.ceil(weighing.beats * weighing.rate / frequency)
     lead = round(_LEAD * weighing.rate / frequency) * _FINER
@@ -139,7 +139,7 @@ def _by_beat(at: Array, memory: float, rng: np.random.Generator) -> Array:
 
 
 def _noise(weighing: Weighing, count: int, fine: float, rng: np.random.Generator) -> Array:
-    """Vibration of the mount, and a slow drift."""
+    """Vibration of the mount and a slow drift, [``count``, 2] in N along x and z, at ``fine`` samples per second."""
     out = np.empty((count, 2))
     for k, natural in enumerate(weighing.mount):
         b, a = _mount(natural, 0.02, fine)

@@ -16,7 +16,11 @@ LEARNING = 1.0
 
 
 def _wing(scene: WingScene, values: Values) -> None:
-    """Set a governor that demands the relative speed -d (P - P_m) - g tau, and a motor that follows it within t."""
+    """Drive the crank by a motor with the time constant t, whose governor demands a change of speed.
+
+    The demanded relative change is -d (P - P_m) - g tau, where P is the load, P_m its mean, tau the lead of the crank
+    in s, and g the gain ``GOVERNOR`` times the angular rate of the beat.
+    """
     motor = np.zeros((MOTOR, LANES))
     motor[DROOP], motor[FOLLOWING] = values["d"], 1.0 / values["t"]
     motor[HOLDING] = GOVERNOR * scene.angular_rate / values["t"]

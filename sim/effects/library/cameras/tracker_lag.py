@@ -56,7 +56,7 @@ def _observe(sampling: Sampling, values: Values) -> None:
     sampling.filtered(response(values["smoothing"], order * step))
 
 
-_TEXT = "position noise that the filter assumes, over its acceleration noise times the frame time squared"
+_TEXT = "position noise divided by (acceleration noise times frame time squared), as the filter assumes them"
 
 EFFECT = fault_of_tracks(
     name="tracker_lag",
