@@ -30,6 +30,8 @@ PROBABILITIES = ("single", "listed", "possible", "predicted_weight")
 """Fractions, whose odds are halved and doubled: a probability of 1.7 means nothing."""
 FAINT = 0.35  # of the concealed strength: so weak that verdicts are close to the thresholds
 FAINT_NAME = "-faint"
+BLIND = replace(POLICY, negligible=1e3)
+"""No residual is large enough for this policy: what it changes shows that a policy reaches the diagnosis."""
 RIGHT = {"null": "adequate", "unlisted": "unnamed"}
 
 
@@ -98,14 +100,16 @@ def changes(trials: list[Trial], folders: Folders, jobs: int, only: list[str]) -
         raise SystemExit(f"unknown threshold {', '.join(sorted(unknown))}; `--only` takes names of Policy's fields")
     tasks = [task(trial, trial.name, folders) for trial in trials]
     cases = [(one["name"], how) for one in thresholds for how in FACTORS]
-    every: list[Task] = list(tasks)
+    every: list[Task] = [*tasks, *(replace(one, policy=BLIND) for one in tasks)]
     for name, how in cases:
         policy = replace(POLICY, **{name: varied(name, FACTORS[how])})
         every += [replace(one, policy=policy) for one in tasks]
     said = conclusions(every, folders.root / "conclusions", jobs)
     before, rows = said[: len(tasks)], {one["name"]: dict(one) for one in thresholds}
+    if said[len(tasks) : 2 * len(tasks)] == before:
+        raise SystemExit("no conclusion changes where no residual is large enough: the policy is not used")
     for k, (name, how) in enumerate(cases):
-        after = said[(k + 1) * len(tasks) : (k + 2) * len(tasks)]
+        after = said[(k + 2) * len(tasks) : (k + 3) * len(tasks)]
         rows[name][how] = {
             trial.name: f"{old} -> {new}" for trial, old, new in zip(trials, before, after, strict=True) if old != new
         }

@@ -16,7 +16,7 @@ from wingfit.workers import make_evaluator
 
 @dataclass(frozen=True)
 class Task:
-    """A request: a dataset, the division of a wing's model, and the terms that a vehicle's model leaves out."""
+    """A request: a dataset, the division of a wing's model, the terms that a vehicle's model leaves out, thresholds."""
 
     trial: str
     dataset: Path
@@ -43,7 +43,7 @@ def run(task: Task) -> Outcome:
         calibration = replace(calibration, division=task.division)
     evaluator = make_evaluator("in_process")
     try:
-        for progress in diagnose(load_dataset(task.dataset), DiagnosisSpec(calibration), evaluator):
+        for progress in diagnose(load_dataset(task.dataset), DiagnosisSpec(calibration, policy=task.policy), evaluator):
             finding = progress.finding
         reason = "" if finding else "it ended without a finding"
     except Exception as error:  # a crash counts as a failed trial; the other trials continue
