@@ -1,1 +1,1 @@
-"""Observation + recording -> misfit -> fitted genome."""
+"""Calibration: find the genes with which a model reproduces recordings."""

@@ -56,7 +56,7 @@ class Distribution:
 
 
 def drawn(state: Distribution, seed: int, stage: str, size: int) -> Array:
-    """Unit coordinates [size, F] of the next generation; the first of all is the start itself."""
+    """Unit coordinates [size, F] of the next generation; row 0 of the first generation is the start itself."""
     generation = state.generation + 1
     rows = []
     for slot in range(size):
@@ -70,7 +70,10 @@ def drawn(state: Distribution, seed: int, stage: str, size: int) -> Array:
 
 
 def learnt(state: Distribution, unit: Array, fitness: Array, distance: Array, tolerance: float) -> Distribution:
-    """The distribution after a generation ``unit`` [size, F]; it only narrows if more than half of these failed."""
+    """The distribution updated with a generation ``unit`` [size, F] and its ``fitness`` and ``distance`` [size].
+
+    If more than half of the individuals failed, the step size is halved and the rest of the distribution stays.
+    """
     scores = [finite(f) for f in fitness]
     good = [f for f in scores if f < FAILED]
     first = int(np.argmin(scores))

@@ -117,13 +117,13 @@ def _child(parents: list[Individual], key: str) -> list[float]:
 
 
 def reflected(u: float) -> float:
-    """Back into [0, 1] by mirroring at the bounds: unlike clipping it does not pile individuals on them."""
+    """``u`` mirrored at the bounds into [0, 1]; clipping would pile individuals on the bounds."""
     u = abs(u) % 2.0
     return 2.0 - u if u > 1.0 else u
 
 
 def survive(population: Population, unit: Array, fitness: Array, distance: Array, tolerance: float) -> Population:
-    """The best of parents and children together; equal fitness keeps the elder, so that the order is reproducible."""
+    """The best of parents and children; of equal fitness the parent stays, so that the order is reproducible."""
     size = len(unit)
     everyone = population.unit + [[float(v) for v in row] for row in unit]
     scores = population.fitness + [finite(f) for f in fitness]
@@ -142,5 +142,5 @@ def survive(population: Population, unit: Array, fitness: Array, distance: Array
 
 
 def finite(value: float) -> float:
-    """``value``, or FAILED when it is not finite."""
+    """``value``, or the constant FAILED when it is not finite."""
     return float(value) if np.isfinite(value) else FAILED

@@ -48,7 +48,7 @@ def placed(problem: Problem, evaluator: Evaluator, unit: Array) -> tuple[Array, 
 
 @dataclass(frozen=True)
 class _Weighed:
-    """Whitened residuals [N] at the start, and the changes of them that the other genes can make."""
+    """Whitened residuals [N] at the start, and the changes of them that the other genes can compensate."""
 
     noise: list[Noise]
     white: Array
@@ -79,7 +79,7 @@ class _Weighed:
 
 
 def _movable(problem: Problem, unit: Array) -> list[Effect]:
-    """Effects at zero whose size and at least one other gene are searched."""
+    """Effects of size zero at ``unit`` [F], if their size and at least one other gene are searched."""
     genes = free_genes(problem)
     genome = problem.base.as_dict() | dict(zip(problem.free, values_at(genes, unit[None])[0].tolist(), strict=True))
     found = {effect.name: effect for name in problem.free if (effect := effect_of(name))}
@@ -93,7 +93,7 @@ def _movable(problem: Problem, unit: Array) -> list[Effect]:
 
 
 def _tried(unit: Array, shape: list[int]) -> Array:
-    """The start [1 + PLACES, F], first as it is, then with its columns ``shape`` spread evenly over their boxes."""
+    """Starts [1 + PLACES, F]: ``unit``, then ``unit`` with its columns ``shape`` spread evenly over their boxes."""
     tried = np.tile(unit, (1 + PLACES, 1))
     tried[1:, shape] = spread(PLACES, len(shape))
     return tried

@@ -55,7 +55,7 @@ class Prepared:
 
 
 def prepare(spec: CalibrationSpec, dataset: Dataset) -> Prepared:
-    """Everything that is decided before anything is simulated; ValueError when the spec does not fit the dataset."""
+    """Decide model, stages and filters, without simulating; ValueError when the spec does not fit the dataset."""
     spec = resolved(spec, dataset)
     model = model_for(dataset, spec)
     known = [gene.name for gene in model.genes]
@@ -77,7 +77,7 @@ def prepare(spec: CalibrationSpec, dataset: Dataset) -> Prepared:
 
 
 def _fitted(spec: CalibrationSpec, dataset: Dataset) -> tuple[Recording, ...]:
-    """Recordings to fit, as they were recorded."""
+    """The unfiltered recordings that are to be fitted."""
     for name, times in Counter(spec.recordings).items():
         if times > 1:
             raise ValueError(f"recording {name!r} is named {times} times; name it once")
@@ -112,7 +112,7 @@ def fitted_through(spec: CalibrationSpec, recording: Recording) -> LowPass | Non
 
 
 def _staged(free: tuple[str, ...], recordings: tuple[Recording, ...]) -> tuple[Stage, ...]:
-    """Vacuum recordings fit the structure, the others then the aerodynamics (thesis Fig. 2).
+    """Two stages: structural genes fitted to recordings in vacuum, aerodynamic genes to the others (thesis Fig. 2).
 
     Effects that are not aerodynamic act in vacuum as well, and are fitted there.
     """

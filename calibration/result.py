@@ -47,7 +47,7 @@ class GeneResult:
 
     @classmethod
     def of(cls, gene: Gene, nominal: float, best: float, found: Standing | None) -> GeneResult:
-        """Result of ``gene`` with what was ``found`` of it; None where it was not searched."""
+        """Result of ``gene``; ``found`` is its standard error, None where the gene was not searched."""
         lower, upper = (gene.lower, gene.upper) if gene.share_of is None else (0.0, 1.0)
         error, identifiable, absolute = (
             (found.standard_error, found.identifiable, found.absolute) if found else [None] * 3

@@ -87,7 +87,7 @@ def found(spec: CalibrationSpec, dataset: Dataset, checkpoint: dict[str, Any]) -
 
 @dataclass
 class _State:
-    """Everything that the next generation depends on.
+    """Everything on which the next generation depends.
 
     ``base`` is the genome that a stage starts from; ``newton`` the checkpoint of a Gauss-Newton iteration under way.
     """
@@ -120,7 +120,7 @@ def _empty(spec: CalibrationSpec) -> Population:
 
 
 class _Run:
-    """One stage under way; ``state`` moves on with every generation."""
+    """The search of one stage; ``state`` is replaced after every generation."""
 
     def __init__(self, ready: Prepared, state: _State, evaluator: Evaluator) -> None:
         self.spec, self.stages, self.state, self.evaluator = ready.spec, ready.stages, state, evaluator
@@ -144,7 +144,7 @@ class _Run:
             yield self._iteration(step, step.converged or step.index + 1 >= limit)
 
     def _generation(self) -> Generation:
-        """Breed, evaluate and select once."""
+        """One generation: make children, evaluate them and select the survivors."""
         spec, state, name = self.spec, self.state, self.stage.name
         unit = self._drawn()
         evaluation = self.evaluator.evaluate(self.problem, values_at(self.genes, unit))
@@ -212,7 +212,7 @@ class _Run:
         )
 
     def _progress(self) -> float:
-        """Fraction done, taking a search to last EXPECTED_GENERATIONS, or as many more as its stall still allows."""
+        """Fraction done, assuming EXPECTED_GENERATIONS generations, or as many more as the stall limit still allows."""
         population, spec = self.state.population, self.spec
         done = population.generation + 1
         left = 0 if _ended(population, spec) else max(spec.stall - population.stall, EXPECTED_GENERATIONS - done)

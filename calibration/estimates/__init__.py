@@ -1,1 +1,1 @@
-"""Maximum-likelihood estimates, their covariance, and what the data cannot separate."""
+"""Maximum-likelihood estimates, their covariance, and remarks on genes that are not identifiable."""

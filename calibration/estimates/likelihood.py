@@ -124,10 +124,11 @@ def iterate(
 ) -> Iterator[Step]:
     """Iterate from ``start`` (genes that it does not name start at the base) or on from ``checkpoint``.
 
-    Ends when no step is better, when a step is smaller than STEP and gains less than COST of the cost, when two in
-    succession gain as little (what then still moves is not identifiable), or after ``iterations``. Resumed equals
-    uninterrupted, bit for bit. ValueError when the start cannot be simulated. Effects that are switched off start so,
-    at the place that promises most (:mod:`wingfit.calibration.initial_effect_position`).
+    Ends when no step lowers the cost, when a step is smaller than STEP and lowers the cost by less than the fraction
+    COST, when two steps in succession lower it by less (genes that still move are then not identifiable), or after
+    ``iterations``. A resumed iteration gives the same bits as an uninterrupted one. ValueError when the start cannot
+    be simulated. An effect of size zero keeps this size at the start; its other genes start where
+    :mod:`wingfit.calibration.initial_effect_position` puts them.
     """
     genes, before = free_genes(problem), 0
     if checkpoint is None:
@@ -144,7 +145,7 @@ def iterate(
 
 @one_blas_thread
 def estimate(problem: Problem, evaluator: Evaluator, start: Mapping[str, float]) -> Estimate:
-    """Iterate to the end and judge the estimate there."""
+    """Iterate to the end, and estimate the uncertainty there."""
     evaluations, last = 0, None
     for last in iterate(problem, evaluator, start):
         evaluations += last.evaluations
@@ -165,7 +166,7 @@ def estimate(problem: Problem, evaluator: Evaluator, start: Mapping[str, float])
 
 
 def at_bounds(genes: list[Gene], values: Mapping[str, float]) -> tuple[str, ...]:
-    """Remarks on genes whose values are at a bound, except sizes of zero: they mean that an effect is absent."""
+    """Remarks on genes whose values are at a bound, except sizes of zero, which mean that an effect is absent."""
     genes = [gene for gene in genes if values[gene.name] != 0.0 or not is_size(gene.name)]
     found = np.array([values[gene.name] for gene in genes])
     return tuple(
@@ -211,7 +212,7 @@ def _better(
     power: float,
     damping: float,
 ) -> _Move:
-    """The best genome that any damping leads to; the present one when none is better.
+    """The move to the best of the genomes that the dampings give; no move where none lowers the cost.
 
     ``quadratic``: the cost near ``unit`` [F]; ``power``: sum of v^T R^-1 v there.
     """

@@ -44,7 +44,7 @@ class Linearised:
 
 
 def free_genes(problem: Problem) -> list[Gene]:
-    """Genes of the free columns, in their order."""
+    """The free genes, in the order of the columns of a batch."""
     genes = {gene.name: gene for gene in problem.model.genes}
     return [genes[name] for name in problem.free]
 
@@ -60,7 +60,7 @@ def unit_at(genes: list[Gene], values: Array) -> Array:
 
 
 def stopped(genes: list[Gene], values: Array) -> Mask:
-    """[F], True where a value lies at a bound of its gene."""
+    """Array [F], True where the value [F] lies at a bound of its gene."""
     unit = unit_at(genes, values)
     return np.asarray((unit < AT_BOUND) | (unit > 1 - AT_BOUND))
 

@@ -31,7 +31,7 @@ SMALL = 0.05  # of the box: what a value of a linear gene is at least compared w
 
 @dataclass(frozen=True)
 class Standing:
-    """Relative standard error of a gene (of a share: when normalised), and whether it is at most IDENTIFIABLE.
+    """Relative standard error of a gene, and whether it is at most IDENTIFIABLE; of a share, after normalisation.
 
     ``absolute`` is the standard error in the gene's unit (of a share: of its weight).
     """
@@ -74,13 +74,13 @@ class Uncertainty:
 
     @property
     def correlation(self) -> Array:
-        """[F, F]."""
+        """Correlation of the values, [F, F]."""
         scale = np.sqrt(np.diag(self.covariance))
         return np.asarray(self.covariance / scale / scale[:, None])
 
     @property
     def standing(self) -> dict[str, Standing]:
-        """Standing of each gene."""
+        """Standard errors of each free gene, by name, and whether they identify it."""
         errors = np.where(self.known, np.sqrt(np.diag(self.relative)), np.inf)
         absolute = self.standard_errors
         return {
@@ -90,10 +90,10 @@ class Uncertainty:
 
 @one_blas_thread
 def standing(problem: Problem, evaluator: Evaluator) -> dict[str, Standing]:
-    """Standing of each free gene at the problem's base genome; infinite errors where that cannot be simulated.
+    """Standard errors of each free gene at the problem's base genome; infinite where that cannot be simulated.
 
-    The phase of each recording of tracks is refitted at every displaced genome, so the uncertainty of the trigger is in
-    the errors.
+    The phase of each recording of tracks is refitted at every displaced genome, so the errors include the
+    uncertainty of the trigger.
     """
     try:
         return uncertainty(problem, evaluator).standing
@@ -129,10 +129,10 @@ def uncertainty(problem: Problem, evaluator: Evaluator) -> Uncertainty:
 
 
 def unit_covariance(problem: Problem, linear: Linearised, noise: list[Noise]) -> tuple[Array, tuple[str, ...]]:
-    """Covariance [F, F] of an estimate in unit coordinates, and remarks on what it rests on.
+    """Covariance [F, F] of an estimate in unit coordinates, and remarks on recordings with too few beats.
 
-    The box is a weak prior, without which nothing would bound a gene that the data ignore; one that is not ``known``
-    has nothing but this prior, and the errors of the others hold for its value as it is.
+    The gene box is a weak prior; without it, the variance of a gene that no datum depends on would be infinite. A gene
+    that is not ``known`` has the variance of this prior, and the errors of the others hold for its present value.
     """
     known = np.flatnonzero(linear.known)
     covariance = np.eye(len(problem.free)) * PRIOR**2
@@ -161,7 +161,10 @@ def unit_covariance(problem: Problem, linear: Linearised, noise: list[Noise]) ->
 
 @dataclass(frozen=True)
 class _Part:
-    """One recording, whitened: residuals [T, C], sensitivities [T, C, F], and sums of scores [B, F] of whole beats."""
+    """One recording, whitened: residuals [T, C], sensitivities [T, C, F], and the score of each whole beat [B, F].
+
+    A score is the derivative of the log-likelihood with respect to the F genes.
+    """
 
     record: Recording
     white: Array
@@ -198,9 +201,9 @@ class _Part:
 
 
 def _from_samples(parts: list[_Part], bread: Array) -> Array:
-    """Covariance [F, F] of the sum of scores, from the correlations of samples.
+    """Covariance [F, F] of the sum of all scores, from the correlations between samples.
 
-    Few beats still give a lower limit: where they scatter more, their scatter is used.
+    Where the scores of whole beats, few as they are, scatter more than that, their scatter is used.
     """
     total = np.zeros_like(bread)
     for part, meat in zip(parts, score_covariances([part.block() for part in parts], bread), strict=True):

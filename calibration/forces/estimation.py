@@ -53,7 +53,7 @@ class Prediction:
 
 @dataclass(frozen=True)
 class _Judged:
-    """A stage with its best genome, the uncertainty of that, and the local estimate."""
+    """A stage with its best genome, the uncertainty of this genome, and the estimate made of both."""
 
     stage: Stage
     genome: Genome
@@ -63,7 +63,7 @@ class _Judged:
 
 @dataclass(frozen=True)
 class _Compared:
-    """One recording beside models: agreements, and the RMS difference (N) of the fitted axes by source.
+    """One recording compared with models: agreements, and the RMS difference (N) of the fitted axes by source.
 
     ``scatter`` is the RMS of what does not repeat from beat to beat in these axes, the noise; None with too few beats.
     """
@@ -133,9 +133,9 @@ def compare_forces(
 def predict(
     spec: CalibrationSpec, dataset: Dataset, law: GlobalModel, condition: Condition, points: int = POINTS
 ) -> Prediction:
-    """Forces under any ``condition`` from the global model of a calibration; what leaves a gene's box is held at it.
+    """Forces under any ``condition`` from the global model of a calibration; coefficients stay in their genes' boxes.
 
-    They are those of the vehicle: faults of the measurement that the calibration found are left out.
+    These forces act on the vehicle; faults of the measurement that the calibration found are not applied.
     """
     spec = resolved(spec, dataset)
     model = vehicle_model(dataset, spec)
@@ -154,9 +154,9 @@ def predict(
 def _by_law(
     model: BladeElementWing, law: GlobalModel, condition: Condition
 ) -> tuple[dict[str, float], tuple[str, ...]]:
-    """Coefficients that the law gives under ``condition``, within their genes' boxes, and what must be known of them.
+    """Coefficients that the law gives under ``condition``, and remarks.
 
-    One that the law takes out of its box is held at its edge, with a remark.
+    A coefficient that the law puts outside the box of its gene gets the nearest bound, with a remark.
     """
     found = at(law, condition)
     values, remarks = dict(found.values), list(found.remarks)
@@ -208,7 +208,7 @@ def _judge(
 def _global(
     spec: CalibrationSpec, dataset: Dataset, estimates: list[LocalEstimate]
 ) -> tuple[GlobalModel | None, tuple[str, ...]]:
-    """Eq. 23 on local estimates; without one, why."""
+    """The global model (Eq. 23) of local estimates and its remarks; None where they determine none, and why."""
     if spec.mode != "local":
         return None, ()
     try:
@@ -302,7 +302,7 @@ def _left_out(
 ) -> tuple[tuple[Agreement, ...], tuple[str, ...]]:
     """For each fitted recording, how a global model that was fitted without this recording agrees with it.
 
-    There is none where the other recordings do not determine a global model. Also remarks on these models.
+    A recording without which no global model is determined is skipped. The second tuple has remarks on these models.
     """
     found: list[Agreement] = []
     remarks: list[str] = []

@@ -45,10 +45,10 @@ def fit_global(
 ) -> GlobalModel:
     """Fit Eq. 23 to ``estimates``, each from one recording under the condition at the same place.
 
-    Least squares, each local coefficient weighted by 1 / (its squared standard error + the squared scatter of the law
-    itself). That scatter is what makes the weighted squared differences as large as their degrees of freedom (Paule and
-    Mandel 1982); without it a condition with many beats would rule the fit although the law, not the noise, limits it.
-    With fewer than FREE_FOR_SCATTER conditions to spare, or ``weighted`` False, all count the same, as in the source.
+    Least squares, each local coefficient weighted by 1 / (its squared standard error + the squared scatter of local
+    coefficients about the law). The scatter is chosen so that the sum of weighted squared differences equals the
+    degrees of freedom (Paule and Mandel 1982); without it, a condition with many beats would dominate the fit. With
+    fewer than FREE_FOR_SCATTER more conditions than coefficients, or ``weighted`` False, all weights are equal.
 
     ValueError where the conditions are too few, or frequency and pitch cannot be separated.
     """
@@ -160,7 +160,7 @@ def _weighted(design: Array, local: Array, variance: Array) -> Array:
 
 
 def _scatter2(design: Array, local: Array, variance: Array) -> float:
-    """Squared scatter of the law with which the weighted squares equal the degrees of freedom; at least 0."""
+    """Squared scatter with which the weighted sum of squares equals the degrees of freedom; at least 0."""
     freedom = design.shape[0] - design.shape[1]
     variance = np.maximum(variance, 1e-12 * float(np.mean(local**2)))
 
@@ -198,11 +198,11 @@ def _independent(design: Array) -> bool:
 
 
 def _extrapolation(model: GlobalModel, condition: Condition) -> tuple[str, ...]:
-    """Say where ``condition`` lies outside those of ``model``: by one variable, or by combining the law's two.
+    """Remarks where ``condition`` lies outside those of ``model``: in one variable, or in frequency and pitch together.
 
-    Airspeed and density are not in the law, but the coefficients were found at theirs. The combination is judged by the
-    leverage, x^T (X^T X)^-1 x, whose largest value among the conditions fitted bounds an ellipse around them (hidden
-    extrapolation: Montgomery, Peck and Vining 2012, section 3.8).
+    Airspeed and density are not in the law, but the coefficients hold only near the fitted ones. Frequency
+    and pitch together are judged by the leverage, x^T (X^T X)^-1 x, whose largest value among the conditions fitted
+    bounds an ellipse around them (hidden extrapolation: Montgomery, Peck and Vining 2012, section 3.8).
     """
     f, pitch = condition.flap_frequency, condition.angle_of_attack
     remarks = [

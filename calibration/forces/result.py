@@ -1,4 +1,4 @@
-"""What a calibration on forces hands out: coefficients condition by condition, a global model, and how well each fits.
+"""The result of a calibration on forces: coefficients by condition, a global model, and how well each fits.
 
 Plain data; :mod:`wingfit.calibration.forces.estimation` and :mod:`wingfit.calibration.forces.agreement` fill it. SI
 units, forces in N.
@@ -25,7 +25,7 @@ class LocalEstimate:
 
     ``standard_errors`` are Cramer-Rao bounds that account for coloured residuals, absolute; ``correlation`` [F, F] in
     the order of ``values``. ``noise`` is the estimated covariance R of the fitted outputs, N^2, one matrix per
-    recording. ``remarks`` say in words what the data cannot separate.
+    recording. ``remarks`` say which coefficients are not identifiable.
     """
 
     name: str
