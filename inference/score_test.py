@@ -1,7 +1,7 @@
 """Score tests: how much of a residual an addition to a model would explain, all nuisance genes being refitted.
 
-What the nuisance genes can do is projected out of the residual and of the changes that the addition makes (Rao 1948;
-here with changes of finite size, because many effects have no slope where they are switched off).
+The changes that the nuisance genes can make are projected out of the residual and of the changes by the addition (Rao
+1948; here with changes of finite size, because many effects have no slope where they are switched off).
 """
 
 from __future__ import annotations
@@ -20,18 +20,18 @@ INVISIBLE = 1e-12  # of a field's length that the nuisance genes cannot make up 
 
 @dataclass(frozen=True)
 class Nuisance:
-    """An orthonormal basis [N, O] of what the nuisance genes can do to whitened residuals [N]."""
+    """The changes of whitened residuals [N] that the nuisance genes can make: their orthonormal basis [N, O]."""
 
     basis: Float[Array, "N O"]
 
     @classmethod
     def of(cls, slopes: Float[Array, "N F"]) -> Nuisance:
-        """The test for a model with the whitened sensitivities ``slopes`` [N, F]."""
+        """The nuisance of F genes with the whitened sensitivities ``slopes`` [N, F]."""
         basis, power, _ = np.linalg.svd(slopes, full_matrices=False)
         return cls(basis[:, power > DEPENDENT * power.max(initial=0.0)])
 
     def rest(self, vectors: Float[Array, "*batch M"]) -> Float[Array, "*batch N"]:
-        """Whitened ``vectors`` [..., M], M <= N, zero beyond M, without what the genes can do: [..., N]."""
+        """``vectors`` [..., M] minus their projection on the basis, [..., N]; entries from M <= N on count as zero."""
         size = vectors.shape[-1]
         inside = (vectors @ self.basis[:size]) @ self.basis.T
         inside[..., :size] -= vectors

@@ -1,11 +1,11 @@
 """Noise that differs between beats: the covariance of an estimate from the scores of single beats.
 
 The scatter of measured forces grows and falls with the forces themselves, since the flow separates anew in every beat.
-Such noise is not stationary within the beat. A formula that takes its correlations as those of a stationary one
-(:mod:`wingfit.inference.noise.coloured`) gives too small an error to a gene that acts where the scatter is large,
-and too large a one to a gene that acts elsewhere. From beat to beat it is stationary. So the scores S^T R^-1 v are
-summed over each whole beat, and the covariance of their sum is estimated from the series of beats with a flat-topped
-taper (Politis and Romano 1995; for scores: Newey and West 1987).
+Such noise is not stationary within the beat. A formula for stationary noise (:mod:`wingfit.inference.noise.coloured`)
+gives too small an error to a gene that acts where the scatter is large, and too large an error to one that acts
+elsewhere. From beat to beat the noise is stationary. So the scores S^T R^-1 v (S: sensitivities, R: noise covariance,
+v: residuals) are summed over each whole beat, and the covariance of their sum is estimated from the series of beats
+with a flat-topped taper (Politis and Romano 1995; for scores: Newey and West 1987).
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ def beat_scores(
 ) -> tuple[Float[Array, "B F"], float]:
     """Sums [B, F] over each whole beat of sensitivity [T, C, F] times whitened residual [T, C], 0 where not ``seen``.
 
-    Also the share of all samples seen that lies in whole beats.
+    Also returned: the fraction of all samples seen that lie in whole beats.
     """
     beat = _beats(record)
     scores = np.zeros((int(beat[-1]) + 1, sensitivity.shape[2]))
@@ -42,9 +42,9 @@ def beat_scores(
 def beat_score_covariance(scores: Float[Array, "B F"], samples_used: float, absorbed: float) -> Float[Array, "F F"]:
     """Covariance [F, F] of the sum of all scores of a recording, from the ``scores`` [B, F] of its B whole beats.
 
-    A fit to this recording alone makes its scores add up to zero, as if their mean had been taken off; of what the
-    taper sums, that loses the share sum_k taper_k (B - |k|) / B^2. Of a fit to several recordings this one bears the
-    part ``absorbed``. ``samples_used`` is the share of all samples that lies in whole beats.
+    A fit to this recording alone makes its scores add up to zero. This lowers the tapered sum over lags k by the
+    fraction sum_k taper_k (B - |k|) / B^2; in a fit to several recordings, by the part ``absorbed`` (0 to 1) of it.
+    The result is corrected for this, and for samples outside whole beats: ``samples_used`` is the fraction within.
     """
     beats = len(scores)
     total, pairs = TAPER[0] * scores.T @ scores, TAPER[0] * beats
@@ -57,9 +57,9 @@ def beat_score_covariance(scores: Float[Array, "B F"], samples_used: float, abso
 
 
 def without_mean_beat(record: Recording, white: Float[Array, "T C"], beats: int) -> Float[Array, "T C"]:
-    """Residuals [T, C] less what repeats in every beat, of a recording with so many whole ``beats``; zeros stay.
+    """Whitened residuals [T, C] of a recording with so many whole ``beats``, minus their mean beat; zeros stay zero.
 
-    What repeats is misfit of the model, which is no noise: it does not change from recording to recording.
+    The mean beat of the residuals is misfit of the model and not noise.
     """
     if beats < FEWEST_MEAN:
         return white
@@ -69,7 +69,7 @@ def without_mean_beat(record: Recording, white: Float[Array, "T C"], beats: int)
 
 
 def _beats(record: Recording) -> Index:
-    """Number [T] of the beat of each sample."""
+    """Index [T] of the beat in which each sample lies, from 0."""
     beat = np.floor(record.times * record.condition.flap_frequency + 1e-6).astype(np.int64)
     return np.asarray(beat - beat[0])
 
@@ -77,8 +77,8 @@ def _beats(record: Recording) -> Index:
 def widening(beats: float) -> float:
     """Factor on a variance that was estimated from this number of beats.
 
-    It has about nu = B / sum_k taper_k^2 degrees of freedom, and a quotient by its root follows
-    Student's t, whose variance is nu / (nu - 2).
+    The variance has about nu = B / sum_k taper_k^2 degrees of freedom. An error divided by its root follows Student's
+    t, whose variance is nu / (nu - 2), the result.
     """
     freedom = beats / float(TAPER[0] ** 2 + 2 * (TAPER[1:] ** 2).sum())
     return freedom / (freedom - 2.0)

@@ -35,7 +35,7 @@ SETTLED = 1e-3  # relative change of the score covariance at which the iteration
 
 @dataclass(frozen=True)
 class Block:
-    """One recording, whitened, on a time grid of G slots.
+    """One recording, whitened, on a regular time grid of G instants.
 
     K groups of n outputs each: outputs of a group may be correlated with each other, groups are not. Forces are one
     group of all fitted axes; tracks are as many groups as channels.
@@ -64,7 +64,7 @@ class Block:
         *,
         grouped: bool,
     ) -> Block:
-        """From whitened residuals [T, C], sensitivities [T, C, F] and ``seen`` [T, C], all zero where not seen.
+        """Make a block of whitened residuals [T, C] and sensitivities [T, C, F], both zero where not ``seen`` [T, C].
 
         ``grouped``: the C outputs may be correlated with each other.
         """
@@ -89,7 +89,7 @@ class Block:
         return cls(spread(sensitivity, (*shape, genes)), np.maximum(np.round(pairs), 0.0), raw, groups, length)
 
     def correlation(self, lost: Array) -> Array:
-        """Correlations [lags, n, n] of the noise, when the fit took ``lost`` [lags, n, n] of the sums; not tapered."""
+        """Correlations [lags, n, n] of the noise, not tapered; ``lost`` [lags, n, n]: decrease of the sums by the fit."""
         return np.asarray((self.raw + lost) / np.maximum(self.pairs, 1.0)[:, None, None])
 
     def spectrum(self, correlation: Array, last: int) -> Complex:
@@ -103,7 +103,7 @@ class Block:
         return np.asarray((axes * np.maximum(density, 0.0)[:, None, :]) @ np.swapaxes(axes.conj(), 1, 2))
 
     def through(self, spectrum: Complex) -> Complex:
-        """Complex [f, K, n, F] of R_vv S at the frames seen."""
+        """Fourier transform [f, K, n, F] of R_vv S at the frames seen."""
         whole = irfft(np.einsum("fab,fkbp->fkap", spectrum, self.sensitivity), self.length, axis=0)
         whole[: len(self.seen)] *= self.seen[:, :, None, None]
         whole[len(self.seen) :] = 0.0
@@ -120,7 +120,7 @@ class Block:
         return np.asarray(np.einsum("f,fkp,fkq->pq", weight, flat.conj(), other, optimize=True).real)
 
     def lost(self, through: Complex, inverse: Array, covariance: Array) -> Array:
-        """Expected loss [lags, n, n] of the sums of products to a fit with M^-1 = ``inverse``."""
+        """Expected decrease [lags, n, n] of the sums of products by a fit with M^-1 = ``inverse``."""
         mine = self.sensitivity
         kept = through @ inverse - 0.5 * mine @ covariance
         both = _lagged(mine, kept, self.length) + _lagged(kept, mine, self.length)
@@ -128,9 +128,9 @@ class Block:
 
 
 def grid(times: Array, longest: int) -> Index:
-    """Place of each frame on a grid of the median interval, [T]; pauses count for at most ``longest`` + 1 intervals.
+    """Index [T] of each frame on a grid of the median interval; a pause counts for at most ``longest`` + 1 intervals.
 
-    Frames so uneven that two would share a place are numbered as they come.
+    Where two frames would get one index, because frames are too uneven, all are numbered 0, 1, 2, ...
     """
     if len(times) < 2:
         return np.zeros(len(times), np.int64)
@@ -143,7 +143,7 @@ def grid(times: Array, longest: int) -> Index:
 
 
 def score_covariances(blocks: list[Block], inverse: Float[Array, "F F"]) -> list[Array]:
-    """Covariance [F, F] of each block's scores, with M^-1 = ``inverse``, by the iteration of the module's text."""
+    """Covariance [F, F] of each block's scores, by the fixed-point iteration above; ``inverse`` is M^-1."""
     lost = [np.zeros_like(block.raw) for block in blocks]
     each, total = [np.zeros_like(inverse)] * len(blocks), np.zeros_like(inverse)
     for _ in range(ROUNDS):

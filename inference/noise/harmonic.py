@@ -118,7 +118,7 @@ def whole_markers(recording: Recording) -> Mask:
 
 @dataclass(frozen=True)
 class _Scatter:
-    """What does not repeat with the beat.
+    """The part of a recording that does not repeat with the beat.
 
     Attributes:
         values: [T, C] recorded minus mean beat, zero where not valid.
@@ -175,7 +175,7 @@ def _check_moves(recording: Recording, seen: Mask) -> None:
 
 
 def still_markers(recording: Recording) -> tuple[str, ...]:
-    """Markers that were recorded at one and the same place throughout: they were not tracked, and are not used."""
+    """Names of markers with one constant position: they were not tracked, and are not used."""
     still = _still(recording)
     return tuple(name for k, name in enumerate(recording.markers) if still[3 * k])
 
@@ -190,7 +190,9 @@ def _still(recording: Recording) -> Mask:
 
 
 def _apparent(recording: Recording) -> tuple[float, Index]:
-    """Apparent advance of the beat from sample to sample (beats, at most half), and the number [T] of each sample."""
+    """Apparent advance of the phase from sample to sample (beats, at most 0.5), and the number [T] of each sample.
+
+    A strobe slightly slower than the wing makes the beat appear to advance slowly."""
     times = recording.times
     step = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
     if step <= 0.0:
@@ -203,7 +205,7 @@ def _apparent(recording: Recording) -> tuple[float, Index]:
 
 
 def _harmonics(recording: Recording, advance: float) -> int:
-    """How many harmonics of the beat are looked at."""
+    """Number of harmonics of the beat to fit; ValueError where the samples determine none."""
     most = HARMONICS
     if recording.kind == "forces":
         most = HARMONICS_OF_FORCES

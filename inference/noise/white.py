@@ -15,7 +15,7 @@ POOLED = 5.0  # samples: weight of the mean variance of a recording in the varia
 
 @dataclass(frozen=True)
 class Noise:
-    """R of one recording [C, C] (m^2 or N^2), and the matrix [C, C] that whitens rows of residuals from the right."""
+    """Noise covariance R [C, C] of one recording (m^2 or N^2), and the matrix [C, C] W that whitens residuals: v W."""
 
     covariance: Float[Array, "C C"]
     whitening: Float[Array, "C C"]
@@ -28,7 +28,7 @@ class Noise:
 
         Forces have the full covariance of the fitted axes, (1/N) sum of v v^T. Tracks have one variance for each
         channel: of 120 channels seen for as many frames, with gaps, a full matrix would be singular; each variance is
-        drawn a little to their mean, so that a track of a few frames cannot be fitted exactly and outweigh the rest.
+        shrunk a little towards their mean, so that a track of a few frames cannot be fitted exactly and outweigh the rest.
         Channels that are not fitted get variance 1, which has no influence.
         """
         seen = np.isfinite(residuals)
