@@ -89,7 +89,7 @@ class Block:
         return cls(spread(sensitivity, (*shape, genes)), np.maximum(np.round(pairs), 0.0), raw, groups, length)
 
     def correlation(self, lost: Array) -> Array:
-        """Correlations [lags, n, n] of the noise, not tapered; ``lost`` [lags, n, n]: decrease of the sums by the fit."""
+        """Correlations [lags, n, n] of the noise, not tapered; ``lost`` [lags, n, n]: what the sums lost to the fit."""
         return np.asarray((self.raw + lost) / np.maximum(self.pairs, 1.0)[:, None, None])
 
     def spectrum(self, correlation: Array, last: int) -> Complex:

@@ -28,7 +28,7 @@ class Noise:
 
         Forces have the full covariance of the fitted axes, (1/N) sum of v v^T. Tracks have one variance for each
         channel: of 120 channels seen for as many frames, with gaps, a full matrix would be singular; each variance is
-        shrunk a little towards their mean, so that a track of a few frames cannot be fitted exactly and outweigh the rest.
+        shrunk a little towards their mean, so that a track of a few frames cannot be fitted exactly and dominate.
         Channels that are not fitted get variance 1, which has no influence.
         """
         seen = np.isfinite(residuals)
