@@ -192,7 +192,8 @@ def _still(recording: Recording) -> Mask:
 def _apparent(recording: Recording) -> tuple[float, Index]:
     """Apparent advance of the phase from sample to sample (beats, at most 0.5), and the number [T] of each sample.
 
-    A strobe slightly slower than the wing makes the beat appear to advance slowly."""
+    A strobe slightly slower than the wing makes the beat appear to advance slowly.
+    """
     times = recording.times
     step = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
     if step <= 0.0:

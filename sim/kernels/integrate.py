@@ -124,7 +124,7 @@ def forces(wiring: Wiring, setting: Setting, lanes: Lanes, work: Work) -> None:
 
 @kernel
 def point_forces(lanes: Lanes, work: Work) -> None:
-    """Add the wrenches of the laws of points to those of the bodies, and what they lose and keep to the lanes."""
+    """Evaluate the laws of effects that act at points of bodies, and add their wrenches to those of the bodies."""
     laws = lanes.laws
     work.point_wrench[:] = 0.0
     work.point_k[:] = 0.0

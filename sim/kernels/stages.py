@@ -24,7 +24,10 @@ def combine(part: float, base: Array, U: Array, coefficient: Array, count: int, 
 def coupled_rates(
     xi: Array, V: Array, U_xi: Array, U_V: Array, coefficient: Array, count: int, scale: float, rate: Array, lead: Array
 ) -> None:
-    """Rate of the local coordinates plus ``scale`` times the stages' coupling, and that of the twists in ``lead``."""
+    """Set ``rate`` to r + scale sum_s c_s U_xi[s] and ``lead`` to scale sum_s c_s U_V[s], all [N, 6, W].
+
+    r is the rate of the local coordinates; c is ``coefficient``, and s runs over the first ``count`` stages.
+    """
     for i in range(xi.shape[0]):
         first = body_rate(load_vector(xi, i, 0), load_vector(V, i, 0), load_vector(V, i, 3))
         for k in range(6):

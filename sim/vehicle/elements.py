@@ -74,7 +74,8 @@ def velocities(
 ) -> tuple[Vector, Vector]:
     """Velocity of an element through the air along its chord and normal to it (Eqs. 18-19).
 
-    ``swing`` is that of its flapping, ``u`` and ``w`` are those of the stream along body x and this side's z.
+    ``ct`` and ``st``: cosine and sine of the pitch; ``swing``: velocity by flapping; ``u``, ``w``: the stream along body
+    x and this side's z; ``stream`` and ``whole`` scale its part along the chord and normal to it.
     """
     vx = swing * ct + (u * st + w * ct) * stream
     vz = whole * (u * ct - w * st) - swing * st
@@ -225,9 +226,10 @@ def synthesise(basis: Array, series: Array, out: Array) -> None:
 
 @allocating
 def synthesise_at(psi: Array, series: Array, out: Array) -> None:
-    """The same of one individual at its own phases ``psi`` [T] (rad): ``out`` [T, A] from ``series`` [A, 2 K + 1].
+    """Set ``out`` [T, A] to A Fourier series of one individual at the phases ``psi`` [T], rad.
 
-    Sines and cosines by recurrence over the harmonics, which is much faster than computing each.
+    A row of ``series`` [A, 2 K + 1] holds the mean, K cosine and K sine coefficients. Sines and cosines follow by
+    recurrence over the harmonics, which is much faster than computing each.
     """
     A, K = len(series), (series.shape[1] - 1) // 2
     dc, ds, c, s = np.empty((4, CHUNK))

@@ -41,13 +41,13 @@ class StationedWings:
     Attributes:
         places: the stations.
         sides: motion [B, 14, n] of each side that is computed, and the stream relative to it.
-        turning: [B, n], rad/s: C_R theta_w' of Eq. 2, or what replaces it, at the pitch station of a single wing.
+        turning: [B, n], rad/s: C_R theta_w' of Eq. 2, or the term that replaces it, at the pitch station of one wing.
         fling: [B, n], rad/s: the contribution of wings that peel apart (Eq. 7).
         loading: [B, 8]: factor on the circulation.
         density: [B] of the air, kg/m^3.
         lift: [B, 2]: C_l of the sine law and the factor on the measured curve.
         drag: [B, 3]: C_D0, C_Dpi2 and the factor on the measured curve.
-        alike: number of wings per computed side.
+        alike: number of wings that move like one computed side.
     """
 
     places: Stations

@@ -14,7 +14,7 @@ ROW_COUNT = 14
 
 
 def uppers(vehicle: Vehicle) -> tuple[bool, ...]:
-    """For each pair of wings that is computed, whether it is the upper one: (False,), for "x4" (False, True)."""
+    """Whether each computed pair of wings is the upper one: (False, True) for the layout "x4", else (False,)."""
     return (False, True) if vehicle.layout == "x4" else (False,)
 
 

@@ -28,15 +28,15 @@ def series_of(forces: Array, harmonics: int, recording: Recording) -> Array:
 
 
 def phases(recording: Recording, times: Array) -> Array:
-    """Phase (rad) of the beat at ``times`` (s)."""
+    """Phase of the beat, 2 pi f t (rad), at ``times`` (s)."""
     return np.asarray(2 * np.pi * recording.condition.flap_frequency * times)
 
 
 @lru_cache(maxsize=1)  # of the last recording only, since those of long recordings are large
 def basis_of(recording: Recording, harmonics: int) -> tuple[Array, Index]:
-    """Cosines, then sines [K, T] at the recording's instants of the harmonics that its low-pass passes.
+    """Cosines, then sines of the harmonics that the recording's low-pass passes, at its T instants: [K, T].
 
-    Also their indices [K] in the series of :func:`series_of`.
+    The second array [K] holds the index of each of these rows in the coefficients of :func:`series_of`.
     """
     k = np.arange(harmonics + 1)
     if recording.low_pass:

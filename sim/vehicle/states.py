@@ -19,10 +19,11 @@ _SWEEPS = 6  # iterations with the correlation
 
 @inlined
 def _step(before: Vector, after: Vector) -> tuple[Vector, Vector, Vector]:
-    """Decay of a state in a step, and the weights of its target before and after, which is linear in between.
+    """Factors (d, c, e) of a step of x' = rate (target - x): x after it is d x + c target before + e target after.
 
-    ``before`` and ``after`` are its rate times half the step. The decay is the Pade approximant (1, 2) of exp(-a), with
-    an error of a^4 / 72 and never above one; with these weights a constant target is followed exactly.
+    The target is linear within the step. ``before`` and ``after`` are the rate at both ends times half the step; a is
+    their sum. d is the Pade approximant (1, 2) of exp(-a), with an error of a^4 / 72 and never above one; a constant
+    target is followed exactly.
     """
     a = greatest(before + after, _MIN_DECAY)
     below = 1.0 / (a * (a * (1.0 / 6.0) + 2.0 / 3.0) + 1.0)
@@ -33,11 +34,11 @@ def _step(before: Vector, after: Vector) -> tuple[Vector, Vector, Vector]:
 
 @allocating
 def followed(speed: Array, share: Array, target: Array, step: float, out: Array) -> None:
-    """Periodic solution x of x' = share speed (target - x) over one beat.
+    """Set ``out`` to the periodic solution x of x' = share speed (target - x) over one beat.
 
-    One sweep from zero, which gives the periodic start, then another from there.
+    One sweep from zero gives the periodic start; another sweep starts there.
 
-    ``out`` is set to x; ``speed`` (m/s; in a step the mean over its ends), ``target`` (linear over a step) and ``out``
+    ``speed`` (m/s; in a step the mean over its ends), ``target`` (linear over a step) and ``out``
     [sides, B, n, 8]; ``share`` [B, 8], 1/m, not negative; ``step`` in s.
     """
     n = speed.shape[2]
@@ -131,10 +132,10 @@ def separate(attached: Array, share: Array, rotation: Array, circulation: Array)
 
 @kernel
 def overtake(wing: Array, share: Array, wake: Array) -> None:
-    """Replace the velocity ``wake`` w by share (w - k u), that relative to ``wing``, which moves at u on the same line.
+    """Replace the velocity w of the ``wake`` by share (w - v), where v is w limited to the interval between 0 and u.
 
-    k u is the part of w that moves with the wing: w limited to the interval between 0 and u. All [sides, B, n, 8] in
-    m/s, ``share`` [B].
+    u is the velocity of the ``wing`` on the same line; v is the part of w that moves along with the wing. All
+    [sides, B, n, 8] in m/s, ``share`` [B].
     """
     for k in range(len(wake)):
         for b in range(len(share)):

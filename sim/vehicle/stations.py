@@ -123,9 +123,9 @@ def station_circulation(
 ) -> None:  # fmt: skip
     """Speed (m/s) and quasi-steady circulation (m^2/s), positive as in Eq. 8, both [B, n, 8] (Eqs. 2-4, 7).
 
-    ``along`` and ``normal`` [B, n, 8], m/s; ``turning`` [B, n]: C_R theta_w' at the pitch station, or what replaces it
-    in Eq. 2, rad/s; ``coefficient`` [B, 2]: C_l of the sine law and the factor on the measured curve; ``twist`` [8]:
-    fractions of ``turning``; ``chord`` [8], m; ``loading`` [B, 8]: factor on the circulation.
+    ``along`` and ``normal`` [B, n, 8], m/s; ``turning`` [B, n]: C_R theta_w' at the pitch station, or the term that
+    replaces it in Eq. 2, rad/s; ``coefficient`` [B, 2]: C_l of the sine law and the factor on the measured curve;
+    ``twist`` [8]: fractions of ``turning``; ``chord`` [8], m; ``loading`` [B, 8]: factor on the circulation.
     """
     for b in range(len(along)):
         C_l, K_l = coefficient[b, 0], coefficient[b, 1]
