@@ -74,8 +74,8 @@ def velocities(
 ) -> tuple[Vector, Vector]:
     """Velocity of an element through the air along its chord and normal to it (Eqs. 18-19).
 
-    ``ct`` and ``st``: cosine and sine of the pitch; ``swing``: velocity by flapping; ``u``, ``w``: the stream along body
-    x and this side's z; ``stream`` and ``whole`` scale its part along the chord and normal to it.
+    ``ct`` and ``st``: cosine and sine of the pitch; ``swing``: velocity by flapping; ``u``, ``w``: the stream along
+    body x and this side's z; ``stream`` and ``whole`` scale its part along the chord and normal to it.
     """
     vx = swing * ct + (u * st + w * ct) * stream
     vz = whole * (u * ct - w * st) - swing * st
