@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 RUNS := $(VENV)/runs
 INSTALLED := $(VENV)/installed
 
-.PHONY: demo proof test test-service test-pages test-rest check check-wheel serve format lock install pin-image check-image clean
+.PHONY: demo proof test test-service test-pages test-programs test-rest check check-wheel serve format lock install pin-image check-image clean
 
 demo: $(RUNS)  ## start the service, calibrate the example campaign, print what came out
 	@$(BIN)/python -m examples.demo
@@ -17,8 +17,8 @@ proof: $(RUNS)  ## play both stories on concealed data, each ending with a repor
 serve: $(RUNS)  ## start the service and stay
 	@$(BIN)/wingfit serve
 
-test: $(INSTALLED)  ## every check and every test, three at a time: servers and browsers wait more than they compute
-	@$(MAKE) --no-print-directory -k -j3 test-rest test-service test-pages check
+test: $(INSTALLED)  ## every check and every test, four at a time: programs, servers and browsers wait more than they compute
+	@$(MAKE) --no-print-directory -k -j4 test-service test-rest test-programs test-pages check
 
 test-service:
 	$(BIN)/python -m pytest tests/service --ignore tests/service/pages
@@ -26,8 +26,13 @@ test-service:
 test-pages:
 	$(BIN)/python -m pytest tests/service/pages
 
+# They start programs, and wait for them.
+PROGRAMS := tests/docs tests/benchmarks tests/workers
+test-programs:
+	$(BIN)/python -m pytest $(PROGRAMS)
+
 test-rest:
-	$(BIN)/python -m pytest --ignore tests/service
+	$(BIN)/python -m pytest --ignore tests/service $(PROGRAMS:%=--ignore %)
 
 check: $(INSTALLED) check-image  ## every check, no test
 	$(BIN)/ruff check .
