@@ -158,7 +158,7 @@ class BladeElementWing:
     # -- effects -----------------------------------------------------------------------------------------------
 
     def _by_active_effects(self, batch: Array) -> list[tuple[tuple[Effect, ...], list[int]]]:
-        """Sets of effects on the vehicle that are on together, each with the rows of ``batch`` [B, G] that have it on."""
+        """Sets of effects on the vehicle, each with the indices in ``batch`` [B, G] where just these are on."""
         return by_active([effect for effect in self.chosen if effect.vehicle], self.genes, batch)
 
     def _rows_with_effects(
