@@ -268,7 +268,7 @@ def _noise(found: Poses, centre: Array, body: Body, step: float, low_pass: LowPa
 
 
 def _of_centre(found: Poses, body: Body) -> Array:
-    """Sensitivity [T, 6, 3 M] to the markers' displacements of the centre of mass's and the rotation, in body axes."""
+    """Derivative [T, 6, 3 M] of centre of mass (m) and rotation (rad) by the markers' displacements, in body axes."""
     G = found.sensitivity
     moved = G.copy()
     moved[:, :3] -= cross_matrices(body.centre) @ G[:, 3:]
