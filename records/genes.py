@@ -20,8 +20,9 @@ class EstimateError(ValueError):
 
 @dataclass(frozen=True)
 class Gene:
-    """One parameter that a calibration may search.
+    """One parameter that a calibration may search, bounded by ``lower`` and ``upper``, in ``unit``.
 
+    ``nominal`` is its value without a calibration; ``scale`` ("linear", "log") spreads a search over the bounds.
     ``share_of`` names a group whose values are weights: the model divides each by the sum of its group, so
     that the shares sum to one for every genome (thesis Eqs. 12-13).
     """
@@ -51,7 +52,7 @@ class Gene:
             raise ValueError(f"gene '{self.name}' is {value:g}{unit}; it must lie in {bounds}")
 
     def to_unit(self, value: ArrayLike) -> Float[Array, "*B"]:
-        """Map values to [0, 1], logarithmically for a log-scaled gene."""
+        """Map values between the bounds to [0, 1], logarithmically for a log-scaled gene."""
         v = np.asarray(value, float)
         if self.scale == "log":
             return np.asarray(np.log(v / self.lower) / math.log(self.upper / self.lower))

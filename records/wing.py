@@ -22,7 +22,8 @@ class Station:
 class Rod:
     """Carbon rod that slides in a straw glued into the foam, straight from (x_root, y_root) to (x_tip, y_tip), in m.
 
-    The straw with its glue adds ``glue_linear_density`` (kg/m). A driven rod continues as the driving rod of its name.
+    The straw with its glue adds ``glue_linear_density`` (kg/m). A driven rod
+    continues beyond the root as the driving rod that the drive turns.
     """
 
     name: str

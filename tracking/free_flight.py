@@ -28,7 +28,7 @@ _MAX_SPEED = 100.0  # m/s, as in a dataset
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """The rigid body: ``markers`` [M, 3] and ``centre`` [3] of mass in body axes (m), mass (kg).
+    """The rigid body: positions of its ``markers`` [M, 3] and its ``centre`` of mass [3] in body axes (m), mass (kg).
 
     ``inertia`` [3, 3] about the centre of mass in body axes, kg m^2, where moments are wanted.
     """
@@ -185,7 +185,7 @@ def _even_step(times: Array) -> float:
 
 
 def _about(found: Poses) -> list[str]:
-    """Remarks on frames without a pose and on outliers."""
+    """Remarks for the user on frames without a pose and on outliers."""
     frames, missing, rejected = len(found.position), int(np.isnan(found.position[:, 0]).sum()), found.rejected
     remarks = {
         f"{missing} of {frames} frames have no pose: fewer than 3 markers, or markers on one line": missing,
@@ -204,7 +204,7 @@ class _Bridge:
 
 
 def _bridges(known: Mask, longest: int) -> list[_Bridge]:
-    """Cubic interpolation over gaps of at most ``longest`` frames."""
+    """Cubic interpolation of each frame in gaps of at most ``longest`` frames; ``known`` [T]: the frame has a pose."""
     rows, found = np.flatnonzero(known), []
     for before, after in pairwise(rows.tolist()):
         if 1 < after - before <= longest + 1:
@@ -217,7 +217,10 @@ def _bridges(known: Mask, longest: int) -> list[_Bridge]:
 
 
 def _spread_over(taps: Array, rows: Index, bridges: list[_Bridge]) -> Array:
-    """Filter weights [rows, 2 n + 1], with those of interpolated frames moved to the frames they come from."""
+    """Filter weights [rows, 2 n + 1] at frames ``rows``, applied to the frames that have a pose.
+
+    The weights ``taps`` [2 n + 1] of interpolated frames are moved to the frames they are interpolated from.
+    """
     n, spread = len(taps) // 2, np.tile(taps, (len(rows), 1))
     for bridge in bridges:
         place = bridge.frame - rows + n
@@ -230,7 +233,10 @@ def _spread_over(taps: Array, rows: Index, bridges: list[_Bridge]) -> Array:
 
 
 def _attitude(smooth: list[Array]) -> tuple[Array, Array, Array]:
-    """Rotation [T, 3, 3], angular velocity and acceleration [T, 3] in body axes from smoothed quaternions."""
+    """Rotation [T, 3, 3], angular velocity and acceleration [T, 3] in body axes from quaternions.
+
+    ``smooth``: smoothed pose [T, 7] (position, quaternion w, x, y, z) and its first two derivatives.
+    """
     size = np.linalg.norm(smooth[0][:, 3:], axis=1, keepdims=True)
     q, dq, ddq = (s[:, 3:] / size for s in smooth)
     w, v = q[:, :1], q[:, 1:]
@@ -262,7 +268,7 @@ def _noise(found: Poses, centre: Array, body: Body, step: float, low_pass: LowPa
 
 
 def _of_centre(found: Poses, body: Body) -> Array:
-    """Sensitivity [T, 6, 3 M] of displacement of the centre of mass, and of rotation, to the markers, in body axes."""
+    """Derivative [T, 6, 3 M] of centre of mass (m) and rotation (rad) by the markers' displacements, in body axes."""
     G = found.sensitivity
     moved = G.copy()
     moved[:, :3] -= cross_matrices(body.centre) @ G[:, 3:]
@@ -296,7 +302,7 @@ def _admissible(values: Array) -> Array:
 
 
 def _toeplitz(correlation: Array, size: int) -> Array:
-    """Correlation matrix [size, size]."""
+    """Correlation matrix [size, size] of samples in sequence, from the autocorrelation [L]; zero beyond."""
     return np.asarray(scipy.linalg.toeplitz(np.pad(correlation, (0, size))[:size]))
 
 

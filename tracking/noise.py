@@ -60,7 +60,7 @@ def least_squares(times: Array, design: Array, values: Array, noise: Noise | Non
 def products(a: Array, b: Array) -> Array:
     """a^T b of tall matrices [N, p], [N, q].
 
-    Not by BLAS: on busy cores, synchronising its threads takes a hundred times longer than so small a product.
+    BLAS is not used: on busy cores, synchronising its threads takes a hundred times longer than so small a product.
     """
     return np.asarray(np.einsum("ni,nj->ij", a, b))
 
@@ -80,7 +80,7 @@ def correlated(noise: Noise, times: Array, columns: Array) -> Array:
 
 
 def estimate(times: Array, design: Array, values: Array) -> Noise:
-    """Noise of ``values`` in a linear model with the columns of ``design``, by restricted maximum likelihood.
+    """Noise of ``values`` [N] in a linear model with the ``design`` [N, p], by restricted maximum likelihood.
 
     Patterson and Thompson (1971, Biometrika 58): unlike the variance of the residuals it is not biased by the degrees
     of freedom of the fit. At most ``BLOCKS`` blocks of ``BLOCK`` samples are used.
@@ -115,7 +115,10 @@ def _blocks(times: Array, design: Array, values: Array) -> list[Block]:
 
 
 def _restricted(blocks: list[Block], share: float, time: float, scale: float) -> tuple[float, float]:
-    """Minus twice the restricted log-likelihood up to a constant, at the best variance, and that variance."""
+    """Minus twice the restricted log-likelihood of the noise up to a constant, at the best variance; that variance.
+
+    ``share`` of the variance is coloured, with the correlation time ``time`` (s); values are divided by ``scale``.
+    """
     shape = Noise(float(np.sqrt(1 - share)), float(np.sqrt(share)), time)
     columns = blocks[0][1].shape[1]
     total, logarithm, count = np.zeros((columns + 1, columns + 1)), 0.0, 0
@@ -135,7 +138,7 @@ def _restricted(blocks: list[Block], share: float, time: float, scale: float) ->
 def _whitened(noise: Noise, times: Array, columns: Array) -> tuple[Array, float]:
     """``columns`` [N, p] whitened for ``noise``, and the logarithm of the determinant of its covariance.
 
-    Kalman filter of the exponentially correlated part (Jones 1981): exact, and linear in N.
+    By the Kalman filter of the exponentially correlated part (Jones 1981): exact, and linear in N.
     """
     decay = np.exp(-np.diff(times, prepend=times[0]) / noise.time)
     power, nugget = noise.coloured**2, noise.white**2

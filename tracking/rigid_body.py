@@ -41,7 +41,7 @@ class Poses:
 
     @property
     def sensitivity(self) -> Array:
-        """[T, 6, 3 M] derivative of the pose by the markers' displacements (m), all in body axes.
+        """Derivative [T, 6, 3 M] of the pose by the markers' displacements (m), all in body axes.
 
         Rows: displacement of the body's origin (m), then small rotation (rad), of the linearised least-squares fit.
         """
@@ -88,7 +88,7 @@ def scale_remarks(tracks: Array, shape: Array) -> list[str]:
 def _scale(tracks: Array, shape: Array) -> float:
     """Ratio of the distances between markers in the tracks to those in ``shape``; NaN if no two are seen together.
 
-    The median over pairs and frames, which is robust to swapped markers.
+    It is the median over pairs and frames, which is robust to swapped markers.
     """
     first, second = np.triu_indices(len(shape), 1)
     expected = np.linalg.norm(shape[first] - shape[second], axis=-1)
@@ -102,8 +102,8 @@ def poses(tracks: Array, shape: Array) -> Poses:
     """Least-squares poses (Arun, Huang and Blostein 1987; Kabsch 1976) of ``tracks`` [T, M, 3], m, NaN where not seen.
 
     ``shape`` [M, 3] are the markers' positions in body axes, m. It is refined to the mean measured positions, aligned
-    with the given ones by least squares; so an error of the shape does not make the pose jump when a marker vanishes.
-    Samples far from the rigid body (swapped markers) are excluded.
+    with the given ones by least squares, so that an error of the shape does not make the pose jump when a marker
+    vanishes. Samples far from the rigid body (swapped markers) are excluded.
     """
     if np.linalg.matrix_rank(shape - shape.mean(axis=0), tol=_FLAT * float(np.ptp(shape, axis=0).max())) < 2:
         raise ValueError(f"the {len(shape)} markers lie on one line; a pose needs 3 that do not")
@@ -153,7 +153,7 @@ def _align(body: Array, world: Array, seen: Mask) -> tuple[Array, Array]:
 
 
 def _outlying(found: Poses) -> Mask:
-    """[T, M] the worst marker of each frame if its residual is far above the median; at least four must remain."""
+    """True [T, M] for the worst marker of a frame if its residual is far above the median and four others remain."""
     size = np.linalg.norm(found.residuals, axis=-1)
     usual = float(np.nanmedian(size)) if np.isfinite(size).any() else 0.0
     worst = np.where(np.isfinite(size), size, -1.0)

@@ -27,11 +27,11 @@ _UNDETERMINED = 1e8
 
 @dataclass(frozen=True, eq=False)
 class PeriodicFit:
-    """mean + sum_k [cosine_k cos(2 pi k t*) + sine_k sin(2 pi k t*)], t* = frequency (t - start).
+    """Fitted series: mean + sum_k [cosine_k cos(2 pi k t*) + sine_k sin(2 pi k t*)], t* = frequency (t - start).
 
     Attributes:
         frequency: of the beat, Hz; ``start``: a time at which t* = 0, s.
-        coefficients: [1 + 2 K] mean, cosine_1, sine_1, cosine_2, ...; ``covariance``: theirs under coloured noise.
+        coefficients: [1 + 2 K] mean, cosine_1, sine_1, cosine_2, ...; ``covariance``: of these, under coloured noise.
         noise: of one sample.
         lost: [4] bound on the RMS over the beat of the harmonics beyond K, for value and derivatives (unit / s^d);
             infinite if the amplitudes decrease too slowly for the derivative to be square integrable.
@@ -68,18 +68,18 @@ class PeriodicFit:
 
     @property
     def passed(self) -> Array:
-        """[4] RMS over the beat of the noise in value and derivatives."""
+        """RMS over the beat of the noise in the value and its first three derivatives [4], unit / s^d."""
         errors = np.stack([self.error_at(_phases(), d) for d in range(DERIVATIVES + 1)])
         return np.asarray(np.sqrt(np.mean(errors**2, axis=1)))
 
     @property
     def error(self) -> Array:
-        """[4] RMS over the beat of noise and truncation error together."""
+        """RMS over the beat of noise and truncation error together, of the value and three derivatives [4]."""
         return np.hypot(self.passed, self.lost)
 
     @property
     def amplitude(self) -> Array:
-        """[4] RMS over the beat of the signal about its mean, and of its derivatives."""
+        """RMS over the beat of the signal about its mean, and of its three derivatives [4]."""
         return np.array([float(np.std(self.at(_phases(), d))) for d in range(DERIVATIVES + 1)])
 
     @property
@@ -89,7 +89,7 @@ class PeriodicFit:
         return float(c[0]), tuple(c[1::2].tolist()), tuple(c[2::2].tolist())
 
     def shifted(self, phase: float) -> PeriodicFit:
-        """The same motion with the phase ``phase`` as the new origin t* = 0."""
+        """The same motion, with the instant at t* = ``phase`` as the new origin t* = 0."""
         turn = _turn(self.harmonics, phase)
         return replace(
             self,
@@ -106,8 +106,8 @@ def fit_periodic(
     """Fit a periodic series to samples of several beats.
 
     ``times`` [N] in s increase, evenly or not; NaN in ``values`` [N] is a gap. Without ``harmonics`` their number is
-    chosen by cross-validation over beats (Stone 1974); with fewer than three beats over samples, where correlated noise
-    may be mistaken for motion. ValueError if the samples are too few for a series.
+    chosen by cross-validation over beats (Stone 1974). With fewer than three beats it is over samples, and correlated
+    noise may be mistaken for motion. ValueError if the samples are too few for a series.
     """
     seen = np.isfinite(values)
     times, values = times[seen], values[seen]
@@ -136,7 +136,7 @@ def fit_periodic(
 
 
 def basis(phase: Array, harmonics: int, derivative: int = 0, frequency: float = 1.0) -> Array:
-    """Columns [..., 1 + 2 K] of the series at ``phase``, or of a derivative in time."""
+    """Factors [..., 1 + 2 K] (1, cos, sin, ...) of the coefficients at ``phase`` t* [...], or of a time derivative."""
     k = np.arange(1, harmonics + 1)
     angle = 2 * np.pi * np.multiply.outer(phase, k)
     factor = (2 * np.pi * frequency * k) ** derivative
@@ -168,7 +168,7 @@ def _most_harmonics(phase: Array) -> int:
 
 
 def _predictions(phase: Array, values: Array, groups: Index, most: int) -> tuple[float, ...]:
-    """RMS error of predicting each group of samples from the others, for 1 to ``most`` harmonics."""
+    """RMS error of predicting each group of samples from the other groups, for 1 to ``most`` harmonics."""
     X, y = basis(phase, most), values - values.mean()
     parts = [(X[groups == g], y[groups == g]) for g in np.unique(groups)]
     squares = np.stack([products(x, x) for x, _ in parts])
@@ -216,7 +216,7 @@ def _between_beats(phase: Array, linear: LinearFit, group: Index, beats: int) ->
 
 
 def _lost(wide: LinearFit, used: int, frequency: float) -> Array:
-    """[4] RMS over the beat of the harmonics beyond the first ``used``, for the value and its derivatives.
+    """RMS [4] over the beat of the harmonics beyond the first ``used``, for the value and its derivatives.
 
     The amplitude of each such harmonic is its estimate in the longer series ``wide``, but at least the envelope C k^-q
     of the significant harmonics; beyond the longer series it is the envelope.

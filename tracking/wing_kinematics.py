@@ -73,7 +73,7 @@ class PitchLaw:
 class WingKinematics:
     """The estimated motion, the series it is based on, and remarks.
 
-    ``angles`` are the fitted ones, the flap angle from the closed position.
+    ``angles`` are those to which the series were fitted, the flap angle counted from the closed position.
     ``start`` is a time (s, clock of the recording) at which a beat starts; ``start_error`` its standard error.
     """
 
@@ -311,7 +311,7 @@ def pitch_law(times: Array, pitch: Array, flap: PeriodicFit) -> PitchLaw:
 
 
 def beats_of(t_star: Array) -> Array:
-    """Phase [N] that increases over beats, from phases [N] that may start again from 0 in every beat."""
+    """Phase [N] in beats that increases throughout, from phases ``t_star`` [N] that may restart at 0 in every beat."""
     if not np.isfinite(t_star).all():
         raise ValueError("t_star has empty cells; give every row its phase")
     return np.asarray(t_star + np.concatenate([[0.0], np.cumsum(np.ceil(np.maximum(-np.diff(t_star), 0)))]))

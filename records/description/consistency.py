@@ -61,7 +61,7 @@ def _vehicle(dataset: VehicleDatasetFile) -> Iterator[Inconsistency]:
 
 
 def _starts_closed(motion: MotionFile, path: Path) -> Iterator[Inconsistency]:
-    """Wings that clap must be nearly closed at the start of the beat; a split cycle always is."""
+    """Yield an inconsistency if wings that clap are open at the start of the beat; a split cycle never is."""
     flap = motion.flap
     if not isinstance(flap, FourierFile):
         return

@@ -98,7 +98,7 @@ def _attribute(key: str, attributes: Iterable[str]) -> tuple[str | None, Unit]:
 
 
 def _to_value(value: Any, hint: Any, unit: Unit) -> object:
-    """The attribute of type ``hint`` that ``value`` of the file, in ``unit``, stands for."""
+    """Convert ``value`` of the file, which is in ``unit``, to an attribute of type ``hint`` in SI units."""
     if isinstance(value, BaseModel):
         kind = getattr(value, "kind", None)
         return to_dataclass(next(c for c in _dataclasses(hint) if getattr(c, "kind", None) == kind), value)
@@ -130,7 +130,7 @@ def _data(values: Mapping[str, object], model: type[BaseModel]) -> dict[str, obj
 
 
 def _plain(value: Any, models: Sequence[type[BaseModel]], unit: Unit) -> object:
-    """An attribute as plain data, in ``unit``; a dataclass as the keys of that of ``models`` which has its kind."""
+    """Convert an attribute to plain data, in ``unit``; a dataclass by the one of ``models`` with the same ``kind``."""
     if is_dataclass(value):
         kind = getattr(value, "kind", None)
         return to_data(value, next(model for model in models if tag_of(model) == kind))

@@ -92,7 +92,7 @@ def tag_of(model: type[BaseModel]) -> str | None:
 
 
 def one_or_each(value: Any) -> str:
-    """Tag of a noise level in a union: one number for all channels, or a mapping with one for each."""
+    """Discriminator of the forms of a noise level: "one" number for all channels, or a mapping with "each"."""
     return "each" if isinstance(value, Mapping) else "one"
 
 

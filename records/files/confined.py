@@ -151,7 +151,7 @@ def _failure(status: int, label: str, limits: Limits) -> Exception:
 
 
 def _faults(answer: bytes, label: str) -> DatasetError:
-    """The faults that the child reported, all taken as plain text."""
+    """The faults that the child reported as JSON; its texts are not trusted and are taken as plain text."""
     try:
         report = json.loads(answer)
         faults = [Fault(str(where), value and str(value), str(message)) for where, value, message in report["faults"]]
@@ -195,7 +195,7 @@ def main(arguments: Sequence[str]) -> None:
 
 
 def _limit(which: int, most: int, slack: int = 0) -> None:
-    """Set a soft limit, and a hard limit that is larger by ``slack``."""
+    """Set the soft limit ``most`` of a resource (``resource.RLIMIT_...``), and a hard limit larger by ``slack``."""
     _, hard = resource.getrlimit(which)
     hard = most + slack if hard == resource.RLIM_INFINITY else min(most + slack, hard)
     resource.setrlimit(which, (min(most, hard), hard))

@@ -43,7 +43,7 @@ _BROKEN = (OSError, KeyError, RuntimeError, ValueError, TypeError, AttributeErro
 
 
 class Limit(NamedTuple):
-    """Numbers that may still be read, ``left`` of ``most``, and whether the storage layout is checked."""
+    """How many numbers may still be read (``left`` of ``most``), and whether the ``storage`` layout is checked."""
 
     left: int
     most: int

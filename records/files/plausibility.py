@@ -64,7 +64,7 @@ def _check_times(times: Float[Array, " T"], at: Locate, faults: Faults) -> bool:
 def _check_positions(
     values: Float[Array, "T C"], markers: tuple[str, ...], wing: Wing, where: str, faults: Faults
 ) -> None:
-    """Markers are within about a span of the hinge; farther ones indicate another unit or frame."""
+    """Add a fault for markers far from the hinge: beyond about a span, unit or frame are likely to be wrong."""
     hinge = (0.0, wing.hinge.y, wing.hinge.z)
     distance = _typical(values, hinge)
     limit = limits.IMPLAUSIBLE_SPANS * wing.span
@@ -90,7 +90,7 @@ def _check_positions(
 def _typical(values: Float[Array, "T C"], hinge: tuple[float, float, float]) -> float:
     """Largest median distance from the hinge along an axis, of markers [T, 3 M]; 0 without any value.
 
-    One axis after the other, to save memory.
+    The axes are treated one after the other, to save memory.
     """
     return max(_median_distance(values[:, axis::3], hinge[axis]) for axis in range(3))
 
@@ -102,7 +102,10 @@ def _median_distance(places: Float[Array, "T M"], origin: float) -> float:
 
 
 def _check_forces(recording: Recording, vehicle: Vehicle, where: str, faults: Faults) -> None:
-    """Forces in flight are about a weight; far larger or smaller ones indicate another unit. One axis may be zero."""
+    """Add a fault for forces far larger or smaller than the vehicle's weight: their unit is likely to be wrong.
+
+    The larger axis counts; the other may be zero.
+    """
     sizes = {}
     for name, axis in zip(recording.forces, recording.values.T, strict=True):
         found = axis[np.isfinite(axis)]

@@ -43,7 +43,7 @@ class Samples:
 
 @dataclass(frozen=True)
 class Layout:
-    """Columns of a file: that of the time, and ``columns`` [C] in the order of the channels."""
+    """Indices of the columns of a file: of ``time``, and ``columns`` [C] in the order of the channels."""
 
     time: int
     columns: list[int]

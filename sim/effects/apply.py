@@ -25,7 +25,7 @@ def by_active(
 
 
 def affected(effects: Iterable[Effect], genes: tuple[Gene, ...], genomes: Array) -> Index:
-    """Indices of those of ``genomes`` [B, G] of which an effect changes the observation."""
+    """Indices of those of ``genomes`` [B, G] in which at least one of the effects on the observation is on."""
     on = [effect.on(genes, genomes) for effect in effects if effect.observe]
     return np.flatnonzero(np.any(on, axis=0)) if on else np.empty(0, np.intp)
 

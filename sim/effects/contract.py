@@ -1,7 +1,8 @@
 """What every effect declares, and the three places where it may act: a wing, a vehicle, an observation.
 
 An effect has sizes: parameters that switch it off exactly where all of them are zero. Its other parameters say where it
-acts and how; they have no meaning then. All become genes, which a calibration searches like any other.
+acts and how; they have no meaning while the effect is off. All become genes, which a calibration searches like any
+other.
 """
 
 from __future__ import annotations
@@ -54,8 +55,8 @@ class Parameter:
         description: what it is, for users.
         of: the measure of the rig that scales bounds and typical value: its span (m), its mean chord (m) or the mass of
             the wing (kg).
-        place: whether it says where on the wing the effect acts.
-        scale: how a search spreads over the bounds.
+        place: whether the parameter is a position on the wing where the effect acts.
+        scale: how a search spreads over the bounds, "linear" or "log".
     """
 
     name: str
@@ -76,10 +77,10 @@ class Effect:
     ValueError if its port does not take its family (:data:`FAMILIES`), or if its law names none of its sizes.
 
     Attributes:
-        name: also of its file, and of its page docs/effects/NAME.md.
-        title: for users.
+        name: identifier; also the name of its file, and of its page docs/effects/NAME.md.
+        title: name for users.
         family: kind of physics.
-        port: where it enters the model.
+        port: the part of the model that it changes.
         size: parameters that switch it off exactly where all are zero.
         shape: the other parameters.
         power: energy exchange of its own law: "conservative": none is gained or lost over a beat; "dissipative": some
@@ -131,7 +132,7 @@ class Effect:
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """Sizes, then the others."""
+        """All parameters: sizes, then shape parameters."""
         return (*self.size, *self.shape)
 
     @property
@@ -160,7 +161,7 @@ class Effect:
         return {p.name: genomes[:, column[f"{self.name}.{p.name}"]] for p in self.parameters}
 
     def on(self, genes: tuple[Gene, ...], genomes: Array) -> Mask:
-        """Whether it is switched on, in each of ``genomes`` [B, G]."""
+        """Whether any size of the effect is nonzero in each of ``genomes`` [B, G]."""
         values = self.values(genes, genomes)
         return np.asarray(np.any([values[p.name] != 0.0 for p in self.size], axis=0))
 
@@ -181,7 +182,7 @@ fault_of_recordings = partial(Effect, family="measurement", port="observation", 
 
 
 def place(station: float, chord: float) -> tuple[Parameter, Parameter]:
-    """Shape parameters of an effect at one place of the wing, by the typical place."""
+    """Two parameters for the position of an effect on the wing, with typical fractions of the span and of the chord."""
     along = "position along the span, as a fraction of the span from root to tip"
     across = "position along the chord, as a fraction of the chord from the leading edge"
     return (
@@ -191,7 +192,7 @@ def place(station: float, chord: float) -> tuple[Parameter, Parameter]:
 
 
 def measure(rig: Wing | Vehicle, of: Measure | None) -> float:
-    """A length (m) or mass (kg) of ``rig``; 1 for None."""
+    """The measure ``of`` the rig by which bounds of parameters are scaled: length (m) or mass (kg); 1 for None."""
     if of is None:
         return 1.0
     if of == "mass":

@@ -1,7 +1,7 @@
-"""A given load on the wing, by its place along the span and its phase, or a given motion of its drive.
+"""A given load on the wing, by its position along the span and its phase, or a given motion of its drive.
 
-The response of the tracks to it shows which load or motion is missing where model and recording differ. It is not in
-the registry, because a search for missing physics must not propose it.
+The response of the tracks to this load shows which load or motion is missing where model and recording differ. It is
+not in the registry, because a search for missing physics must not propose it.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _CUTS = 1200  # pieces of the span over which the hat functions are averaged
 
 @dataclass(frozen=True)
 class Probe:
-    """A force per metre of span, N/m: hat functions over ``stations`` times a Fourier series of the drive phase.
+    """A force per metre of span (N/m): hat functions over ``stations`` times Fourier series of the drive phase.
 
     ``stations`` are fractions of the span, increasing from 0 (root) to 1 (tip); ``harmonics`` of the flap frequency.
     The force acts upward along the normal of the wing and is spread over the chord. ``turning`` adds a moment about the
@@ -139,7 +139,7 @@ class Probe:
 
 
 def strip_middles(structure: Structure) -> Array:
-    """Span parts [S] at which evenly spread loads of the strips act."""
+    """Fractions of the span [S] at which loads that are spread evenly over the strips act."""
     edges, wiring = structure.planform.strips(structure.division), structure.wiring
     y = np.array([body.centroid[1] for body in structure.bodies])
     middle = np.add.reduceat(wiring.weight * y, wiring.strip_start[:-1])
@@ -147,23 +147,26 @@ def strip_middles(structure: Structure) -> Array:
 
 
 def _push(frame: Any, moment: int) -> None:
-    """The normal force on each strip."""
+    """Add the normal force on each strip."""
     _series(frame, PUSH_N)
 
 
 def _roll(frame: Any, moment: int) -> None:
-    """The moment of the forces about the middle of their strip."""
+    """Add the moment, about the strip's middle, of the forces on each strip."""
     _series(frame, PUSH_L)
 
 
 def _turn(frame: Any, moment: int) -> None:
-    """The moment about the span."""
+    """Add the moment about the span on each strip."""
     _series(frame, PUSH_M)
 
 
 @inlined
 def _series(frame: Any, which: int) -> None:
-    """Add sum_k a_k cos k psi + b_k sin k psi to a load, with the stage's share of its rate of change in a step."""
+    """Add sum_k a_k cos k psi + b_k sin k psi to row ``which`` of the strips' loads, psi being the drive phase.
+
+    The parameters a_k, b_k are in N or N m; the integrator's term for explicit dependence on time is included.
+    """
     port = strip_port(frame)
     harmonics = len(port.parameters) // 2
     share = load1(port.clock, SHARE)
@@ -184,7 +187,7 @@ def _series(frame: Any, which: int) -> None:
 
 @inlined
 def _further(turned: Any, by: Any) -> Any:
-    """Cosine and sine of the sum of two angles."""
+    """(Cosine, sine) of the sum of two angles, from those of the angles."""
     return turned[0] * by[0] - turned[1] * by[1], turned[1] * by[0] + turned[0] * by[1]
 
 

@@ -29,11 +29,12 @@ def strip_flow(
     start: Index, weight: Array, centroid: Array, wind: Array, coefficients: Array, induced: Array, R: Array,
     p: Array, V: Array, flow: Array, loads: Array,
 ) -> None:  # fmt: skip
-    """The airflow of every strip, ``flow`` [S, FLOW, W], and ``loads`` [S, LOADS, W] by the affine laws.
+    """Set the airflow of every strip, ``flow`` [S, FLOW, W], and its ``loads`` [S, LOADS, W] by the affine laws.
 
-    ``start`` [S + 1]: bodies of each strip; ``weight`` [N]: share of the strip's area, ``centroid`` [N, 2]: planform
-    centroid in the body frame; ``coefficients`` [4, W]: L_a, L_b, ID_a, ID_b; ``induced`` [S, 3, W]: velocity of the
-    air in addition to the wind; if it is empty, position and pitch rate of the strips are not computed either.
+    Strip s consists of the bodies ``start[s]`` to ``start[s + 1]`` - 1; ``weight`` [N]: a body's share of the strip's
+    area, ``centroid`` [N, 2]: of its planform, body frame (m); ``coefficients`` [4, W]: L_a, L_b, ID_a, ID_b of C_L =
+    L_a alpha + L_b and C_D = ID_a |alpha| + ID_b; ``induced`` [S, 3, W]: velocity of the air in addition to the wind
+    (m/s); if it is empty, position and pitch rate of the strips are not computed either.
     """
     mean = np.empty((9, LANES))
     for s in range(len(start) - 1):
@@ -89,7 +90,7 @@ def strip_flow(
 def _position_and_pitch_rate(
     s: int, start: Index, weight: Array, centroid: Array, R: Array, p: Array, V: Array, flow: Array
 ) -> None:
-    """Set the position of the strip's centroid in the world, and its pitch rate."""
+    """Set in ``flow`` the position of the centroid of strip ``s`` in the world, and the strip's pitch rate."""
     for i in (arrays.PLACE_X, arrays.PLACE_X + 1, arrays.PLACE_X + 2, arrays.PITCH_RATE):
         store(flow, s, i, 0.0)
     for n in range(start[s], start[s + 1]):
@@ -112,11 +113,12 @@ def strip_forces(
     drag_share: Array, drag_x: Array, flow: Array, loads: Array, spread: bool, R: Array, V: Array, wrench: Array,
     damping: Array, power: Array, force: Array,
 ) -> None:  # fmt: skip
-    """Add the air's wrench to every body, from the ``loads`` of its strip.
+    """Add to ``wrench`` that of the air on every body, from the ``loads`` of its strip.
 
-    ``lift_x``, ``drag_x`` [N, W]: points of action of the shares along the chord, in the body frame; ``spread``:
-    whether there are uniformly distributed loads. Also set: ``damping`` [N, W], force per normal speed of the body (for
-    the linearisation), ``power`` [W] of the air on the wing, ``force`` [3, W] of the air on the wing in the world.
+    ``lift_share``, ``drag_share`` [N, W]: the body's fraction of the strip's lift and drag; ``lift_x``, ``drag_x``
+    [N, W]: where these act along the chord, body frame (m); ``spread``: whether there are uniformly distributed loads.
+    Also set: ``damping`` [N, W], force per normal speed of the body (for the linearisation), ``power`` [W] of the air
+    on the wing, ``force`` [3, W] of the air on the wing in the world.
     """
     lift, drag = np.empty((4, LANES)), np.empty((4, LANES))
     push = np.empty((5, LANES))

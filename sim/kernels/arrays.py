@@ -44,9 +44,12 @@ AREA, MEAN_CHORD, WIDTH, STATION, GEOMETRY = range(5)  # m^2, m, m, part of the 
 class Wiring(NamedTuple):
     """Topology and geometry, the same for all individuals. Bodies 0..N-1, driving rods N and N+1.
 
-    Connectors from index ``driven`` on start at a driving rod. ``lower`` and ``upper`` are their blocks in the matrix
-    (``wingfit.sim.kernels.tangents``); ``order`` to ``fill`` are those of ``wingfit.sim.solver.elimination``.
-    ``geometry`` [S, GEOMETRY].
+    ``mass`` [N] (kg) and ``inertia`` [N, 9] (kg m^2) of the bodies. Connector c joins the arm ``a`` [C, 3] of body
+    ``first`` [C] to the arm ``b`` of ``second`` (m); those from index ``driven`` on start at a driving rod. ``lower``
+    and ``upper`` [C] are their blocks in the matrix (:func:`wingfit.sim.kernels.tangents.add_connectors`); ``order`` to
+    ``fill`` are those of ``wingfit.sim.solver.elimination``. ``strip_start``, ``weight``, ``centroid``: see
+    :func:`wingfit.sim.kernels.air.strip_flow`; ``geometry`` [S, GEOMETRY] of the strips. ``markers`` [M, 3]: positions
+    in the frames of the bodies ``carrier`` [M], m.
     """
 
     mass: Array
@@ -83,13 +86,13 @@ class Setting(NamedTuple):
 
 
 class Laws(NamedTuple):
-    """Compiled laws of the effects chosen.
+    """Compiled laws of the effects chosen: functions called by address (:mod:`wingfit.sim.kernels.laws`).
 
-    ``strip`` and ``connector`` [L, 6]: address of the law, number of parameters and of states per place, their first
-    indices in ``parameters`` [., W] and in the states [Z, W], first index in ``axes``. ``axes``: axis of each state per
-    connector, 0..5 as in stiffness. ``size`` [Z]: scale of a state in metres. ``point`` [L, 5]: address of the law,
-    number of parameters and of points, first indices in ``parameters`` and among the points; ``bodies`` [P] of the
-    points, and where they lie on these, ``arms`` [P, 3, W]. ``motor`` [MOTOR, W] or empty: a compliant drive
+    ``strip`` and ``connector`` [L, 6]: address of the law, number of its parameters and of its states for each strip or
+    connector, their first indices in ``parameters`` [., W] and in the states [Z, W], first index in ``axes``. ``axes``:
+    axis of each state of a connector, 0..5 as in stiffness. ``size`` [Z]: scale of a state in metres. ``point`` [L, 5]:
+    address of the law, number of parameters and of points, first indices in ``parameters`` and among the points, which
+    lie on ``bodies`` [P] at ``arms`` [P, 3, W] (m, body frame). ``motor`` [MOTOR, W] or empty: a compliant drive
     (:mod:`wingfit.sim.kernels.motor`), whose states are the last.
     """
 
@@ -107,12 +110,12 @@ class Laws(NamedTuple):
 class Lanes(NamedTuple):
     """Inputs that differ between individuals.
 
-    Stiffness and damping [C, 6, W], air coefficients [4, W], shares of lift and drag and where they act [N, W],
-    ``hinge`` [9, W]: axis of the driving rods, offset of its true position from that in the rods' frame, and the true
-    position (m). The others are empty for most wings: the stiffness [C, 9, W] that couples rotation with translation;
-    ``pairs`` [P, 3] of bodies (i, j) with the number of their matrix block, whose momenta are coupled by ``masses``
-    [P, 36, W], the first ``weighing`` of which have weight, while the others are added mass of the air; and the laws of
-    effects, see :mod:`wingfit.sim.kernels.laws`.
+    Stiffness and damping [C, 6, W], air coefficients [4, W], shares of lift and drag and where they act [N, W]
+    (:mod:`wingfit.sim.kernels.air`), ``hinge`` [9, W]: axis of the driving rods, offset of its true position from that
+    in the rods' frame, and the true position (m). The others are empty for most wings: the stiffness [C, 9, W] that
+    couples rotation with translation; ``pairs`` [P, 3] of bodies (i, j) with the number of their matrix block, whose
+    momenta are coupled by ``masses`` [P, 36, W], the first ``weighing`` of which have weight, while the others are
+    added mass of the air; and the laws of effects, see :mod:`wingfit.sim.kernels.laws`.
     """
 
     stiffness: Array
@@ -169,7 +172,7 @@ class Trace(NamedTuple):
 
 
 def new_work(wiring: Wiring, setting: Setting, lanes: Lanes) -> Work:
-    """Working arrays for a group of lanes."""
+    """Allocate the working arrays for a group of lanes, zero except for the constants, and address them to the laws."""
     n, c, s = len(wiring.mass), len(wiring.first), len(wiring.geometry)
     z, laws = len(lanes.laws.size), lanes.laws
     motion, stages = (n + 2, 6), (STAGES, n + 2, 6)
@@ -208,7 +211,7 @@ def new_work(wiring: Wiring, setting: Setting, lanes: Lanes) -> Work:
 
 
 def _frame_laws(wiring: Wiring, setting: Setting, laws: Laws, work: Work) -> None:
-    """Fill the frame of every law with the addresses of its arrays."""
+    """Fill the frame of every law in ``work``: integers, its array sizes and the addresses of its arrays."""
     air = (work.flow, work.loads, work.induced, wiring.geometry, setting.density, setting.wind, work.clock)
     joints = (work.Q, work.d, work.twist, work.more, work.more_k, work.more_d, work.lost, work.stored)
     for k, row in enumerate(laws.strip):
@@ -226,6 +229,6 @@ def _frame_laws(wiring: Wiring, setting: Setting, laws: Laws, work: Work) -> Non
 
 
 def _frame(places: int, row: Index, arrays: tuple[Array, ...]) -> list[int]:
-    """The frame of a law: numbers of places, parameters and states, then the addresses of its arrays."""
+    """Numbers of strips, connectors or points (``places``), of parameters and of states, then addresses of arrays."""
     found = [places, int(row[1]), int(row[2]), *(array.ctypes.data for array in arrays)]
     return found + [0] * (FRAME - len(found))

@@ -17,7 +17,7 @@ from wingfit.sim.kernels.lanes.vector import Vector, load, load0, store, store0
 
 @kernel
 def move(R0: Array, p0: Array, xi: Array, R: Array, p: Array) -> None:
-    """Pose at local coordinates ``xi`` about (R0, p0).
+    """Set ``R``, ``p`` to the pose at local coordinates ``xi`` about (R0, p0).
 
     sin(t)/t and (1 - cos(t))/t^2 are power series in t^2, exact to round-off for t < 1; the integrator treats larger
     rotations in one step as divergence.
@@ -45,9 +45,10 @@ def move(R0: Array, p0: Array, xi: Array, R: Array, p: Array) -> None:
 
 @inlined
 def body_rate(theta: Three, omega: Three, v: Three) -> tuple[Vector, Vector, Vector, Vector, Vector, Vector]:
-    """Rate of the local coordinates: theta' = omega + theta x omega / 2 + theta x (theta x omega) / 12, d' = exp v.
+    """Components of theta', then of d': the rates of the local coordinates ``theta`` and d at the twist (omega, v).
 
-    theta is O(step); the series are truncated at an error of fourth order in theta.
+    theta' = omega + theta x omega / 2 + theta x (theta x omega) / 12, d' = exp(theta~) v. theta is O(step); the series
+    are truncated at an error of fourth order in theta.
     """
     a, b = cross(theta, omega), cross(theta, v)
     c, d = cross(theta, a), cross(theta, b)
@@ -99,7 +100,7 @@ def times_mass(mass: Array, inertia: Array, V: Array, out: Array) -> None:
 def kinetic_and_height(
     mass: Array, inertia: Array, p: Array, V: Array, gravity: float, kinetic: Array, potential: Array
 ) -> None:
-    """Kinetic energy 1/2 V^T M V and potential energy m g z of all bodies, per lane."""
+    """Set ``kinetic`` to 1/2 V^T M V and ``potential`` to m g z, summed over all bodies (both [W], J)."""
     kinetic[:] = 0.0
     potential[:] = 0.0
     momentum = np.zeros_like(V)
@@ -112,7 +113,7 @@ def kinetic_and_height(
 
 @kernel
 def track(markers: Array, carrier: Index, R: Array, p: Array, out: Array) -> None:
-    """World positions [M, 3, W] of markers carried at ``markers`` [M, 3] in the frames of bodies ``carrier`` [M]."""
+    """Set ``out`` [M, 3, W] to world positions of markers at ``markers`` [M, 3] in the frames of bodies ``carrier``."""
     for m in range(len(carrier)):
         n = carrier[m]
         x, y, z = markers[m, 0], markers[m, 1], markers[m, 2]

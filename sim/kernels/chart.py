@@ -33,7 +33,7 @@ def coordinates(about: State, state: State, rate: float, sizes: Array, out: Arra
 
 @kernel
 def displaced(about: State, x: Array, rate: float, sizes: Array, state: State) -> None:
-    """Set ``state`` to that with the coordinates ``x`` [12 N + Z]; its driving rods are not changed."""
+    """Set ``state`` from its coordinates ``x`` [12 N + Z] (:func:`coordinates`); its driving rods are not changed."""
     bodies = len(state.V) - 2
     for n in range(bodies):
         k = 12 * n
@@ -48,9 +48,9 @@ def displaced(about: State, x: Array, rate: float, sizes: Array, state: State) -
 
 @inlined
 def rotation_vector(first: Array, second: Array) -> tuple[float, float, float]:
-    """Rotation vector (rad) of first^T second, for matrices [9], by the unit quaternion.
+    """Rotation vector (rad) of first^T second, for rotation matrices [9], by the unit quaternion.
 
-    The largest component is computed first and the others divided by it, for accuracy at any angle (Shepperd, J.
+    The quaternion's largest component is computed first and the others from it, for accuracy at any angle (Shepperd, J.
     Guidance and Control 1, 1978).
     """
     a, b, c = _column(first, second, 0)
@@ -83,7 +83,7 @@ def _column(first: Array, second: Array, k: int) -> tuple[float, float, float]:
 
 @inlined
 def turn(first: Array, x: float, y: float, z: float, out: Array) -> None:
-    """first exp([x, y, z]~) into ``out`` [9] (Rodrigues 1840)."""
+    """Set ``out`` [9] to ``first`` [9] exp([x, y, z]~), the rotation vector (x, y, z) in rad (Rodrigues 1840)."""
     angle = math.sqrt(x * x + y * y + z * z)
     half = 0.5 * angle
     once = math.sin(angle) / angle if angle > 0 else 1.0

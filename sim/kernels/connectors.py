@@ -37,7 +37,7 @@ from wingfit.sim.kernels.lanes.vector import Vector, load, load0, store, store0
 
 @kernel
 def relative_pose(first: Index, second: Index, a: Array, b: Array, R: Array, p: Array, Q: Array, d: Array) -> None:
-    """Q [C, 9, W] and d [C, 3, W] of every connector."""
+    """Set Q [C, 9, W] and d [C, 3, W], rotation and position of frame B in frame A, of every connector."""
     for c in range(len(first)):
         i, j = first[c], second[c]
         back, B, bx, by, bz = transposed(load_matrix(R, i)), load_matrix(R, j), b[c, 0], b[c, 1], b[c, 2]
@@ -50,7 +50,10 @@ def relative_pose(first: Index, second: Index, a: Array, b: Array, R: Array, p: 
 
 @inlined
 def spring_wrench(Q: Nine, d: Three, ko: Three, kt: Three) -> tuple[Three, Three, Vector]:
-    """Moment and force of the spring on B in A's axes at o_B, and its energy (thesis Eqs. 5-7)."""
+    """Moment and force of the spring on B in A's axes at o_B, and its energy, by thesis Eqs. 5-7.
+
+    ``ko`` and ``kt``: stiffness of rotation about and of translation along the axes.
+    """
     g = co_stiffness(ko)
     x, y, z = d
     u = (
@@ -93,7 +96,7 @@ def relative_twist(
 
 @inlined
 def damper_wrench(rate: Three, slide: Three, do: Three, dt: Three) -> tuple[Three, Three]:
-    """Moment and force of the damper against the motion (thesis Eq. 4)."""
+    """Moment ``do`` times ``rate`` (rad/s) and force ``dt`` times ``slide`` (m/s), against the motion (Eq. 4)."""
     return ((do[0] * rate[0], do[1] * rate[1], do[2] * rate[2]), (dt[0] * slide[0], dt[1] * slide[1], dt[2] * slide[2]))
 
 
@@ -137,7 +140,7 @@ def connect(
 
 @kernel
 def twists(first: Index, second: Index, a: Array, b: Array, Q: Array, d: Array, V: Array, out: Array) -> None:
-    """Twist [C, 6, W] of each second body relative to the first at o_B, in A's axes: J V."""
+    """Set ``out`` [C, 6, W] to the twist J V of each second body relative to the first at o_B, in A's axes."""
     for c in range(len(first)):
         i, j = first[c], second[c]
         q, x = load_matrix(Q, c), load_vector(d, c, 0)
@@ -153,7 +156,10 @@ def twists(first: Index, second: Index, a: Array, b: Array, Q: Array, d: Array, 
 def add_turned(
     first: Index, second: Index, a: Array, b: Array, Q: Array, d: Array, V: Array, X: Array, out: Array
 ) -> None:
-    """Add to ``out`` [C, 6, W] the change of the relative twists with the pose, for bodies' displacements X: B J X."""
+    """Add to ``out`` [C, 6, W] the change B J X of the relative twists due to displacements X of the bodies.
+
+    B and J are those of :mod:`wingfit.sim.kernels.tangents`.
+    """
     for c in range(len(first)):
         i, j = first[c], second[c]
         q, x = load_matrix(Q, c), load_vector(d, c, 0)
@@ -169,7 +175,7 @@ def add_turned(
 
 @kernel
 def push_apart(first: Index, second: Index, a: Array, b: Array, Q: Array, d: Array, push: Array, wrench: Array) -> None:
-    """Subtract J^T times ``push`` [C, 6, W], a wrench against the second body's motion, from the bodies' wrenches."""
+    """Subtract the wrench ``push`` [C, 6, W] (at o_B, A's axes) from that on B, and its reaction from that on A."""
     for c in range(len(first)):
         i, j = first[c], second[c]
         q, x = load_matrix(Q, c), load_vector(d, c, 0)
@@ -183,7 +189,7 @@ def push_apart(first: Index, second: Index, a: Array, b: Array, Q: Array, d: Arr
 def tangent(
     first: Index, second: Index, a: Array, b: Array, C: Array, Q: Array, d: Array, X: Array, out: Array
 ) -> None:
-    """Subtract J^T C J X from ``out`` for bodies' motions X [N, 6, W]; C [C, 6, W] as K.
+    """Subtract J^T C J X from ``out`` for twists or displacements X of the bodies; C [C, 6, W] is a diagonal.
 
     J maps twists of the bodies to the relative twist of B in A. This is the material stiffness (or damping) only.
     """

@@ -88,7 +88,7 @@ def set_rods(rods: Array, hinge: Array, state: State) -> None:
 
 @kernel
 def forces(wiring: Wiring, setting: Setting, lanes: Lanes, work: Work) -> None:
-    """Wrenches on all bodies and rods, and rates of the effects' states, at pose, twist and states in ``work``."""
+    """Set ``work.wrench`` of all bodies and rods and the rates of the effects' states, for the motion in ``work``."""
     n = len(wiring.mass)
     w_, Q, d, laws = work.wrench, work.Q, work.d, lanes.laws
     relative_pose(wiring.first, wiring.second, wiring.a, wiring.b, work.R, work.p, Q, d)
@@ -124,7 +124,10 @@ def forces(wiring: Wiring, setting: Setting, lanes: Lanes, work: Work) -> None:
 
 @kernel
 def point_forces(lanes: Lanes, work: Work) -> None:
-    """Evaluate the laws of effects that act at points of bodies, and add their wrenches to those of the bodies."""
+    """Call the effects' laws that act at points of bodies, and add their wrenches to ``work.wrench``.
+
+    The laws themselves add the power that they dissipate and the energy that they store to ``lost`` and ``stored``.
+    """
     laws = lanes.laws
     work.point_wrench[:] = 0.0
     work.point_k[:] = 0.0
@@ -137,7 +140,7 @@ def point_forces(lanes: Lanes, work: Work) -> None:
 
 @kernel
 def airflow(wiring: Wiring, setting: Setting, lanes: Lanes, work: Work) -> None:
-    """Compute flow and loads of all strips."""
+    """Set ``work.flow`` and ``work.loads`` of all strips, with the contributions of the effects' laws of the air."""
     laws = lanes.laws
     work.induced[:] = 0.0
     for k in range(len(laws.strip)):
@@ -155,7 +158,7 @@ def airflow(wiring: Wiring, setting: Setting, lanes: Lanes, work: Work) -> None:
 def record_step(wiring: Wiring, setting: Setting, lanes: Lanes, work: Work, trace: Trace, t: int) -> None:
     """Store motion, rods' load, air force, powers and energies at the start of step ``t`` in ``trace``.
 
-    Not at the stages, where stiff springs are far from their values at the ends of the step.
+    They are not stored at the stages, where stiff springs are far from their values at the ends of the step.
     """
     n, power = len(wiring.mass), trace.power[t]
     store1(power, arrays.DAMPERS, -load0(work.lost))
@@ -215,10 +218,11 @@ def linearise(wiring: Wiring, setting: Setting, lanes: Lanes, work: Work) -> Non
 
 @kernel
 def solve_stage(wiring: Wiring, setting: Setting, lanes: Lanes, work: Work, rods: Array, stage: int) -> None:
-    """Solve the stage for U_V, U_xi and U_z; ``rods`` [2, 3, W] as in the drive.
+    """Solve the stage for U_V, U_xi and U_z; ``rods`` [2, 3, W]: angle, rate and acceleration of the driving rods.
 
-    With r = f + sum of COUPLING U / h, the unknown Y = U_xi / (h gamma) meets S Y = M (r_V + r_xi / (h gamma)) -
-    dW/dV r_xi, and U_V = (I - h gamma A) Y - r_xi. The rods' Y is known, their acceleration being prescribed.
+    With the right-hand side f of the equations and r = f + sum of COUPLING U / h, Y = U_xi / (h gamma) solves S Y = M
+    (r_V + r_xi / (h gamma)) - dW/dV r_xi, and U_V = (I - h gamma A) Y - r_xi. The rods' Y is known, their acceleration
+    being prescribed.
     """
     n, hg, k = len(wiring.mass), setting.step * GAMMA, wiring.driven
     r_xi, wrench, known = work.r_xi, work.wrench, work.known
@@ -246,7 +250,7 @@ def solve_stage(wiring: Wiring, setting: Setting, lanes: Lanes, work: Work, rods
 
 @kernel
 def _to_stage(work: Work, state: State, stage: int) -> None:
-    """Local coordinates, twist, states and pose of a stage."""
+    """Set local coordinates, twist, effects' states and pose in ``work`` to those at which ``stage`` is evaluated."""
     if stage < STAGES - 1:
         combine(0.0, state.V, work.U_xi, STAGE[stage], stage, work.xi)
         combine(1.0, state.V, work.U_V, STAGE[stage], stage, work.V)
@@ -263,7 +267,7 @@ def _to_stage(work: Work, state: State, stage: int) -> None:
 
 @kernel
 def _set_clock(clock: Array, turn: float, t: int, stage: int) -> None:
-    """Set the drive phase of a stage of step ``t`` for the laws; a step is ``turn`` (rad)."""
+    """Set in ``clock`` the drive phase of a stage of step ``t``, which the laws read; a step is ``turn`` (rad)."""
     clock[arrays.NOW] = turn * (t + NODES[stage])
     clock[arrays.START] = turn * t
     clock[arrays.SHARE] = turn * SLOPES[stage]
@@ -271,7 +275,7 @@ def _set_clock(clock: Array, turn: float, t: int, stage: int) -> None:
 
 @allocating
 def finish_step(work: Work, state: State, alive: Mask) -> None:
-    """Complete the step; lanes that rotated too far or are NaN are marked in ``alive``."""
+    """Set ``state`` to the end of the step, and ``alive`` to False for lanes that rotated too far or are NaN."""
     _to_stage(work, state, STAGES)
     state.R[:] = work.R
     state.p[:] = work.p
@@ -290,10 +294,10 @@ def advance(
 ) -> None:
     """Integrate one beat of n steps from ``state``, in place.
 
-    ``drive`` [n, STAGES, 2, 3, W]: angle, rate and acceleration of both rods at the stages of every step (six rows for
-    a compliant drive). Angle and rate are used at the start of the step only; within it they follow from the
-    acceleration. Lanes whose bodies rotate more than MAX_ROTATION in a step, or become NaN, are set to False in
-    ``alive``; they are computed further but not used.
+    ``drive`` [n, STAGES, 2, 3, W]: angle, rate and acceleration of both rods at the stages of every step (six
+    columns instead of three for a compliant drive, see :func:`wingfit.sim.kernels.motor.rods_of`). Angle and rate are
+    used at the start of the step only; within it they follow from the acceleration. Lanes whose bodies rotate more than
+    MAX_ROTATION in a step, or become NaN, are set to False in ``alive``; they are computed further but not used.
     """
     for t in range(len(drive)):
         rods = drive[t, 0]

@@ -107,7 +107,7 @@ def _cache_folder(source: Path) -> Path:
 
 
 def _start_with(shipped: Path, folder: Path) -> None:
-    """Copy the compiled kernels ``shipped`` with a read-only installation to a ``folder`` that does not exist yet.
+    """Copy the compiled kernels ``shipped``, part of a read-only installation, to a ``folder`` that does not exist yet.
 
     They are copied to another name and renamed, since other processes may read the folder at any time.
     """

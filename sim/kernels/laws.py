@@ -2,10 +2,11 @@
 
 A law is a function ``law(frame, moment)``. It is compiled separately, when it is first used (:func:`address`), and
 cached by the source of its file and of the kernels. ``strip_port(frame)``, ``connector_port(frame)`` or
-``point_port(frame)`` gives the arrays that it reads and adds to; their last axis is the lanes, to be used with the
-functions of :mod:`wingfit.sim.kernels.lanes.vector`. Laws of the air are called at two moments of every stage: BEFORE
-the flow of the strips is known, when they may set the induced velocity from their states, and AFTER, when they change
-the loads and set the rates of their states. Laws of connectors and of points are called once, AFTER.
+``point_port(frame)`` gives the arrays that the law reads and adds to; ``frame`` holds their addresses. Their last axis
+is the lanes, to be used with the functions of :mod:`wingfit.sim.kernels.lanes.vector`. Laws of the air are called at
+two moments of every stage: BEFORE the flow of the strips is known, when they may set the induced velocity from their
+states, and AFTER, when they change the loads and set the rates of their states. Laws of connectors and of points are
+called once, AFTER.
 """
 
 from __future__ import annotations
@@ -56,10 +57,11 @@ derivative of the wrench along that axis by the state.
 
 
 PointPort = namedtuple("PointPort", "places parameters place turn twist wrench stiffness damping lost stored clock")
-"""What a law of points of bodies sees. P points; parameters [N, P, W] are its own; all else is in the world.
+"""Inputs and outputs of a law of points of bodies. P points; parameters [N, P, W] are its own; all else is in the
+world.
 
-A point lies elsewhere in each individual, often on another body: where all parameters are zero, the law must give
-nothing. Read: ``place`` [P, 3, W] (m), ``turn`` [P, 9, W], the rotation of the body, ``twist`` [P, 6, W], its
+A point lies elsewhere in each individual, often on another body: where all parameters are zero, the wrench must
+be zero. Read: ``place`` [P, 3, W] (m), ``turn`` [P, 9, W], the rotation of the body, ``twist`` [P, 6, W], its
 angular velocity and the velocity of the point (rad/s, m/s), ``clock`` as for a strip. Add to: ``wrench``
 [P, 6, W], moment about the point and force on it (N m, N); ``stiffness`` and ``damping`` [P, 36, W], minus its
 derivatives by the motion (rotation, displacement) and by the twist, 6 x 6 row by row; ``lost`` and ``stored`` [W],
@@ -80,7 +82,7 @@ def _doubles(typingctx: Any, address: Any) -> Any:  # noqa: ARG001
 
 @intrinsic
 def call(typingctx: Any, function: Any, frame: Any, moment: Any) -> Any:  # noqa: ARG001
-    """Call the law at address ``function`` with the frame at address ``frame``."""
+    """Call the law at address ``function`` with the frame at address ``frame``, at ``moment`` BEFORE or AFTER."""
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:  # noqa: ARG001
         long = ir.IntType(64)
@@ -112,7 +114,7 @@ def _lanes(address: Any) -> Array:
 
 @inlined
 def strip_port(frame: Any) -> StripPort:
-    """Open the frame of a law of the air."""
+    """Arrays of a law of the air, by name, from its ``frame``: a row of integers (numbers of rows, addresses)."""
     S, P, K = frame[0], frame[1], frame[2]
     return StripPort(
         S, _table(frame[3], P, S), _table(frame[4], K, S), _table(frame[5], K, S), _table(frame[6], K, S),
@@ -123,7 +125,7 @@ def strip_port(frame: Any) -> StripPort:
 
 @inlined
 def connector_port(frame: Any) -> ConnectorPort:
-    """Open the frame of a law of the connectors."""
+    """Arrays of a law of the connectors, by name, from its ``frame``: integers (numbers of rows, addresses)."""
     C, P, K = frame[0], frame[1], frame[2]
     return ConnectorPort(
         C, _table(frame[3], P, C), _table(frame[4], K, C), _table(frame[5], K, C), _table(frame[6], K, C),
@@ -135,7 +137,7 @@ def connector_port(frame: Any) -> ConnectorPort:
 
 @inlined
 def point_port(frame: Any) -> PointPort:
-    """Open the frame of a law of points of bodies."""
+    """Arrays of a law of points of bodies, by name, from its ``frame``: integers (numbers of rows, addresses)."""
     K, P = frame[0], frame[1]
     return PointPort(
         K, _table(frame[3], P, K), _table(frame[4], K, 3), _table(frame[5], K, 9), _table(frame[6], K, 6),

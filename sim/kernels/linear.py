@@ -98,7 +98,7 @@ def factor(order: Index, start: Index, below: Index, products: Index, product_st
 
 @kernel
 def subtract_column(row: int, m: int, blocks: Array, known: Array, column: int, x: Array) -> None:
-    """x[row] <- x[row] - block m times ``known[column]``."""
+    """x[row] <- x[row] - block m times ``known[column]``; ``x`` and ``known`` [., 6, W]."""
     y0, y1, y2 = load(known, column, 0), load(known, column, 1), load(known, column, 2)
     y3, y4, y5 = load(known, column, 3), load(known, column, 4), load(known, column, 5)
     for i in range(6):
@@ -119,7 +119,10 @@ def _times_block(m: int, blocks: Array, n: int, x: Array) -> None:
 
 @kernel
 def solve(order: Index, start: Index, below: Index, row: Index, blocks: Array, x: Array) -> None:
-    """Solve L U x = x in place for x [N, 6, W]; ``row`` gives the body row of each block in ``below``."""
+    """Replace the right-hand side x [N, 6, W] by the solution, given the factors in ``blocks`` (:func:`factor`).
+
+    ``row`` gives the body whose row of the matrix holds each block of ``below``.
+    """
     for k in range(len(order)):
         for s in range(start[k], start[k + 1]):
             subtract_column(row[s], below[s], blocks, x, order[k], x)

@@ -47,7 +47,7 @@ from wingfit.sim.kernels.lanes.vector import load, load0, load1, store0
 
 @inlined
 def _across(masses: Array, k: int) -> Nine:
-    """Nonzero 3 x 3 part of an added mass: rotation about x and y, translation along z."""
+    """Nonzero 3 x 3 part of the added mass of pair k: rotation about x and y, translation along z."""
     return (
         load(masses, k, 0), load(masses, k, 1), load(masses, k, 5),
         load(masses, k, 6), load(masses, k, 7), load(masses, k, 11),
@@ -57,20 +57,20 @@ def _across(masses: Array, k: int) -> Nine:
 
 @inlined
 def _in_body(R: Array, n: int, wind: Array) -> Three:
-    """The wind in the frame of body n."""
+    """The wind [3, W] (m/s, world) in the frame of body n."""
     return times(transposed(load_matrix(R, n)), (load1(wind, 0), load1(wind, 1), load1(wind, 2)))
 
 
 @inlined
 def _relative(V: Array, R: Array, n: int, wind: Array, air: bool) -> Three:
-    """Velocity of body n; for added mass relative to the wind."""
+    """Velocity of body n in its own frame; for added mass (``air``) relative to the wind."""
     v = load_vector(V, n, 3)
     return less(v, _in_body(R, n, wind)) if air else v
 
 
 @kernel
 def add_momentum(lanes: Lanes, setting: Setting, R: Array, V: Array, wrench: Array) -> None:
-    """Add the gyroscopic terms of the momenta, and the weight of the first ``weighing`` pairs, to the wrenches."""
+    """Add to ``wrench`` the gyroscopic terms of all pairs and the weight of the first ``weighing`` pairs."""
     for k in range(lanes.weighing):
         i, j = lanes.pairs[k, 0], lanes.pairs[k, 1]
         M, omega = load_block(lanes.masses, k), load_vector(V, i, 0)
@@ -89,7 +89,7 @@ def add_momentum(lanes: Lanes, setting: Setting, R: Array, V: Array, wrench: Arr
 
 @inlined
 def _first_moment(M: Six) -> Three:
-    """Mass times position, from the block of moment and velocity, which is its cross product matrix."""
+    """Mass times centre of mass s of the 6 x 6 mass matrix M, whose upper right block is s~."""
     return M[1][7], M[1][2], M[1][3]
 
 
@@ -147,7 +147,7 @@ def _with_motion(A: Six, omega: Three, v: Three, length: float) -> Six:
 
 @inlined
 def _with_wind(A: Six, M: Six, omega: Three, w: Three, length: float) -> Six:
-    """A and, as the wind w turns in the body's frame, l M (omega~ w~ - w~ omega~ / 2) in the columns of rotation."""
+    """A plus l M (omega~ w~ - w~ omega~ / 2) in the columns of rotation: the wind w turns in the body's frame."""
     turned = plus(scaled(length, skew_times(omega, skew(w))), scaled(-0.5 * length, skew_times(w, skew(omega))))
     return plus(A[0], product(M[1], turned)), A[1], plus(A[2], product(M[3], turned)), A[3]
 
@@ -156,7 +156,7 @@ def _with_wind(A: Six, M: Six, omega: Three, w: Three, length: float) -> Six:
 def add_mass_terms(
     lanes: Lanes, setting: Setting, R: Array, V: Array, factor: float, lead: Array, X: Array, wrench: Array
 ) -> None:
-    """Add M (lead + ``factor`` X) - dW/dV X to the wrenches, as :func:`sim.kernels.tangents.add_own_terms` does."""
+    """Add M (lead + ``factor`` X) - dW/dV X to the wrenches, M being the pairs' masses and W their wrenches."""
     for k in range(lanes.weighing):
         i, j = lanes.pairs[k, 0], lanes.pairs[k, 1]
         M, omega, v = load_block(lanes.masses, k), load_vector(V, i, 0), load_vector(V, i, 3)
@@ -181,7 +181,7 @@ def add_mass_terms(
 
 @kernel
 def add_energies(lanes: Lanes, setting: Setting, work: Work, kinetic: Array, potential: Array) -> None:
-    """Add the kinetic energy of all pairs and the potential energy of those with weight."""
+    """Add the kinetic energy of all pairs and the potential energy of those with weight, both [W], J."""
     R, V = work.R, work.V
     for k in range(len(lanes.pairs)):
         i, j, air = lanes.pairs[k, 0], lanes.pairs[k, 1], k >= lanes.weighing

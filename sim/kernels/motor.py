@@ -22,7 +22,7 @@ DROOP, FOLLOWING, HOLDING, AVERAGING, MOTOR = range(5)  # d, 1 / T, k, a
 
 @kernel
 def rods_of(profile: Array, tau_sigma: Array, turning: Array, out: Array) -> None:
-    """Angle, rate and acceleration ``out`` [2, 3, W] of both rods from ``profile`` [2, 6, W].
+    """Set ``out`` [2, 3, W] to angle, rate and acceleration of both rods, from ``profile`` [2, 6, W].
 
     The profile is the angle and four time derivatives, then the method's term for explicit time dependence.
     ``tau_sigma`` [Z, W]: all states; ``turning`` [Z, W]: their rates.
@@ -41,7 +41,7 @@ def rods_of(profile: Array, tau_sigma: Array, turning: Array, out: Array) -> Non
 
 @kernel
 def motor_rates(motor: Array, work: Work) -> None:
-    """Rates of the motor's states under the load of the rods; ``motor`` [MOTOR, W]."""
+    """Set the rates of the motor's states under the load of the rods; ``motor`` [MOTOR, W]: d, 1 / T, k, a."""
     n, z = len(work.V) - 2, len(work.z) - 3
     tau, sigma, mean = load1(work.z, z), load1(work.z, z + 1), load1(work.z, z + 2)
     drawn = tau * 0.0

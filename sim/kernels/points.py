@@ -62,7 +62,7 @@ def add_point_wrenches(laws: Laws, work: Work) -> None:
 
 @kernel
 def add_point_blocks(laws: Laws, work: Work, length: float) -> None:
-    """Add the points' part of S, -dW/dV (I - l A) - l dW/dxi, to the blocks; keep -dW/dV in ``drag`` [P, 36, W].
+    """Add the points' part of S, -dW/dV (I - l A) - l dW/dxi, to the blocks; store -dW/dV in ``drag`` [P, 36, W].
 
     Both terms together are E (D + l K + [[X, 0], [Y, 0]]) E^T with (X, Y) = l (D (-omega~ / 2, b~ omega~ / 2 -
     omega~ b~) - (m~, f~)).
@@ -90,7 +90,7 @@ def add_point_blocks(laws: Laws, work: Work, length: float) -> None:
 
 @kernel
 def add_point_terms(bodies: Index, drag: Array, X: Array, wrench: Array) -> None:
-    """Add -dW/dV X to the wrenches, as :func:`wingfit.sim.kernels.tangents.add_own_terms` does."""
+    """Add -dW/dV X to the wrenches [N+2, 6, W]; ``drag`` [P, 36, W]: -dW/dV of each point."""
     for k in range(len(bodies)):
         i = bodies[k]
         t, f = times_six(load_block(drag, k), load_vector(X, i, 0), load_vector(X, i, 3))

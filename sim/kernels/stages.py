@@ -11,7 +11,7 @@ from wingfit.sim.kernels.lanes.vector import Vector, load, load1, load3, store
 
 @kernel
 def combine(part: float, base: Array, U: Array, coefficient: Array, count: int, out: Array) -> None:
-    """out = ``part`` times ``base`` plus the sum over the first ``count`` stages of coefficient * U."""
+    """Set ``out`` [., 6, W] to ``part`` ``base`` + sum_s coefficient[s] U[s] over the first ``count`` stages."""
     for i in range(out.shape[0]):
         for k in range(6):
             total = part * load(base, i, k)
@@ -24,9 +24,9 @@ def combine(part: float, base: Array, U: Array, coefficient: Array, count: int, 
 def coupled_rates(
     xi: Array, V: Array, U_xi: Array, U_V: Array, coefficient: Array, count: int, scale: float, rate: Array, lead: Array
 ) -> None:
-    """Set ``rate`` to r + scale sum_s c_s U_xi[s] and ``lead`` to scale sum_s c_s U_V[s], all [N, 6, W].
+    """Set ``rate`` to r + scale sum_s coefficient[s] U_xi[s] and ``lead`` to scale sum_s coefficient[s] U_V[s].
 
-    r is the rate of the local coordinates; c is ``coefficient``, and s runs over the first ``count`` stages.
+    r is the rate of the local coordinates ``xi`` of each body at the twist ``V``; s are the first ``count`` stages.
     """
     for i in range(xi.shape[0]):
         first = body_rate(load_vector(xi, i, 0), load_vector(V, i, 0), load_vector(V, i, 3))
@@ -42,7 +42,7 @@ def coupled_rates(
 
 @kernel
 def keep_stage(Y: Array, rate: Array, V: Array, length: float, U_xi: Array, U_V: Array) -> None:
-    """U_xi = l Y and U_V = (I - l A) Y - r_xi of a stage, l being ``length`` and A y = (y x omega / 2, y x v)."""
+    """Set U_xi = l Y and U_V = (I - l A) Y - r_xi of a stage: l is ``length``, A (x, y) = (x x omega / 2, x x v)."""
     for i in range(Y.shape[0]):
         turn = load_vector(Y, i, 0)
         a, b = cross(turn, load_vector(V, i, 0)), cross(turn, load_vector(V, i, 3))
@@ -58,7 +58,7 @@ def keep_stage(Y: Array, rate: Array, V: Array, length: float, U_xi: Array, U_V:
 def place_rod(
     rod: int, turning: Vector, length: float, hinge: Array, V: Array, lead: Array, rate: Array, known: Array
 ) -> None:
-    """Y of a driving rod that turns about the hinge with the acceleration ``turning``; l is ``length``.
+    """Set ``known[rod]`` [6, W] to Y of a driving rod with the acceleration ``turning`` (rad/s^2); l is ``length``.
 
     Y = (I - l A)^-1 (r_xi + l (lead + acceleration)) as in :func:`keep_stage`; A has no effect on rotation about a
     fixed axis.

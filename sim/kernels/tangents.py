@@ -73,7 +73,7 @@ def coupling_tangent(N: Nine, d: Three) -> Six:
 
 @inlined
 def twist_tangent(g: Three, omega: Three, turning: Three) -> Six:
-    """B: g and ``turning`` are B's velocity and angular velocity, ``omega`` A's angular velocity, all in A's axes."""
+    """The matrix B; frame B has velocity g and angular velocity ``turning``, A turns at ``omega`` (in A's axes)."""
     return (scaled(-1.0, skew(turning)), scaled(0.0, skew(g)), scaled(-1.0, skew(g)), scaled(-1.0, skew(omega)))
 
 
@@ -130,7 +130,7 @@ def start_blocks(
 ) -> None:  # fmt: skip
     """Set the diagonal to the bodies' own part of S: inertia, gyroscopic terms, gravity, the air's normal damping.
 
-    ``damping`` [N, W] acts along each body's normal. Blocks that no connector sets, ``fill``, become zero.
+    ``damping`` [N, W] (N s/m) acts along each body's normal. Blocks that no connector sets, ``fill``, become zero.
     """
     for k in fill:
         for i in range(36):
@@ -172,7 +172,7 @@ def add_connectors(
     first: Index, second: Index, lower: Index, upper: Index, a: Array, b: Array, K: Array, D: Array, coupling: Array,
     more: Array, more_k: Array, more_d: Array, Q_: Array, d_: Array, V: Array, length: float, blocks: Array,
 ) -> None:  # fmt: skip
-    """Add the connectors' part of S to the diagonal and set it beside.
+    """Add the connectors' part of S to its diagonal blocks, and set its off-diagonal blocks.
 
     ``lower`` and ``upper`` number the blocks (second, first) and (first, second); upper is -1 where ``first`` is a
     driving rod, whose motion is known: its own row is not needed, its column is applied to the right-hand side.

@@ -23,7 +23,7 @@ class Elimination:
         order: bodies in the order of elimination.
         start: below[start[k]:start[k + 1]] are the blocks under the diagonal of order[k].
         below: numbers of the blocks below the diagonal.
-        row: the body of the row of each of these.
+        row: body whose row of the matrix holds each block of ``below``.
         products: (target, left, right) of products to subtract.
         product_start: rows product_start[k]:product_start[k + 1] of ``products`` follow the elimination of order[k].
         fill: blocks that do not belong to a connector.

@@ -54,7 +54,7 @@ class Numerics:
             raise ValueError(f"window is {self.window} beats; it must be at least 0 (no acceleration)")
 
     def ladder(self, condition: Condition) -> tuple[int, ...]:
-        """Steps per beat to try under a condition, coarsest first."""
+        """Numbers of steps per beat to try under a condition, smallest first."""
         if self.steps is not None:
             return (self.steps,)
         least = STEPS_PER_HZ * condition.flap_frequency

@@ -99,7 +99,7 @@ class Secants:
         self.starts, self.ends, self.best, self.extrapolated = [], [], None, False
 
     def _correction(self, change: Array) -> Array:
-        """Estimated step from the end of the beat to the fixed point; zero without secants."""
+        """Coordinates [12 N + Z] of the estimated fixed point relative to the end of a beat with this ``change``."""
         if not self.columns or not np.all(np.isfinite(change)):
             return np.zeros_like(change)
         moved, changed = (np.array(part).T for part in zip(*self.columns, strict=True))

@@ -21,11 +21,11 @@ from wingfit.sim.wing.structure import Structure
 def drive_table(
     rods: RodDrive, frequency: float, numerics: Numerics, n: int, beat: int, *, compliant: bool = False
 ) -> Array:
-    """[n, STAGES, 2, 3, W]: angle, rate, acceleration (rad, s) of both rods at the stages of n steps of beat ``beat``.
+    """Angle, rate, acceleration (rad, s) [n, STAGES, 2, 3, W] of both rods at the stages of n steps of a beat.
 
-    The acceleration includes the Rosenbrock method's term for the explicit dependence on time. For a compliant drive
-    (``compliant``) the table has six rows instead of three: two more derivatives, and that term by itself. Tables are
-    cached and must not be changed.
+    ``beat`` is its number: the amplitude grows over the first ones. The acceleration includes the Rosenbrock method's
+    term for the explicit dependence on time. For a compliant drive (``compliant``) the fourth axis has six entries
+    instead of three: two more derivatives, and that term by itself. Tables are cached and must not be changed.
     """
     ramp = numerics.ramp_beats
     return _table(rods.series.tobytes(), rods.series.shape, frequency, ramp, n, min(beat, ramp), compliant)
@@ -54,7 +54,10 @@ def _table(
 
 
 def _ramped(angle: Array, x: Array, rate: float) -> Array:
-    """``angle`` times a smooth step from 0 at x = 0 to 1 at x = 1, with its derivatives; x grows at ``rate``."""
+    """First four columns of ``angle`` (value and derivatives) times a smooth step from 0 at x = 0 to 1 at x = 1.
+
+    x grows at ``rate`` (1/s).
+    """
     x = np.minimum(x, 1.0)
     e = x**3 * (10 - 15 * x + 6 * x**2)
     e1 = rate * 30 * x**2 * (1 - x) ** 2
@@ -79,7 +82,7 @@ def at_rest(structure: Structure, states: int = 0) -> State:
 
 
 def setting(condition: Condition, steps: int) -> Setting:
-    """A condition as input of the kernels, with ``steps`` per beat."""
+    """Air density, wind, gravity and step of a condition as input of the kernels, with ``steps`` per beat."""
     a = condition.angle_of_attack
     wind = condition.airspeed * np.array([np.cos(a), 0.0, np.sin(a)])
     step = 1.0 / (condition.flap_frequency * steps)

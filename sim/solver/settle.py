@@ -27,23 +27,23 @@ DIVERGED = "a body turned more than 1 rad within one step"
 
 @dataclass
 class Course:
-    """State of the solution for one individual, over increasing numbers of steps.
+    """Progress of the solution for one individual, over increasing numbers of steps per beat.
 
     Attributes:
         genome: [G].
         state: at the start of the next beat; None at rest.
-        secants: of the map of its beats.
+        secants: past beats, from which the periodic motion is extrapolated; None before the first.
         tracks: [n, M, 3] with the previous number of steps, m.
         changes: of the tracks from each number of steps to the next, m.
         beats: total number of simulated beats.
         failures: how many numbers of steps failed.
         trace: of the periodic beat with the present number of steps.
-        reason: of a failure with the present number of steps.
+        reason: why the present number of steps failed, or None.
         distance: to the periodic motion, m.
         growth: factor by which a disturbance of the periodic motion grows in a beat.
         error: estimated error, m.
         done: whether the motion is accurate, or has failed finally.
-        before: copy from the previous number of steps.
+        before: this object at the previous number of steps.
     """
 
     genome: Array
@@ -68,7 +68,7 @@ class Course:
 
 
 class Subject(NamedTuple):
-    """What is simulated: a structure, a condition, and the function that makes a scene of up to LANES genomes."""
+    """What is simulated: a structure, a condition, and a function from up to LANES genomes to the kernels' inputs."""
 
     structure: Structure
     condition: Condition
@@ -92,7 +92,7 @@ class _Group:
         self.alive = np.ones(LANES, bool)
 
     def table(self, numerics: Numerics, steps: int, beat: int) -> Array:
-        """The drive table of a beat."""
+        """The rods' motion in beat number ``beat``, see :func:`wingfit.sim.solver.scene.drive_table`."""
         frequency, compliant = self.angular_rate / (2 * np.pi), len(self.lanes.laws.motor) > 0
         return drive_table(self.scene.rods, frequency, numerics, steps, beat, compliant=compliant)
 
@@ -194,7 +194,7 @@ def _put(into: State, lane: int, state: State) -> None:
 
 
 def _mean_growth(distances: Array) -> float:
-    """Growth per beat over the latter half of a series, by a straight line through its logarithm."""
+    """Growth factor per beat of the latter half of ``distances`` [beats], by a straight line through the logarithm."""
     tail = np.log(np.maximum(distances[len(distances) // 2 :], ROUND_OFF))
     return float(np.exp(np.polyfit(np.arange(len(tail)), tail, 1)[0]))
 

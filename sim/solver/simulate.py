@@ -66,7 +66,7 @@ def periodic_beats(
 def settled_course(subject: Subject, genome: Array, numerics: Numerics) -> Course | None:
     """The solution for one individual, as a warm start for others; None if it fails.
 
-    With the previous number of steps if that turns out to be accurate enough.
+    It is the solution at the previous number of steps if that turns out to be accurate enough.
     """
     course = Course(genome)
     _settled(subject, [course], numerics, with_motion=False)
@@ -133,7 +133,7 @@ def _groups(courses: list[Course]) -> list[list[Course]]:
 
 
 def _judge(course: Course, numerics: Numerics, steps: int, *, last: bool) -> None:
-    """Decide whether an individual is accurate, needs more steps, or has failed."""
+    """Set in ``course`` whether an individual is accurate, needs more steps, or has failed."""
     if course.reason is not None:
         course.failures += 1
         course.tracks, course.changes, course.error = None, [], np.nan  # one that diverged starts again from rest

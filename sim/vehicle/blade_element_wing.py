@@ -1,7 +1,7 @@
 """A flapping vehicle as a model: from genomes to forces of its wings, sampled and filtered like a recording.
 
 Quasi-steady blade elements with clap-and-peel (Armanini et al. 2016). Forces are sums of coefficients times terms that
-depend on the motion alone; so a search over coefficients computes the elements once.
+depend on the motion alone, so that a search over coefficients computes these terms only once.
 """
 
 from __future__ import annotations
@@ -93,9 +93,9 @@ class BladeElementWing:
 
     @cached_property
     def searched(self) -> tuple[str, ...]:
-        """The genes estimated by Armanini et al. (2016): lift, rotational and fling coefficients; and genes of effects.
+        """Names of the genes that a search estimates by default: lift, rotational and fling coefficients, and effects'.
 
-        Drag and motion are fixed by default.
+        As in Armanini et al. (2016), drag and motion are fixed.
         """
         added = {gene.name for effect in self.chosen for gene in effect.genes(self.vehicle)}
         return tuple(gene.name for gene in self.genes if gene.name in added.union(SEARCHED))
@@ -158,13 +158,13 @@ class BladeElementWing:
     # -- effects -----------------------------------------------------------------------------------------------
 
     def _by_active_effects(self, batch: Array) -> list[tuple[tuple[Effect, ...], list[int]]]:
-        """Groups of individuals by the effects on the vehicle that are on."""
+        """Sets of effects on the vehicle, each with the indices in ``batch`` [B, G] where just these are on."""
         return by_active([effect for effect in self.chosen if effect.vehicle], self.genes, batch)
 
     def _rows_with_effects(
         self, effects: tuple[Effect, ...], batch: Array, recording: Recording
     ) -> tuple[Array, Array, Array]:
-        """With ``effects`` on: weights [B, rows] and forces [B, rows, 2, n] of active rows; added forces [B, 2, n]."""
+        """With ``effects`` on: weights [B, rows] and forces [B, rows, 2, n] of the terms; added forces [B, 2, n], N."""
         moving = {} if recording.motion else self._values(batch, self._motion_names)
         scene = self._scene(moving | self._values(batch, _COEFFICIENTS), len(batch), recording)
         for effect in effects:
@@ -174,7 +174,7 @@ class BladeElementWing:
         return self._weights(scene.genes, len(batch)), self._wings(scene), scene.finish()
 
     def _observed(self, batch: Array, beat: Array, recording: Recording) -> tuple[Index, Sampling]:
-        """Individuals for which an effect on the observation is on, and the balance's observation of their ``beat``."""
+        """Indices in ``batch`` where an effect on the observation is on, and the observation of their ``beat``."""
         changed = affected(self.chosen, self.genes, batch)
         times, added = (np.zeros((len(changed), *shape)) for shape in (recording.times.shape, recording.values.shape))
         sampling = Sampling(self.vehicle, recording, beat[changed], times + recording.times, added)
@@ -188,7 +188,7 @@ class BladeElementWing:
         return {gene.name: batch[:, k] for k, gene in enumerate(self.genes) if gene.name in names}
 
     def _weights(self, coefficients: Mapping[str, Array], count: int) -> Array:
-        """Coefficients [B, rows] of the rows, for ``count`` individuals."""
+        """Factors [count, rows] by which the forces of each active term are multiplied; see :meth:`_rows`."""
         zero, one = np.zeros(count), np.ones(count)
         scale = {row: coefficients.get(name, zero) if name else one for row, (_, name) in _ROWS.items()}
         scale["rotation"] = scale["rotation"] * (ROTATION_POINT - self.vehicle.pitch_axis)
@@ -197,7 +197,7 @@ class BladeElementWing:
 
     @cached_property
     def _active(self) -> tuple[str, ...]:
-        """Rows of the active terms."""
+        """Names of the active rows: the parts of the force, each with its own coefficient, that belong to ``terms``."""
         return tuple(row for row, (term, _) in _ROWS.items() if term in self.terms)
 
     @cached_property
@@ -209,7 +209,7 @@ class BladeElementWing:
         return frozenset(gene.name for gene in motion_genes(self.vehicle.motion))
 
     def _cached_rows(self, batch: Array, recording: Recording) -> list[Array]:
-        """Forces of each active row [rows, 2, n] of every individual; those of recent motions are cached."""
+        """As :meth:`_rows`, one array [rows, 2, n] for each individual; those of recent motions are cached."""
         cached = self._cache.setdefault(recording, OrderedDict())
         motions = np.stack(list(self._values(batch, self._motion_names).values()) or [np.zeros(len(batch))], axis=1)
         keys = [motion.tobytes() for motion in motions]
@@ -222,7 +222,7 @@ class BladeElementWing:
         return answer
 
     def _rows(self, batch: Array, recording: Recording) -> Array:
-        """Forces of each active row [B, rows, 2, n] of all wings, for the motions that ``batch`` [B, G] prescribes."""
+        """Forces [B, rows, 2, n] of each active row for a coefficient of one (N), all wings together."""
         moving = {} if recording.motion else self._values(batch, self._motion_names)
         found = self._wings(self._scene(moving, len(batch) if moving else 1, recording))
         return np.repeat(found, len(batch), axis=0) if len(found) < len(batch) else found
@@ -234,7 +234,7 @@ class BladeElementWing:
         return VehicleScene.of(setting, genes, count)
 
     def _wings(self, scene: VehicleScene) -> Array:
-        """Forces of each active row [B, rows, 2, n] of all wings of a scene."""
+        """Forces [B, rows, 2, n] of each active row for a coefficient of one (N), all wings of ``scene`` together."""
         vehicle, n, motion = self.vehicle, self.instants, scene.setting.motion
         r, chord, mass, width = self._span
         first, step = np.array([r[0], width]) / (motion.pitch_station * vehicle.span)
@@ -316,7 +316,7 @@ def _check_estimates(vehicle: Vehicle, genes: tuple[Gene, ...]) -> None:
 
 
 def _sum(weights: Array, rows: Array) -> Array:
-    """Weighted sum of ``rows`` [rows, ...], in a fixed order, so that it does not depend on the batch."""
+    """Sum over the first axis of ``rows`` [rows, ...] times ``weights``, in a fixed order for any size of the batch."""
     total = np.zeros(rows.shape[1:])
     for weight, row in zip(weights, rows, strict=True):
         if weight != 0.0:

@@ -1,7 +1,7 @@
 """The forces of all blade elements, instant by instant, by physical term (Armanini et al. 2016, Eqs. 1-15, 18-19).
 
-Each term is computed for a coefficient of one, so that forces are weighted sums of these rows. Instants are independent
-of each other; eight of them are computed at a time, in the vector registers of the processor.
+Each term is computed for a coefficient of one, so that forces are weighted sums of these rows (ROWS, CURVE_ROWS).
+Instants are independent of each other; eight of them are computed at a time, in the vector registers of the processor.
 """
 
 from __future__ import annotations
@@ -57,8 +57,8 @@ class Side(NamedTuple):
 class Constants(NamedTuple):
     """Constants of all elements.
 
-    Thickness b and width dr of an element (m), twist of the first element and its increment to the next as fractions of
-    that at the pitch station, d of the added mass (chords).
+    ``thickness`` b and ``width`` dr of an element (m); ``twist`` of the first element and its increment ``twist_step``
+    to the next, as fractions of the twist at the pitch station; ``point``: d of the added mass (Eqs. 18-19), chords.
     """
 
     thickness: float
@@ -72,10 +72,10 @@ class Constants(NamedTuple):
 def velocities(
     ct: Vector, st: Vector, swing: Vector, u: Vector, w: Vector, whole: Vector, stream: float
 ) -> tuple[Vector, Vector]:
-    """Velocity of an element through the air along its chord and normal to it (Eqs. 18-19).
+    """Velocity of an element through the air along its chord and normal to it, m/s (Eqs. 18-19).
 
-    ``ct`` and ``st``: cosine and sine of the pitch; ``swing``: velocity by flapping; ``u``, ``w``: the stream along
-    body x and this side's z; ``stream`` and ``whole`` scale its part along the chord and normal to it.
+    ``ct``, ``st``: cosine and sine of its pitch; ``swing``: velocity by flapping; ``u``, ``w``: of the stream along
+    body x and this side's z (m/s); ``whole``: factor on the stream in the normal part; ``stream``: as in :class:`Side`.
     """
     vx = swing * ct + (u * st + w * ct) * stream
     vz = whole * (u * ct - w * st) - swing * st
@@ -87,7 +87,10 @@ def _element_forces(
     motion: Array, side: Side, r: Array, chord: Array, mass: Array, rho: float, loading: Array, constants: Constants,
     out: Array,
 ) -> None:  # fmt: skip
-    """The rows of ROWS for one individual: ``motion`` [14, n / 8, 8], ``out`` [7, 2, n / 8, 8]."""
+    """Add to ``out`` [7, 2, n / 8, 8] the forces of ROWS along body x and z (N) of one wing at n instants.
+
+    ``motion`` [14, n / 8, 8]: rows FLAP_RATE to DOWNWARD; others as in :func:`wing_forces`.
+    """
     dr, d = constants.width, constants.point
     m11 = 0.25 * math.pi * rho * constants.thickness**2  # Eq. 10
     for g in range(motion.shape[1]):
@@ -163,7 +166,7 @@ def curve_drag(alpha: float) -> float:
 def _curve_forces(
     motion: Array, side: Side, r: Array, chord: Array, rho: float, loading: Array, constants: Constants, out: Array
 ) -> None:
-    """Lift and drag by measured steady curves: ``out`` [2, 2, n / 8, 8], in the order of CURVE_ROWS.
+    """Add to ``out`` [2, 2, n / 8, 8] lift and drag by measured steady curves, in the order of CURVE_ROWS.
 
     Measured on a revolving wing; the angle of attack is folded into 0 to 90 degrees.
     """
@@ -209,7 +212,7 @@ def wing_forces(
 
 @allocating
 def synthesise(basis: Array, series: Array, out: Array) -> None:
-    """Sum Fourier series: ``out`` [B, T, A] from ``basis`` [K, T] and ``series`` [B, A, K], in one order for all B."""
+    """Set ``out`` [B, T, A] to the sum over k of ``series`` [B, A, K] times ``basis`` [K, T], in a fixed order."""
     K, T = basis.shape
     total = np.empty(CHUNK)
     for start in range(0, T, CHUNK):
@@ -226,10 +229,10 @@ def synthesise(basis: Array, series: Array, out: Array) -> None:
 
 @allocating
 def synthesise_at(psi: Array, series: Array, out: Array) -> None:
-    """Set ``out`` [T, A] to A Fourier series of one individual at the phases ``psi`` [T], rad.
+    """Set ``out`` [T, A] to the values of A Fourier series of one individual at the phases ``psi`` [T], rad.
 
-    A row of ``series`` [A, 2 K + 1] holds the mean, K cosine and K sine coefficients. Sines and cosines follow by
-    recurrence over the harmonics, which is much faster than computing each.
+    A row of ``series`` [A, 2 K + 1] is the mean, K cosine coefficients and K sine coefficients of one series. Sines and
+    cosines are computed by recurrence over the harmonics, which is much faster than computing each.
     """
     A, K = len(series), (series.shape[1] - 1) // 2
     dc, ds, c, s = np.empty((4, CHUNK))

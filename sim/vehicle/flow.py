@@ -40,14 +40,15 @@ class StationedWings:
 
     Attributes:
         places: the stations.
-        sides: motion [B, 14, n] of each side that is computed, and the stream relative to it.
-        turning: [B, n], rad/s: C_R theta_w' of Eq. 2, or the term that replaces it, at the pitch station of one wing.
+        sides: for each side that is computed, motion [B, 14, n] (rows as in :mod:`wingfit.sim.vehicle.elements`) and
+            the stream relative to it.
+        turning: [B, n], rad/s: C_R theta_w' of Eq. 2, or what replaces it, at the pitch station of a single wing.
         fling: [B, n], rad/s: the contribution of wings that peel apart (Eq. 7).
         loading: [B, 8]: factor on the circulation.
         density: [B] of the air, kg/m^3.
         lift: [B, 2]: C_l of the sine law and the factor on the measured curve.
         drag: [B, 3]: C_D0, C_Dpi2 and the factor on the measured curve.
-        alike: number of wings that move like one computed side.
+        alike: number of wings per computed side.
     """
 
     places: Stations
@@ -61,7 +62,7 @@ class StationedWings:
     alike: float
 
     def every(self, k: int) -> StationedWings:
-        """The same wings at every ``k``-th instant."""
+        """The same wings at every ``k``-th of their instants only."""
         sides = tuple((rows[:, :, ::k].copy(), side) for rows, side in self.sides)
         return replace(self, sides=sides, turning=self.turning[:, ::k].copy(), fling=self.fling[:, ::k].copy())
 
@@ -108,7 +109,7 @@ class StationedWings:
         return np.asarray(rate[:, :, None] * lever[:, None])
 
     def _circulate(self, flow: Flow) -> None:
-        """Set speed and quasi-steady circulation from the velocities."""
+        """Set speed and quasi-steady circulation of ``flow`` from its velocities ``along`` and ``normal``."""
         places = self.places
         for k in range(len(self.sides)):
             velocity, wing = (flow.along[k], flow.normal[k]), (places.twist, places.chord, self.loading)

@@ -33,10 +33,11 @@ _PITCH_GENES = (
 
 @dataclass(frozen=True)
 class Angles:
-    """Over one beat in n equal steps from t* = 0, for B individuals; derivatives by time in s.
+    """Motion over one beat at n equal steps from t* = 0, for B individuals.
 
-    ``flap`` [B, 3, n] and ``pitch`` [B, 3, n] (at the pitch station) with their first two derivatives; ``peel`` [B, n]
-    is 1 while the wings peel apart and 0 after, ``peeled`` [n] the fraction of the chord that has come apart.
+    ``flap`` [B, 3, n] and ``pitch`` [B, 3, n] (at the pitch station): angle (rad) and its first two derivatives by time
+    (s); ``peel`` [B, n] is 1 while the wings peel apart and 0 after, ``peeled`` [n] the fraction of the chord that has
+    come apart.
     """
 
     flap: Array
@@ -78,7 +79,7 @@ def angles_of(
 
 
 def flap_series(flap: Flap, values: Mapping[str, Array], count: int, instants: int) -> Complex:
-    """Series [B, K + 1] of the flap angle: Re sum_k series_k exp(2 pi i k t*)."""
+    """Fourier series [B, K + 1] of the flap angle (rad): Re sum_k series_k exp(2 pi i k t*), for ``count`` = B."""
     if isinstance(flap, FourierFlap):
         return np.tile(flap.series, (count, 1))
     k = np.arange(min(HARMONICS, (instants - 1) // 2) + 1)
@@ -90,7 +91,7 @@ def flap_series(flap: Flap, values: Mapping[str, Array], count: int, instants: i
 
 
 def _column(values: Mapping[str, Array], name: str, own: float) -> Array:
-    """[B, 1] of a gene, or [1, 1] of the motion's own value."""
+    """The gene ``name`` of ``values`` as a column [B, 1]; without such a gene, ``own`` as [1, 1]."""
     return np.asarray(values.get(name, np.array([own])), float)[:, None]
 
 

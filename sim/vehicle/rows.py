@@ -24,10 +24,10 @@ def mirrored(vehicle: Vehicle) -> float:
 
 
 def motion_rows(prescribed: Angles, forward: Array, root: float, half_step: float) -> Array:
-    """Motion [B, 14, n] for the kernels, without the rows that depend on the side; ``forward`` is [B, n].
+    """Motion [B, 14, n] for the kernels, without the rows that depend on the side (see :func:`set_side`).
 
-    ``half_step`` is the twist of the first element as a fraction of that at the pitch station: half a step of the
-    elements.
+    ``forward`` [B, n]: the stream along body x, m/s; ``root``: pitch at the wing's root, rad. ``half_step`` is the
+    twist of the first element as a fraction of that at the pitch station: half a step of the elements.
     """
     flap, pitch = prescribed.flap, prescribed.pitch
     rows = np.empty((len(flap), ROW_COUNT, flap.shape[2]))
@@ -40,7 +40,10 @@ def motion_rows(prescribed: Angles, forward: Array, root: float, half_step: floa
 
 
 def set_twist(rows: Array, pitch: Array, root: float, half_step: float) -> None:
-    """Set the pitch of the first element and the steps between elements; ``pitch`` [B, n] is at the pitch station."""
+    """Set the pitch of the first element and the step between elements in ``rows`` [B, 14, n].
+
+    ``pitch`` [B, n]: at the pitch station, ``root``: at the root, rad.
+    """
     half = half_step * (pitch - root)
     c, s = np.cos(half), np.sin(half)
     rows[:, elements.COSINE], rows[:, elements.SINE] = (

@@ -15,9 +15,9 @@ _NEGLIGIBLE = 1e-9  # gain below which a harmonic is omitted
 
 
 def series_of(forces: Array, harmonics: int, recording: Recording) -> Array:
-    """Series [..., 2 K + 1] of periodic ``forces`` [..., n], filtered like the recording; K are its ``harmonics``.
+    """Fourier series [..., 2 K + 1] of periodic ``forces`` [..., n], filtered like the recording; K is ``harmonics``.
 
-    Mean, then cosine and sine coefficients of each harmonic.
+    Mean, then K cosine coefficients, then K sine coefficients.
     """
     spectrum = np.fft.rfft(forces)[..., : harmonics + 1] / forces.shape[-1]
     if recording.low_pass:
@@ -28,13 +28,13 @@ def series_of(forces: Array, harmonics: int, recording: Recording) -> Array:
 
 
 def phases(recording: Recording, times: Array) -> Array:
-    """Phase of the beat, 2 pi f t (rad), at ``times`` (s)."""
+    """Phase (rad) of the beat at ``times`` (s)."""
     return np.asarray(2 * np.pi * recording.condition.flap_frequency * times)
 
 
 @lru_cache(maxsize=1)  # of the last recording only, since those of long recordings are large
 def basis_of(recording: Recording, harmonics: int) -> tuple[Array, Index]:
-    """Cosines, then sines of the harmonics that the recording's low-pass passes, at its T instants: [K, T].
+    """Cosines, then sines of the harmonics that the recording's low-pass passes, at its T instants: array [K, T].
 
     The second array [K] holds the index of each of these rows in the coefficients of :func:`series_of`.
     """
@@ -48,7 +48,7 @@ def basis_of(recording: Recording, harmonics: int) -> tuple[Array, Index]:
 
 
 def passed(added: Array, recording: Recording) -> Array:
-    """Forces ``added`` [T, C] by the balance, after the recording's low-pass.
+    """Forces ``added`` [T, C] (N), errors that the balance adds, after the recording's low-pass.
 
     Near the ends of a recording, where the low-pass gives no values and nothing is compared, they are unfiltered.
     """

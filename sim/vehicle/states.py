@@ -1,4 +1,4 @@
-"""Periodic solutions, over a prescribed beat, of the differential equations of the air's states."""
+"""Periodic solutions, over a prescribed beat, of the differential equations of states such as the inflow."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ _SWEEPS = 6  # iterations with the correlation
 
 @inlined
 def _step(before: Vector, after: Vector) -> tuple[Vector, Vector, Vector]:
-    """Factors (d, c, e) of a step of x' = rate (target - x): x after it is d x + c target before + e target after.
+    """(decay, w0, w1) of one step of x' = rate (y - x): x_after = decay x + w0 y0 + w1 y1, y being linear in between.
 
-    The target is linear within the step. ``before`` and ``after`` are the rate at both ends times half the step; a is
-    their sum. d is the Pade approximant (1, 2) of exp(-a), with an error of a^4 / 72 and never above one; a constant
+    ``before`` and ``after``: rate at the step's start and end times half the step; a is their sum. The decay is the
+    Pade approximant (1, 2) of exp(-a), with an error of a^4 / 72 and never above one; with these weights a constant
     target is followed exactly.
     """
     a = greatest(before + after, _MIN_DECAY)
@@ -34,12 +34,11 @@ def _step(before: Vector, after: Vector) -> tuple[Vector, Vector, Vector]:
 
 @allocating
 def followed(speed: Array, share: Array, target: Array, step: float, out: Array) -> None:
-    """Set ``out`` to the periodic solution x of x' = share speed (target - x) over one beat.
+    """Periodic solution x of x' = share speed (target - x) over one beat.
 
-    One sweep from zero gives the periodic start; another sweep starts there.
-
-    ``speed`` (m/s; in a step the mean over its ends), ``target`` (linear over a step) and ``out``
-    [sides, B, n, 8]; ``share`` [B, 8], 1/m, not negative; ``step`` in s.
+    A sweep over the beat from x = 0 gives the periodic start, from which a second sweep starts. ``out`` is set to x;
+    ``speed`` (m/s; in a step the mean over its ends), ``target`` (linear over a step) and ``out`` [sides, B, n, 8];
+    ``share`` [B, 8], 1/m, not negative; ``step`` in s.
     """
     n = speed.shape[2]
     start, kept = np.zeros(LANES), np.ones(LANES)
@@ -92,7 +91,7 @@ def _logistic(x: Vector) -> Vector:
 def steady_attachment(
     along: Array, normal: Array, speed: Array, chord: Array, stall: Array, step: float, out: Array
 ) -> None:
-    """X_0(alpha - tau_2 alpha') = 1 / (1 + exp((alpha - tau_2 alpha' - angle) / width)) over a beat.
+    """Attached fraction X_0 of the chord over a beat: 1 / (1 + exp((alpha - tau_2 alpha' - angle) / width)).
 
     ``out`` is set to X_0; ``along``, ``normal``, ``speed`` (m/s) and ``out`` [sides, B, n, 8]; ``chord`` [8], m;
     ``stall`` [B, 3]: angle and width, rad, and tau_2 in chords travelled; ``step`` in s.
@@ -132,9 +131,9 @@ def separate(attached: Array, share: Array, rotation: Array, circulation: Array)
 
 @kernel
 def overtake(wing: Array, share: Array, wake: Array) -> None:
-    """Replace the velocity w of the ``wake`` by share (w - v), where v is w limited to the interval between 0 and u.
+    """Replace the velocity w of the air in ``wake`` by ``share`` (w - w limited to the interval between 0 and u).
 
-    u is the velocity of the ``wing`` on the same line; v is the part of w that moves along with the wing. All
+    u is the velocity of ``wing`` along the same line: only the excess of the air over the wing's velocity acts. Both
     [sides, B, n, 8] in m/s, ``share`` [B].
     """
     for k in range(len(wake)):
@@ -174,7 +173,10 @@ def settled_inflow(
 
 @inlined
 def _settle(force: Array, slope: Array, through: float, inertia: float, out: Array) -> float:
-    """Periodic solution ``out`` for a given mass flow, kg/s; returns its mean."""
+    """Set ``out`` [n] to the periodic v of :func:`settled_inflow` for a mass flow ``through``, kg/s; returns its mean.
+
+    ``inertia``: m / step, kg/s.
+    """
     n, start, total = len(force), 0.0, 0.0
     for again in range(2):
         v, product, total = start, 1.0, 0.0

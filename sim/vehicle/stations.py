@@ -50,7 +50,7 @@ _WEIGHTS = _weights()
 
 
 def stations(vehicle: Vehicle, motion: WingMotion) -> Stations:
-    """Stations of the wings of ``vehicle``."""
+    """The eight stations of each wing of ``vehicle``, with the pitch station of ``motion``."""
     r, at, chords = _MIDDLES * vehicle.span, [s.r for s in vehicle.stations], [s.chord for s in vehicle.stations]
     chord = np.asarray(np.interp(r, at, chords))
     twist = r / (motion.pitch_station * vehicle.span)
@@ -70,7 +70,7 @@ def span_sums(values: Array, weight: Array, out: Array) -> None:
 
 @kernel
 def station_turns(motion: Array, cosine: Array, sine: Array) -> None:
-    """Cosine and sine [B, n, 8] of the wing's pitch at the stations, from ``motion`` [B, 14, n]."""
+    """Set ``cosine`` and ``sine`` [B, n, 8] of the wing's pitch at the stations, from ``motion`` [B, 14, n]."""
     for b in range(len(motion)):
         for t in range(motion.shape[2]):
             c, s = motion[b, elements.COSINE, t], motion[b, elements.SINE, t]
@@ -84,7 +84,7 @@ def station_turns(motion: Array, cosine: Array, sine: Array) -> None:
 def station_velocities(
     motion: Array, side: Side, r: Array, cosine: Array, sine: Array, along: Array, normal: Array
 ) -> None:
-    """Velocities through the air along the chord and normal to it [B, n, 8], m/s (Eqs. 18-19)."""
+    """Set ``along`` and ``normal`` [B, n, 8], velocities through the air along the chord and normal to it (m/s)."""
     for b in range(len(motion)):
         for t in range(motion.shape[2]):
             ct, st = load1(cosine[b], t), load1(sine[b], t)
@@ -102,7 +102,7 @@ def station_velocities(
 
 @kernel
 def station_gust(cosine: Array, sine: Array, air: Array, along: Array, normal: Array) -> None:
-    """Change the velocities [B, n, 8] for air that moves along r zeta' at ``air`` [B, n, 8] (m/s)."""
+    """Correct ``along``, ``normal`` [B, n, 8] for air that moves in the flapping direction at ``air`` (m/s)."""
     for b in range(len(air)):
         for t in range(air.shape[1]):
             moved = load1(air[b], t)
@@ -112,7 +112,7 @@ def station_gust(cosine: Array, sine: Array, air: Array, along: Array, normal: A
 
 @inlined
 def _attack(along: float, normal: float) -> float:
-    """Angle of attack folded into 0 to 90 degrees."""
+    """Angle of attack in degrees, folded into 0 to 90."""
     return math.atan2(abs(normal), abs(along)) / DEGREE
 
 
@@ -121,7 +121,7 @@ def station_circulation(
     along: Array, normal: Array, turning: Array, coefficient: Array, twist: Array, chord: Array, loading: Array,
     speed: Array, circulation: Array,
 ) -> None:  # fmt: skip
-    """Speed (m/s) and quasi-steady circulation (m^2/s), positive as in Eq. 8, both [B, n, 8] (Eqs. 2-4, 7).
+    """Set ``speed`` (m/s) and quasi-steady ``circulation`` (m^2/s, positive as in Eq. 8), [B, n, 8] (Eqs. 2-4, 7).
 
     ``along`` and ``normal`` [B, n, 8], m/s; ``turning`` [B, n]: C_R theta_w' at the pitch station, or the term that
     replaces it in Eq. 2, rad/s; ``coefficient`` [B, 2]: C_l of the sine law and the factor on the measured curve;

@@ -73,7 +73,7 @@ HELD_OUT = ("test-3", "test-7")  # of the example: an interpolation and an extra
 
 @dataclass(frozen=True)
 class Balance:
-    """How forces are recorded, and the errors of the balance. Noise is per force axis.
+    """How forces are recorded, and the errors of the balance. "The source" is Armanini et al. (2016).
 
     Attributes:
         rate: samples per second, Hz; the source's (3.2.2).
@@ -82,12 +82,12 @@ class Balance:
         sensor: standard deviation of the white noise of a sample, N. The source's transducer resolves 0.149 gram-force.
         resonance: natural frequency of the clamped body along x and z, Hz. A body of 17 g on a strut, bent by a
             fuselage of carbon rod; above the harmonics that are looked at, or the forces could not be read at all.
-        damping: its damping ratio; clamped carbon structures have 1 to 3 %.
+        damping: damping ratio of the resonance; clamped carbon structures have 1 to 3 %.
         participation: part of the force that drives the resonance. Small, since the source clamps the body where the
             forces act, to this end (3.2.2). At 40 Hz it makes the forces 1 % too large: a systematic error.
         rattle: standard deviation of what motor, gears and the tunnel's 1 % turbulence excite in the resonance, N.
         drift: standard deviation of the slow drift, N; small, since the zero is taken before each test.
-        drift_time: its correlation time, s; a transducer warms up in seconds to minutes.
+        drift_time: correlation time of the drift, s; a transducer warms up in seconds to minutes.
         scatter: relative standard deviation of the force from beat to beat: the flow separates anew in each.
         timing: standard deviation of the instant at which a beat begins, beats: half a sample of 80 us. The phase comes
             from a Hall sensor on the mechanism, read with the forces (3.2.2), beat by beat.
@@ -190,7 +190,7 @@ def read_truth(path: Path) -> dict[str, dict[str, float]]:
 
 
 def _by_beat(at: Array, memory: float, rng: np.random.Generator) -> Array:
-    """Unit noise with one value a beat, first-order autoregressive, linear in between; ``at`` [T] in beats."""
+    """Unit noise [T] at ``at`` [T] (beats): one autoregressive value a beat (lag-1 ``memory``), linear in between."""
     first = math.floor(at[0]) - 1
     beats = math.ceil(at[-1]) - first + 2
     white = rng.standard_normal(beats)
@@ -199,7 +199,7 @@ def _by_beat(at: Array, memory: float, rng: np.random.Generator) -> Array:
 
 
 def _measured(force: Array, axis: int, balance: Balance, rng: np.random.Generator) -> Array:
-    """The measured force [T] along an axis: the true one with resonance, drift and white noise."""
+    """The measured force [T] along an axis, N: the true ``force`` with resonance, drift and white noise added."""
     b, a = _resonator(balance.resonance[axis], balance.damping, balance.rate)
     spring_force = scipy.signal.lfilter(b, a, force - force[0]) + force[0]  # at rest under the first force
     rattle = scipy.signal.lfilter(b, a, rng.standard_normal(len(force)))
@@ -212,7 +212,7 @@ def _measured(force: Array, axis: int, balance: Balance, rng: np.random.Generato
 
 
 def _resonator(frequency: float, damping: float, rate: float) -> tuple[Array, Array]:
-    """Digital filter from the force on a damped oscillator to the force that its spring passes on."""
+    """Coefficients (b, a) of the digital filter from the force on a damped oscillator to the force in its spring."""
     omega = 2 * math.pi * frequency
     b, a = scipy.signal.bilinear([omega**2], [1.0, 2 * damping * omega, omega**2], fs=rate)
     return np.asarray(b), np.asarray(a)

@@ -68,7 +68,7 @@ class Tracking:
         memory: correlation of the noise from frame to frame.
         gap_rate: probability per frame that a gap of a marker starts.
         gap_frames: mean length of such a gap.
-        beats: apparent beats recorded.
+        beats: beats recorded, as they appear in the stroboscopic frames.
     """
 
     noise: tuple[float, float, float] = (4e-4, 4e-4, 6e-4)

@@ -48,7 +48,7 @@ class RodDrive:
 
 @lru_cache(maxsize=64)
 def _angles(phases: bytes, both: bytes) -> Array:
-    """Angles of both rods and their first four derivatives by phase [T, 2, 5], at T phases; cached for batches."""
+    """Angle and its first four derivatives by phase [T, 2, 5] of both rods; arguments are bytes, to be cached."""
     series = np.frombuffer(both, np.complex128).reshape(-1, 2)
     turn = _turns(phases, len(series))
     order = (1j * np.arange(len(series))) ** np.arange(5)[:, None]
@@ -62,7 +62,7 @@ def _angles(phases: bytes, both: bytes) -> Array:
 
 @lru_cache(maxsize=4)
 def _turns(phases: bytes, terms: int) -> Complex:
-    """exp(i k psi) [T, terms]."""
+    """exp(i k psi) [T, terms], k = 0, 1, ..., at the phases psi (rad) whose bytes are ``phases``."""
     return np.asarray(np.exp(1j * np.arange(terms) * np.frombuffer(phases)[:, None]))
 
 
@@ -96,7 +96,7 @@ def four_bar_angle(linkage: FourBarDrive, psi: ArrayLike) -> Array:
 
 @lru_cache(maxsize=64)
 def _four_bar_series(linkage: FourBarDrive) -> Complex:
-    """Coefficients of the rocker angle, exact to round-off for usual linkages, where they decrease fast."""
+    """Series [K + 1] of the rocker angle, exact to round-off for usual linkages, where they decrease fast."""
     psi = 2 * np.pi * np.arange(_SAMPLES) / _SAMPLES
     series = np.fft.rfft(four_bar_angle(linkage, psi))[: _HARMONICS + 1] / _SAMPLES
     series[0] = series[0].real

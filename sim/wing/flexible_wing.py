@@ -74,7 +74,7 @@ class FlexibleWing:
 
     @cached_property
     def genes(self) -> tuple[Gene, ...]:
-        """Structural genes (thesis Eq. 18), aerodynamic ones (Eq. 19), then those of the effects."""
+        """Structural genes (thesis Eq. 18), aerodynamic genes (Eq. 19), then those of the effects."""
         own = wing_genes(self.wing.estimates, self.bounds_factor)
         return (*own, *(gene for effect in self.chosen for gene in effect.genes(self.wing)))
 
@@ -89,11 +89,11 @@ class FlexibleWing:
         return self._share_structure(replace(self, effects=(*self.effects, *names)))
 
     def beside(self, genome: ArrayLike) -> FlexibleWing:
-        """The same wing with the periodic motion of ``genome`` [G], without effects, as warm start."""
+        """The same wing, whose simulations start at the periodic motion of ``genome`` [G] without effects."""
         return self._share_structure(replace(self, near=tuple(np.asarray(genome, float)[:_OWN_GENES].tolist())))
 
     def _share_structure(self, other: FlexibleWing) -> FlexibleWing:
-        """``other``, which has the same wing and division, with the structures that have been built already."""
+        """Return ``other``, of the same wing and division, after giving it the structures built for this one."""
         for name in ("structure", "_structure_in_air"):
             if name in self.__dict__:
                 other.__dict__[name] = self.__dict__[name]
@@ -101,7 +101,7 @@ class FlexibleWing:
 
     @property
     def searched(self) -> tuple[str, ...]:
-        """All genes."""
+        """Names of the genes that a calibration estimates: all."""
         return tuple(gene.name for gene in self.genes)
 
     @cached_property
@@ -111,11 +111,11 @@ class FlexibleWing:
 
     @cached_property
     def _structure_in_air(self) -> Structure:
-        """The same with matrix blocks between all bodies of a strip, for the added mass that they share."""
+        """As :attr:`structure`, with matrix blocks between all bodies of a strip, which added mass couples."""
         return build(self.wing, Division.parse(self.division), whole_strips=True)
 
     def subject(self, effects: tuple[Effect, ...], condition: Condition) -> Subject:
-        """The subject of a simulation with these effects on."""
+        """What the solver needs for a simulation with these effects on: structure, condition and scene of genomes."""
         moves_air = any(effect.port == "inertia" and effect.family == "aerodynamics" for effect in effects)
         structure = self._structure_in_air if moves_air else self.structure
 
@@ -144,7 +144,7 @@ class FlexibleWing:
         return tuple(beats[k] for k in wing)
 
     def _beats(self, batch: Array, recording: Recording, with_motion: bool) -> tuple[list[Beat], Index]:
-        """A beat of each distinct wing, and the index of the wing of each individual [B]."""
+        """A beat of each distinct wing, and for each individual [B] of ``batch`` the index of its beat."""
         first, wing = _distinct(self._acting(batch, [effect for effect in self.chosen if effect.wing]))
         wings, found = batch[first], dict[int, Beat]()
         for effects, rows in by_active([effect for effect in self.chosen if effect.wing], self.genes, wings):
@@ -164,7 +164,7 @@ class FlexibleWing:
         return self._plain_key, condition, genome[:_OWN_GENES].tobytes()
 
     def _start_near(self, condition: Condition) -> Course | None:
-        """The solution for ``near`` under ``condition``; None if it fails."""
+        """The periodic solution of the genome ``near`` under ``condition``, as warm start; None if it fails."""
         wing, key = self._plain_wing, (self._plain_key, condition)
         if key not in _STARTS:
             found = settled_course(wing.subject((), condition), np.array(self.near), self.numerics)
@@ -180,7 +180,7 @@ class FlexibleWing:
         return pickle.dumps(self._plain_wing, 5)
 
     def _acting(self, batch: Array, effects: Sequence[Effect]) -> Array:
-        """``batch`` [B, G] with zeros for genes of other effects and of effects that are off."""
+        """``batch`` [B, G] with zeros for the genes of effects that are off or are not in ``effects``."""
         plain = np.zeros_like(batch)
         plain[:, :_OWN_GENES] = batch[:, :_OWN_GENES]
         place = {gene.name: k for k, gene in enumerate(self.genes)}
@@ -226,7 +226,7 @@ class FlexibleWing:
     ) -> tuple[Complex, Array, Array]:
         """Observation of the beats by the cameras: series [B, K + 1, C], instants [B, T] (s), added errors [B, T, C].
 
-        ``wing`` [B] are the indices of the individuals' ``beats``.
+        ``wing`` [B]: index of each individual's beat in ``beats``.
         """
         names = [marker.name for marker in self.wing.markers]
         columns = [names.index(name) for name in recording.markers]
@@ -267,7 +267,7 @@ def _on_grid(tracks: Array) -> Array:
 
 
 def _aligned_values(series: Complex, since: Array, own: Array, recorded: Array) -> Array:
-    """Values [B, T, C] of ``series`` [B, K + 1, C] at phases ``since`` [B, T] plus ``own`` [B].
+    """Values [B, T, C] of ``series`` [B, K + 1, C] at phases ``since`` [B, T] plus ``own`` [B] plus a fit (rad).
 
     A common phase shift of each individual is fitted to ``recorded`` [T, C] by two Gauss-Newton steps; noise makes a
     shift of about a thousandth of a radian. It is limited to MAX_SHIFT, so that a larger one remains visible as misfit.

@@ -76,7 +76,10 @@ def wing_genes(estimates: Mapping[str, float], factor: float = FACTOR) -> tuple[
 
 
 def lanes(structure: Structure, genes: tuple[Gene, ...], genomes: Array) -> Lanes:
-    """Stiffness, damping and air coefficients of up to LANES genomes [B, G]; spare lanes repeat the last one."""
+    """Inputs of the kernels for up to LANES genomes [B, G]: stiffness, damping, air coefficients; no effects.
+
+    Spare lanes repeat the last genome.
+    """
     column = {gene.name: k for k, gene in enumerate(genes)}
     padded = genomes[np.minimum(np.arange(LANES), len(genomes) - 1)]
 
@@ -107,8 +110,8 @@ def lanes(structure: Structure, genes: tuple[Gene, ...], genomes: Array) -> Lane
 def _distribute(structure: Structure, quarters: Array) -> tuple[Array, Array]:
     """Share [N, W] of the strip's force on each body, and its point of action along the chord [N, W] in the body frame.
 
-    Shares are given for the quarters of the chord, for any discretisation: a body bears the part that it covers, at the
-    centroid of that part.
+    The genes ``quarters`` are the shares of four quarters of the chord. A body bears the part of each quarter that it
+    covers, at the middle of that part.
     """
     share, moment = np.zeros((len(structure.panels), LANES)), np.zeros((len(structure.panels), LANES))
     for body, quarter, width, x in structure.stretches:

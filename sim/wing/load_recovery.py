@@ -55,7 +55,7 @@ def from_motion(scene: WingScene, motion: State, crossing: float = 0.0) -> Outpu
 
 
 class _Sums:
-    """Results collected over the groups of instants."""
+    """Results of all instants (first axis n), as :class:`Outputs` has them, filled group by group."""
 
     def __init__(self, structure: Structure, n: int) -> None:
         bodies, connectors, strips = len(structure.bodies), len(structure.connectors), len(structure.division.bodies)
@@ -69,7 +69,7 @@ class _Sums:
 
 
 class _Parts(NamedTuple):
-    """Inputs of the kernels for the wing."""
+    """Inputs of the kernels for the wing: ``wiring``, the condition ``here`` and the ``lanes``."""
 
     wiring: Wiring
     here: Setting
@@ -115,7 +115,7 @@ def _put(work: Work, state: State) -> None:
 
 
 def _connector(parts: _Parts, c: int, groups: list[tuple[Index, State]], sums: _Sums) -> None:
-    """Loads of one connector: the integrator's forces of a wing that has no other connector."""
+    """Set the loads of connector ``c`` in ``sums``: the integrator's forces of a wing that has no other connector."""
     alone, own = parts.alone(c)
     work, w, twist = new_work(*alone), alone.wiring, np.zeros((1, 6, LANES))
     first = int(w.first[0])
@@ -134,7 +134,7 @@ def _connector(parts: _Parts, c: int, groups: list[tuple[Index, State]], sums: _
 
 
 def _air_and_energies(parts: _Parts, groups: list[tuple[Index, State]], sums: _Sums) -> None:
-    """Flow and laws of the air for the whole wing, then the forces one strip at a time; and of laws at points."""
+    """Set air loads and energies in ``sums``: flow of the whole wing, forces strip by strip, effects at points."""
     w, here, group = parts
     work, n, solid = new_work(*parts), len(w.mass), group._replace(pairs=group.pairs[: group.weighing])
     kinetic, height = np.zeros(LANES), np.zeros(LANES)

@@ -55,7 +55,7 @@ def _outputs(model: FlexibleWing, genome: Sequence[float], recording: Recording,
 
 
 def _fine(model: FlexibleWing) -> FlexibleWing:
-    """The model with LOAD_ACCURACY or better, unless the steps are given.
+    """The model with an accuracy of at least LOAD_ACCURACY, unless the number of steps is given.
 
     Loads are small displacements times large stiffnesses, and losses are small compared to the energy exchanged in a
     beat: both need a higher accuracy than tracks.
@@ -69,7 +69,7 @@ def _fine(model: FlexibleWing) -> FlexibleWing:
 def crossing(model: FlexibleWing, recording: Recording, tracks: Array) -> float:
     """Drive phase (beats) at which simulated ``tracks`` [n, M, 3] cross the mid-stroke upwards; 0 if they never do.
 
-    From the same markers as for the recording, so that both phases agree; from all reference markers without data.
+    The same reference markers are used as for the recording, so that both phases agree; without data all of them.
     """
     names = [marker.name for marker in model.wing.markers]
     try:

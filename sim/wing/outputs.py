@@ -84,7 +84,7 @@ class Outputs:
         strips: air loads, root first.
         air_wrench: [n, N, 6] of the air on each body, in its frame at its centre of mass.
         held: [n, N, 6], as ``air_wrench``, of what effects apply at points of the wing, such as a tether.
-        held_lost, held_stored: [n] power that these take (W) and energy that they store (J).
+        held_lost, held_stored: [n] power that these effects dissipate (W) and energy that they store (J).
         lift_axis, thrust_axis: unit vectors in the world. In wind: perpendicular to the stream (in the plane of flow
             and vertical), and against it; without wind: up, and forward (-x). The side force is along y, outboard.
         kinetic, elastic, gravitational: [n] energies, J; gravitational is zero at z = 0.
@@ -125,7 +125,7 @@ class Outputs:
 
     @property
     def balance(self) -> Balance:
-        """Averages over the beat of the powers through the ports."""
+        """Mean powers over the beat: of the motors, in the dampers and to the air."""
         front, rear = (float(motor.power.mean()) for motor in self.motors)
         return Balance(front, rear, float(self.dissipated.mean()), -float(self.air_power.mean()))
 

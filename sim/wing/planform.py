@@ -20,7 +20,7 @@ _ROD_CELLS = 2000
 
 @dataclass(frozen=True)
 class Panel:
-    """Piece of the wing between two span positions and two fractions of the chord."""
+    """Piece of the wing between the span positions ``y0``, ``y1`` (m) and the fractions ``s0``, ``s1`` of the chord."""
 
     y0: float
     y1: float
@@ -79,7 +79,7 @@ class Planform:
         ]
 
     def strips(self, division: Division) -> Array:
-        """Span positions of the strips' edges, root first."""
+        """Span positions (m) of the strips' edges [S + 1], root first."""
         return np.linspace(self._y[0], self._y[-1], len(division.bodies) + 1)
 
 
@@ -94,7 +94,7 @@ def carriers(panels: Sequence[Panel], y: Array, fraction: Array) -> Index:
 
 @one_blas_thread
 def bodies(planform: Planform, panels: list[Panel]) -> list[Body]:
-    """Mass properties of every panel: foam and skin by quadrature, rods with their straw, markers as points."""
+    """Mass properties of every panel: foam and skin are integrated, rods have their straw, markers are points."""
     lumps: list[list[tuple[float, Array]]] = [[] for _ in panels]
     for rod in planform.wing.rods:
         linear = rod.density * round_area(rod.diameter) + rod.glue_linear_density
@@ -143,6 +143,6 @@ def _body(planform: Planform, panel: Panel, lumps: list[tuple[float, Array]]) ->
 
 
 def marker_carriers(planform: Planform, panels: list[Panel], markers: tuple[Marker, ...]) -> Index:
-    """Indices of the bodies that carry the markers."""
+    """Indices [M] of the bodies that carry the ``markers``."""
     x, y, _ = np.array([marker.position for marker in markers]).T
     return carriers(panels, y, planform.fraction(x, y))

@@ -59,9 +59,10 @@ class StationMotion:
 
 @dataclass(frozen=True)
 class Probed:
-    """``responses`` [T, C, P] of a recording to the P unit loads of a probe, m per N/m or N; NaN if a simulation fails.
+    """``responses`` [T, C, P] of a recording's channels to P unit loads, m per N/m, N or deg (:class:`Probe`).
 
-    ``crossing``: drive phase (beats) at which the recorded beat starts; ``motion`` at the stations of the probe.
+    They are NaN where a simulation fails. ``crossing``: drive phase (beats) at which the recorded beat starts;
+    ``motion`` at the stations of the probe.
     """
 
     responses: Array
@@ -102,9 +103,10 @@ def probed(model: FlexibleWing, genome: ArrayLike, recording: Recording, probe: 
 
 
 def _sizes(model: FlexibleWing, probe: Probe) -> Array:
-    """Initial loads: forces [stations] (N/m), then moments (N) if the probe has any, and rotations of the rods (deg).
+    """Initial sizes [P] of the probe's loads: forces at its stations (N/m), moments (N), rotations of the rods (deg).
 
-    Forces are larger near the root, where their lever is small; moments are those of a force times the chord.
+    Moments and rotations are there if the probe has any. Forces are larger near the root, where their lever is small;
+    moments are those of a force times the chord.
     """
     weight = sum(body.mass for body in model.structure.bodies) * _GRAVITY
     forces = _INITIAL_LOAD * weight / model.wing.span / np.maximum(np.array(probe.stations), 0.1)
@@ -118,7 +120,7 @@ def _sizes(model: FlexibleWing, probe: Probe) -> Array:
 def _changes(
     model: FlexibleWing, genome: Array, recording: Recording, which: Index, sizes: Array
 ) -> tuple[Array, tuple[str | None, ...]]:
-    """Changes [B, T, C] of the channels by loads of ``sizes`` [B], and the reasons of failures."""
+    """Changes [B, T, C] of the channels by loads ``which`` [B] of ``sizes`` [B], and reasons of failures or None."""
     batch = np.zeros((len(which) + 1, len(model.genes)))
     batch[:, : len(genome)] = genome
     batch[np.arange(1, len(batch)), len(genome) + which] = sizes
@@ -158,7 +160,7 @@ def station_motion(
 
 
 def _strips(structure: Structure, motion: State) -> tuple[Array, Array, Array, Array, Array]:
-    """Position, normal, chord direction [n, S, 3], pitch rate [n, S] and position on a rigid wing, of each strip."""
+    """Position, normal, chord direction [n, S, 3], pitch rate [n, S] and position on a rigid wing [n, S, 3]."""
     w, count = structure.wiring, len(structure.bodies)
     starts = w.strip_start[:-1]
     R = motion.R.reshape(*motion.R.shape[:2], 3, 3)
@@ -181,7 +183,7 @@ def _strips(structure: Structure, motion: State) -> tuple[Array, Array, Array, A
 
 
 def _between(middles: Array, stations: Array) -> Array:
-    """Weights [J, S] of the strips for interpolation at the stations."""
+    """Weights [J, S] that interpolate from the strips' ``middles`` [S] to ``stations`` [J] (both fractions of span)."""
     inner = np.clip(np.searchsorted(middles, stations) - 1, 0, len(middles) - 2)
     part = (stations - middles[inner]) / (middles[inner + 1] - middles[inner])
     weights = np.zeros((len(stations), len(middles)))

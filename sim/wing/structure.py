@@ -27,7 +27,7 @@ _DRIVEN_GAP = 0.02  # m, largest distance between the root and the start of a dr
 
 @dataclass(frozen=True)
 class Connector:
-    """Spring and damper between two bodies at ``point`` (wing frame); ``first`` is -1 or -2 for a driving rod.
+    """Spring and damper between bodies at ``point`` (m, wing frame); ``first`` is -1 or -2 for a driving rod.
 
     ``foam`` [6] and ``rods`` [S, 6] are second moments (m^4) and areas (m^2) divided by the distance between the
     bodies' centroids; times the modulus named by ``modulus`` they are stiffnesses (thesis Eqs. 15-16 over a length).
@@ -62,7 +62,10 @@ def spring_constants(connectors: tuple[Connector, ...], foam: Array, rod: Array)
 
 @dataclass(frozen=True)
 class Structure:
-    """A discretised wing. ``position``: number of the matrix block for a pair of bodies."""
+    """A discretised wing: its parts, and the inputs ``wiring`` of the kernels that follow from them.
+
+    ``position``: number of the block of the solver's matrix for a pair (row, column) of bodies.
+    """
 
     wing: Wing
     division: Division
@@ -75,9 +78,9 @@ class Structure:
 
     @cached_property
     def stretches(self) -> tuple[tuple[int, int, float, float], ...]:
-        """Overlaps of bodies and quarters of the chord.
+        """Overlaps of bodies with quarters of the chord, to distribute the air's forces, which are given by quarters.
 
-        Each as body, quarter, overlap as a fraction of the chord, and x (m) of its middle in the body's frame.
+        Each entry: body, quarter, overlap as a fraction of the chord, and x (m) of its middle in the body's frame.
         """
         edges = np.linspace(0, 1, QUARTERS + 1).tolist()
         return tuple(
@@ -128,7 +131,7 @@ def _rigidities(section: Rectangle, torsion: float, along_span: bool) -> Array:
 
 
 def _rod_rigidities(diameter: float) -> Array:
-    """Per modulus: E_r I_r about x and z, G_r A_r along x and z; 0 along and about the span, where the rod slides."""
+    """I_r about x, y, z, then A_r along x, y, z [6], of thesis Eqs. 15-16; 0 about and along the span: rods slide."""
     second, A = round_second_moment(diameter), round_area(diameter)
     return np.array([second, 0.0, second, A, 0.0, A])
 
@@ -139,7 +142,7 @@ def _x_of(rod: Rod, y: float) -> float:
 
 
 def _piece(planform: Planform, rod: Rod, y: float, count: int) -> int:
-    """Index of the piece of the chord at ``y``, of ``count``, that contains the rod."""
+    """Index of the piece that contains the rod at ``y``, if the chord is divided into ``count`` equal pieces."""
     return min(int(planform.fraction(_x_of(rod, y), y) * count), count - 1)
 
 
@@ -198,7 +201,7 @@ def _along_span(planform: Planform, division: Division, parts: list[Body]) -> li
 
 
 def _facing(inner: int, outer: int) -> list[tuple[int, int, float, float]]:
-    """Overlapping pieces of two divisions of the chord: their indices, and first and last fraction of the overlap."""
+    """Overlaps of ``inner`` with ``outer`` equal pieces of the chord: index in each, first and last chord fraction."""
     both = [
         (i, j, max(i / inner, j / outer), min((i + 1) / inner, (j + 1) / outer))
         for i in range(inner)
@@ -295,7 +298,7 @@ def _wiring(
 
 
 def _geometry(planform: Planform, division: Division, area: Array) -> Array:
-    """[S, GEOMETRY] of the strips."""
+    """Area, mean chord, width and span fraction [S, GEOMETRY] of the strips of ``area`` [S], m^2."""
     edges = planform.strips(division)
     width = np.diff(edges)
     station = (0.5 * (edges[1:] + edges[:-1]) - edges[0]) / (edges[-1] - edges[0])

@@ -17,11 +17,12 @@ class Joints:
     Attributes:
         along_span: [C]: joins neighbours along the span (or the root with its drive), bends about the chord and twists
             about the span; otherwise neighbours along the chord, with the axes exchanged.
-        part: [C]: length of wing that it represents, as a fraction of the span: an angle divided by it is a curvature
+        part: [C]: length of wing that the connector represents, as a fraction of the span: an angle divided by it is a
+        curvature
             in radians over the span, which is the same in every discretisation.
         within: [C]: joins two bodies of the wing; the others join the root to a driving rod. Effects do not act on
             their bending, because a law in parallel would bridge the play of ``backlash``.
-        reach: [C, 2]: where that wing begins and ends, as fractions of the span from root to tip.
+        reach: [C, 2]: where that length of wing begins and ends, as fractions of the span from root to tip.
     """
 
     along_span: Mask
@@ -50,7 +51,7 @@ class Joints:
         return np.where(self.within[:, None], stiffness[:, 0], 0.0), stiffness[:, 1]
 
     def bending(self, stiffness: Array) -> tuple[Array, Array]:
-        """As :meth:`out_of_plane`, zero where the axis is that of torsion."""
+        """As :meth:`out_of_plane`, but zero also about the axis of torsion."""
         about_x, about_y = self.out_of_plane(stiffness)
         along = self.along_span[:, None]
         return np.where(along, about_x, 0.0), np.where(along, 0.0, about_y)

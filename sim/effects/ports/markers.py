@@ -13,10 +13,10 @@ _NEAR = 0.05  # of the span: distance at which a neighbour has the weight exp(-1
 
 
 def nearest(wing: Wing, values: Values) -> Index:
-    """Markers [B, M] of ``wing``, sorted by their distance at rest from the places PLACE [B].
+    """Indices [B, M] of the markers of ``wing``, sorted by their distance at rest from the position in ``values``.
 
-    A fault affects one marker and never a mixture, so the observation jumps where the place comes nearer to another
-    marker. A gradient search keeps the marker; a trial of places finds it.
+    A fault affects only the nearest marker, so the observation jumps where the position comes nearer to another one.
+    A gradient search therefore stays at a marker; only a trial of several positions finds the right one.
     """
     y, leading, chord = (np.array([getattr(s, a) for s in wing.stations]) for a in ("y", "leading_edge", "chord"))
     at = y[0] + values["station"] * (y[-1] - y[0])
@@ -29,7 +29,8 @@ def nearest(wing: Wing, values: Values) -> Index:
 def tangents(wing: Wing, marker: int) -> Array:
     """Weights [2, M] of the markers' positions that give the derivatives along x and y at rest at ``marker``.
 
-    From a weighted least-squares plane through the markers around it: exact for a uniform rotation and strain.
+    They follow from a weighted least-squares plane through the markers around it: exact for a uniform rotation and
+    strain.
     """
     rest = np.array([m.position[:2] for m in wing.markers])
     apart = rest - rest[marker]

@@ -39,7 +39,7 @@ class Stereo:
 
     @classmethod
     def of(cls, values: Values) -> Stereo:
-        """The pair of cameras with the parameters PLACES [B]."""
+        """The pairs of cameras of B individuals, from the values [B] of the parameters PLACES."""
         x, y, distance, base = (values[p.name][:, None, None] for p in PLACES)
         return cls(x, y, distance, base * distance)
 

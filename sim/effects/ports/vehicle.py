@@ -93,12 +93,12 @@ class VehicleScene:
         return cls(setting, genes, flap, airspeed, rho, one, inflow, loading, none, added)
 
     def __len__(self) -> int:
-        """Individuals."""
+        """Number of individuals B."""
         return len(self.flap)
 
     @property
     def step(self) -> float:
-        """Between instants, s."""
+        """Time between instants, s."""
         return 1.0 / (self.setting.condition.flap_frequency * self.setting.instants)
 
     def after(self, stage: Stage, action: Callable[[], None]) -> None:

@@ -63,7 +63,7 @@ class WingScene:
         return 2 * np.pi * self.condition.flap_frequency
 
     def body_at(self, station: Array, fraction: Array) -> tuple[Index, Array]:
-        """Bodies [W] under places of the wing, and the places [W, 3] relative to their centres of mass, m.
+        """Bodies [W] at positions on the wing, and the positions [W, 3] relative to the bodies' centres of mass, m.
 
         ``station``: fraction of the span from root to tip, ``fraction``: of the chord from the leading edge.
         """
@@ -142,7 +142,7 @@ class WingScene:
         self._arms += [np.where(lanes, arms.T, 0.0) for lanes in here]
 
     def at_rest(self, station: Array, fraction: Array) -> Array:
-        """Positions at rest of places of the wing in the world, [3, W] m."""
+        """World coordinates [3, W] (m) at rest of positions on the wing, given as in :meth:`body_at`."""
         found, arms = self.body_at(station, fraction)
         return np.asarray((arms + np.array([self.structure.bodies[n].centre for n in found])).T)
 
@@ -154,7 +154,7 @@ class WingScene:
 
     @property
     def _motor_sizes(self) -> Array:
-        """Factors for the states of a compliant motor, if any: a lead counts as motion at the speed of the tip."""
+        """Factors from the states of a compliant motor to metres: a lead (s) times the speed of the tip."""
         wing = self.structure.planform.wing
         stroke = np.abs(RodDrive.of(wing.drive, 0.0, 1).series[1:]).sum()  # as described: the same for every individual
         lead = wing.stations[-1].y * self.angular_rate * max(stroke, _LEAST_STROKE)

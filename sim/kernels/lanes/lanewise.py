@@ -1,4 +1,4 @@
-"""Functions for which processors have no vector instruction, lane by lane."""
+"""Functions for which processors have no vector instruction; each lane of the vector is computed separately."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from wingfit.sim.kernels.lanes.vector import Vector, load1, store1
 
 @allocating
 def angle(y: Vector, x: Vector) -> Vector:
-    """atan2."""
+    """atan2(y, x), rad."""
     scratch = np.empty((2, LANES))
     store1(scratch, 0, y)
     store1(scratch, 1, x)

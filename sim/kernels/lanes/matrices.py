@@ -44,7 +44,7 @@ def store_matrix(array: Array, n: int, A: Nine) -> None:
 
 @inlined
 def add_wrench(wrench: Array, n: int, t: Three, f: Three) -> None:
-    """Add a wrench to that of body n."""
+    """Add the moment t and the force f to row n of ``wrench`` [., 6, W]."""
     store_vector(wrench, n, 0, added(load_vector(wrench, n, 0), t))
     store_vector(wrench, n, 3, added(load_vector(wrench, n, 3), f))
 
@@ -85,7 +85,7 @@ def load_inertia(inertia: Array, n: int) -> Nine:
 
 @inlined
 def gyroscopic(inertia: Nine, omega: Three) -> Nine:
-    """Change of omega x (I omega) by omega: omega~ I - (I omega)~."""
+    """Derivative of omega x (I omega) by omega: omega~ I - (I omega)~."""
     return plus(skew_times(omega, inertia), scaled(-1.0, skew(times(inertia, omega))))
 
 
@@ -101,7 +101,7 @@ def plus(A: Nine, B: Nine) -> Nine:
 
 @inlined
 def scaled(factor: float, A: Nine) -> Nine:
-    """Factor times A."""
+    """``factor`` A."""
     return (
         factor * A[0], factor * A[1], factor * A[2],
         factor * A[3], factor * A[4], factor * A[5],
@@ -166,7 +166,7 @@ def cross(a: Three, b: Three) -> Three:
 
 @inlined
 def times_six(M: Six, x: Three, y: Three) -> tuple[Three, Three]:
-    """M times (x, y)."""
+    """M (x, y): the two halves of a 6-vector; M is four 3 x 3 quarters, row by row."""
     return added(times(M[0], x), times(M[1], y)), added(times(M[2], x), times(M[3], y))
 
 
@@ -244,7 +244,7 @@ def co_stiffness_matrix(K: Nine) -> Nine:
 
 @inlined
 def _quarter(blocks: Array, m: int, at: int) -> Nine:
-    """The quarter of block m that starts at element ``at``."""
+    """The 3 x 3 quarter of block m [36, W] that starts at element ``at``."""
     return load_vector(blocks, m, at) + load_vector(blocks, m, at + 6) + load_vector(blocks, m, at + 12)
 
 
@@ -256,7 +256,7 @@ def load_block(blocks: Array, m: int) -> Six:
 
 @inlined
 def add_to_block(blocks: Array, m: int, A: Six) -> None:
-    """Add the 6 x 6 matrix of four to block m of ``blocks`` [NB, 36, W]."""
+    """Add A, a 6 x 6 matrix as four 3 x 3 quarters, to block m of ``blocks`` [NB, 36, W]."""
     _set_quarter(blocks, m, 0, plus(_quarter(blocks, m, 0), A[0]))
     _set_quarter(blocks, m, 3, plus(_quarter(blocks, m, 3), A[1]))
     _set_quarter(blocks, m, 18, plus(_quarter(blocks, m, 18), A[2]))
@@ -273,7 +273,7 @@ def _set_quarter(blocks: Array, m: int, at: int, A: Nine) -> None:
 
 @inlined
 def set_block(blocks: Array, m: int, A: Six) -> None:
-    """Put the 6 x 6 matrix of four into block m of ``blocks`` [NB, 36, W]."""
+    """Put A, a 6 x 6 matrix as four 3 x 3 quarters, into block m of ``blocks`` [NB, 36, W]."""
     _set_quarter(blocks, m, 0, A[0])
     _set_quarter(blocks, m, 3, A[1])
     _set_quarter(blocks, m, 18, A[2])

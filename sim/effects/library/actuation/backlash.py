@@ -18,9 +18,10 @@ _EDGE = 0.02  # of the play: so far before and behind a stop the spring sets in
 
 
 def _law(frame: Any, moment: int) -> None:
-    """A pin about x that turns freely by half the play, b / 2, to either side, in series with the spring of rotation.
+    """Add a pin about x, free to turn by half the play, b / 2, to either side, in series with the spring of rotation.
 
-    The spring stores -g_0 Q_00 - r cos(phi), with p = r cos(phi) = g_1 Q_11 + g_2 Q_22 and q = r sin(phi) =
+    Q is the rotation of the second body in the first; g_0, g_1, g_2 are the spring's constants G (thesis Eq. 5). The
+    spring stores -g_0 Q_00 - r cos(phi), with p = r cos(phi) = g_1 Q_11 + g_2 Q_22 and q = r sin(phi) =
     g_1 Q_21 - g_2 Q_12. With the pin turned by psi, it stores -g_0 Q_00 - r cos(phi - psi). This energy is least at
     psi = phi within the play, and at the stop beyond it. The effect thus replaces cos(phi) by C(phi), and the moment
     about x, -r sin(phi), by -r S with S = -C': S is zero within the play and the sine of phi -+ b / 2 beyond it. The
@@ -51,7 +52,7 @@ def _law(frame: Any, moment: int) -> None:
 
 
 def _wing(scene: WingScene, values: Values) -> None:
-    """Only the spring has play; the damper (foam glued to the rod) still acts, and no other law bends the root."""
+    """Let the springs at the root have play; the damper (foam glued to the rod) still acts as before."""
     k = np.moveaxis(scene.lanes.stiffness[:, :3], 1, 0)
     half, root = 0.5 * values["b"], ~Joints.of(scene.structure).within[:, None]
     g1, g2 = 0.5 * (k[2] + k[0] - k[1]), 0.5 * (k[0] + k[1] - k[2])

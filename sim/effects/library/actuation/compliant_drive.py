@@ -16,9 +16,9 @@ LEARNING = 1.0
 
 
 def _wing(scene: WingScene, values: Values) -> None:
-    """Drive the crank by a motor with the time constant t, whose governor demands a change of speed.
+    """Drive the crank by a motor with the time constant t, whose governor demands a relative change of speed.
 
-    The demanded relative change is -d (P - P_m) - g tau, where P is the load, P_m its mean, tau the lead of the crank
+    The change is -d (P - P_m) - g tau, where P is the load, P_m its mean, tau the lead of the crank
     in s, and g the gain ``GOVERNOR`` times the angular rate of the beat.
     """
     motor = np.zeros((MOTOR, LANES))

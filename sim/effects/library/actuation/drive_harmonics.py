@@ -20,7 +20,7 @@ def _vehicle(scene: VehicleScene, values: Values) -> None:
 
 
 def _wing(scene: WingScene, values: Values) -> None:
-    """The rear rod makes the same error, later by its lag."""
+    """Add the harmonics to the angle of both rods; the rear rod makes the same error, later by its lag."""
     rods, lag = scene.rods, scene.condition.phase_lag
     rods.lengthened(max(HARMONICS))
     amplitude = np.abs(rods.series[1, 0])

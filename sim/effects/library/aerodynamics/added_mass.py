@@ -72,9 +72,10 @@ def _strip_matrix(
 
 
 def _normal_motion(y: float, middle: float, centre: tuple[float, float]) -> list[tuple[int, float, float]]:
-    """Normal velocity of a wing section due to each twist component of its body.
+    """Normal velocity of a wing section at span ``y`` for a unit of each twist component of its body.
 
-    Returns (index of the component, velocity at mid-chord, its change per metre along x), at span ``y``.
+    Returns (index of the component, velocity at mid-chord ``middle``, its change per metre along x); ``centre``: of
+    mass, x and y (m).
     """
     return [(0, y - centre[1], 0.0), (1, centre[0] - middle, -1.0), (5, 1.0, 0.0)]
 
@@ -88,7 +89,7 @@ def _modes(s0: float, s1: float, constant: float, slope: float) -> Array:
     m = np.arange(1, _MODES + 1)
 
     def cosines(n: npt.NDArray[np.int64]) -> Array:
-        """Integral of cos(n t)."""
+        """Integral of cos(n t) over t from t0 to t1."""
         safe = np.where(n == 0, 1, n)
         return np.where(n == 0, t1 - t0, (np.sin(safe * t1) - np.sin(safe * t0)) / safe)
 

@@ -28,7 +28,10 @@ def wagner(s: npt.ArrayLike) -> Array:
 
 
 def _lag(scene: VehicleScene, values: Values) -> None:
-    """Replace Gamma by Gamma - share sum_i DEFICIT_i (Gamma - x_i), x_i' = RATE_i rate (2 V / c) (Gamma - x_i)."""
+    """Replace the circulation Gamma by Gamma - share sum_i DEFICIT_i (Gamma - x_i).
+
+    The states follow x_i' = RATE_i rate (2 V / c) (Gamma - x_i): V is the speed of the flow, c the chord.
+    """
     flow = scene.flow
     per_metre = values["rate"][:, None] * (2.0 / scene.stations.chord)
     share, quasi_steady = values["share"][:, None, None], flow.circulation
@@ -41,7 +44,7 @@ def _lag(scene: VehicleScene, values: Values) -> None:
 
 
 def _law(frame: Any, moment: int) -> None:
-    """As :func:`_lag` for strips, with 2 Gamma / c (speed times lift coefficient) in the place of Gamma."""
+    """Change the loads of strips as :func:`_lag` does; 2 Gamma / c, speed times lift coefficient, replaces Gamma."""
     port = strip_port(frame)
     for s in range(port.places):
         share = load(port.parameters, 0, s)

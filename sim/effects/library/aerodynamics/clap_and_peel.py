@@ -19,7 +19,7 @@ _PHASES = 360  # at which the top of the stroke is looked for
 
 
 def fling_near(distance: Array) -> Array:
-    """Circulation of fling ``distance`` (in chords) from the mirror plane, as a fraction of that of touching wings.
+    """Circulation of fling at ``distance`` (in chords) from the mirror plane, as a fraction of that of touching wings.
 
     Two plates that open side by side suck air into the gap. For a narrow gap, Gamma = omega c^2 / (8 distance)
     (Lighthill 1973). With a coefficient of 2.7, this function agrees with it within a tenth of omega c^2 from 0.15 to
@@ -36,10 +36,11 @@ def _vehicle(scene: VehicleScene, values: Values) -> None:
 
 
 def _law(frame: Any, moment: int) -> None:
-    """Add Gamma = C c^2 omega / 2 to a strip that turns nose down from the mirror plane above the wing.
+    """Add the circulation Gamma = C c^2 omega / 2 to a strip that turns nose down at the rate omega.
 
-    Gamma falls with the distance of mid-chord from the plane, and with the angle between the two: from 45 degrees on,
-    two plates have no more circulation than each by itself.
+    The mirror image of the wing lies beyond a plane above it. C is the coefficient, c the chord. Gamma falls with the
+    distance of mid-chord from the plane, and with the angle between the two: from 45 degrees on, two plates have no
+    more circulation than each by itself.
     """
     port = strip_port(frame)
     for s in range(port.places):
@@ -55,7 +56,7 @@ def _law(frame: Any, moment: int) -> None:
 
 
 def _wing(scene: WingScene, values: Values) -> None:
-    """The plane contains the flapping axis, ``clearance`` above the top of the mean stroke of both rods."""
+    """Add the law, with a mirror plane through the flapping axis at ``clearance`` above the top of the mean stroke."""
     phases = 2 * np.pi * np.arange(_PHASES) / _PHASES
     top = scene.rods.angles(phases)[:, :, 0].mean(axis=1).max(axis=0)
     sine, cosine = np.sin(top + values["clearance"]), np.cos(top + values["clearance"])

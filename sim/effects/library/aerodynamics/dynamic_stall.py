@@ -23,7 +23,8 @@ _METRES = 0.01  # m of motion of the wing per unit of either state
 def _stall(scene: VehicleScene, values: Values) -> None:
     """Multiply the circulation of the angle of attack by 1 - share (1 - ((1 + sqrt X) / 2)^2).
 
-    X follows delay X' + X = X_0(alpha - advance alpha'), with time in chords travelled.
+    X, the attached fraction of the chord, follows delay X' + X = X_0(alpha - advance alpha') with time in chords
+    travelled; X_0 is that of steady flow (:func:`wingfit.sim.vehicle.states.steady_attachment`).
     """
     flow, chord = scene.flow, scene.stations.chord
     stall = np.stack([values["angle"], values["width"], values["advance"]], axis=1)
@@ -34,7 +35,7 @@ def _stall(scene: VehicleScene, values: Values) -> None:
 
 
 def _law(frame: Any, moment: int) -> None:
-    """As :func:`_stall` for strips, with the states 1 - X (the separated fraction) and a delayed alpha.
+    """Change strips' loads as :func:`_stall` does; states: 1 - X (the separated fraction) and a delayed alpha.
 
     The delayed alpha follows alpha within _RECENT chords travelled. The difference of the two gives alpha' without
     accelerations.

@@ -66,7 +66,11 @@ def slices(edges: Array) -> Array:
 
 
 def _law(frame: Any, moment: int) -> None:
-    """v' = -share L / m - 2 rho A |U + v| v / m in world axes; L is the lift of a strip, A and m are of its slice."""
+    """Add the inflow v of each strip: v' = -share L / m - 2 rho A |U + v| v / m in world axes.
+
+    L is the lift of the strip (N), U the wind, A and m area and air mass of the strip's slice of the disc
+    (:func:`slices`).
+    """
     port = strip_port(frame)
     for s in range(port.places):
         if moment == BEFORE:

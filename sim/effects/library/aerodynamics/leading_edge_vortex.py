@@ -25,7 +25,7 @@ _BLEND = math.radians(10.0)  # over which the vortex takes over
 
 
 def _law(frame: Any, moment: int) -> None:
-    """C_L = C_l sin 2 alpha and C_D = 2 C_l sin^2 alpha replace the fraction w of the affine laws.
+    """Replace the fraction w of the affine laws of strips by C_L = C_l sin 2 alpha and C_D = 2 C_l sin^2 alpha.
 
     Together they are C_N = 2 C_l sin alpha along the normal and nothing along the chord, because without suction at
     the leading edge the pressure on a thin wing acts along its normal. w grows smoothly from 0 at the angle where

@@ -15,7 +15,7 @@ _POINTS = ((-0.430568, 0.173927), (-0.169991, 0.326073), (0.169991, 0.326073), (
 
 
 def _law(frame: Any, moment: int) -> None:
-    """Pressure rho / 2 C |w| w at every point of the chord, where w = u_n + theta' x is the stream along the normal.
+    """Add the pressure rho / 2 C |w| w at every point x of the chord; w = u_n + theta' x is the flow along the normal.
 
     A strip that does not pitch has C_N = C |sin alpha| sin alpha (the cross-flow principle). A strip that only pitches
     about its middle is held back by the moment rho / 2 C |theta'| theta' c^4 / 32 per span.

@@ -37,7 +37,7 @@ def strip_factors(structure: Structure, spacing: Array) -> Array:
 
 
 def _law(frame: Any, moment: int) -> None:
-    """Multiply the circulation of each strip by its factor."""
+    """Multiply the circulation of each strip by its factor of :func:`strip_factors`."""
     port = strip_port(frame)
     for s in range(port.places):
         factor = load(port.parameters, 0, s)

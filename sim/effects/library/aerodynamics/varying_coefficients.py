@@ -13,7 +13,10 @@ LIFT = ("C_l", "K_l")  # circulation of the angle of attack, by either law
 
 
 def factor(frequency: float, pitch: float, by_frequency: Array, by_pitch: Array) -> Array:
-    """Factor [B] on a coefficient at a flap frequency (Hz) and body pitch (rad); never below zero."""
+    """Factor [B] on a coefficient at a flap frequency (Hz) and body pitch (rad); never below zero.
+
+    ``by_frequency`` [B]: change per relative change of frequency; ``by_pitch`` [B]: change per rad.
+    """
     more = by_frequency * (frequency / REFERENCE_FREQUENCY - 1.0) + by_pitch * (pitch - REFERENCE_PITCH)
     return np.asarray(np.maximum(1.0 + more, 0.0))
 

@@ -22,7 +22,7 @@ def viscosity(temperature: float) -> float:
 
 
 def _law(frame: Any, moment: int) -> None:
-    """C_D = 2.656 / sqrt(Re) along the chord; Re is that of the chord and of the stream along it."""
+    """Add the friction C_D = 2.656 / sqrt(Re) along the chord of strips; Re is that of chord and stream."""
     port = strip_port(frame)
     for s in range(port.places):
         along = load(port.flow, s, STREAM_C)

@@ -21,8 +21,9 @@ _SCALE = 0.1  # motion of the wing over the motion of the air that causes it
 
 
 def _meet_wake(scene: VehicleScene, values: Values) -> None:
-    """The air moves at share (w - k u), w' = V / (chords c) (u - w); u = r zeta' is the wing's velocity, w the wake's.
+    """Let the air move at share (w - k u) along the flapping direction, with the wake's velocity w.
 
+    w' = V / (chords c) (u - w), with the wing's velocity u = r zeta', the speed V of the flow and the chord c.
     k, in 0 to 1, is the fraction of u that the wake shares: air that the wing has just set in motion is no gust for it.
     The air is thus at rest at a start from rest (Birch and Dickinson 2003) and in steady motion, moves at share (w - u)
     while the wing slows down, and at share w after the reversal. The memory decays with the chords travelled, so that
@@ -36,7 +37,7 @@ def _meet_wake(scene: VehicleScene, values: Values) -> None:
 
 
 def _law(frame: Any, moment: int) -> None:
-    """As :func:`_meet_wake` for strips; states: y, z of the wake's velocity and of a delayed velocity of the wing.
+    """Move the air of strips as :func:`_meet_wake` does; states: y, z of wake's and of the wing's delayed velocity.
 
     The velocity of the wing is not known before the flow is computed. A state that follows it within _RECENT replaces
     it. k is w.u / u^2, limited to 0..1.

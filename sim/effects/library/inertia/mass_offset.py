@@ -20,7 +20,10 @@ def _wing(scene: WingScene, values: Values) -> None:
 
 
 def _shift_mass(scene: VehicleScene, values: Values) -> None:
-    """Add -m times the acceleration of -e (sin theta, cos theta), e = distance; the model has the mass on the axis."""
+    """Add the force -m times the acceleration of the position -e (sin theta, cos theta) of the mass m behind the axis.
+
+    e is ``distance``, theta the wing's pitch; the model itself has the mass on the axis.
+    """
     places, (cosine, sine) = scene.stations, scene.wings.turns
     rate, acceleration = scene.angles.pitch[:, 1], scene.angles.pitch[:, 2]
     mass = places.mass * places.weight * scene.setting.vehicle.wing_mass

@@ -16,11 +16,11 @@ _SOFTEST = 0.7  # part of the stiffness that softening takes at most; the tangen
 
 
 def _law(frame: Any, moment: int) -> None:
-    """Moment of a potential V of s, the sine of the bending angle, from the antisymmetric part of Q.
+    """Add the moment of a potential V of s, the sine of the bending angle, from the antisymmetric part of Q.
 
-    V = k u^2 / (4 b (1 + c u)) with u = b s^2, so that V_s = k s (u + c u^2 / 2) / (1 + c u)^2. This is cubic for
-    c = 0 and otherwise levels off at k s / (2 c). A relative angular rate r gives s' = (tr Q - Q) r / 2, so that the
-    moment is -(tr Q - Q^T) V_s / 2.
+    Q is the rotation of the second body in the first, k the stiffness. V = k u^2 / (4 b (1 + c u)) with u = b s^2, so
+    that V_s = k s (u + c u^2 / 2) / (1 + c u)^2. This is cubic for c = 0 and otherwise levels off at k s / (2 c). A
+    relative angular rate r gives s' = (tr Q - Q) r / 2, so that the moment is -(tr Q - Q^T) V_s / 2.
     """
     port = connector_port(frame)
     stored = load0(port.stored)

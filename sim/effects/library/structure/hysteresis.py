@@ -16,7 +16,10 @@ _TINY = 1e-30
 
 
 def _law(frame: Any, moment: int) -> None:
-    """z' = r - beta |r| |q|^(n - 1) q - gamma r |q|^n, q = z over its largest value, beta + gamma = 1; moment -k z."""
+    """Add the moment -k z about x and y, with z' = r - beta |r| |q|^(n - 1) q - gamma r |q|^n, beta + gamma = 1.
+
+    r is the relative angular rate of the two bodies, q is z over its largest value.
+    """
     port = connector_port(frame)
     stored, lost = load0(port.stored), load0(port.lost)
     for k in range(2):  # about x and y

@@ -19,10 +19,11 @@ _SHAKE = 0.1  # keeps what rods carry from wandering: without it the periodic mo
 
 
 def _law(frame: Any, moment: int) -> None:
-    """Moment -k h, where h is the part of w beyond the play; w' = r - (r |h| + |r| h) / (2 h_max) - e |r| w / w_max.
+    """Add the moment -k h about x, where h is the part of the state w beyond the play.
 
-    This is Dahl's friction: under increasing load, the rods slip more the nearer h is to h_max; under decreasing load,
-    they act as springs. The last term returns them to their unloaded place, by e per sweep of w_max = play + h_max.
+    w' = r - (r |h| + |r| h) / (2 h_max) - e |r| w / w_max, r being the relative angular rate of the bodies. This is
+    Dahl's friction: under increasing load, the rods slip more the nearer h is to h_max; under decreasing load, they act
+    as springs. The last term returns them to their unloaded place, by e per sweep of w_max = play + h_max.
     """
     port = connector_port(frame)
     state, rate, decay, drive, pull = port.state[0], port.rate[0], port.decay[0], port.drive[0], port.pull[0]

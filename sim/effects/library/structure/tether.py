@@ -11,7 +11,7 @@ from wingfit.sim.kernels.laws import point_port
 
 
 def _law(frame: Any, moment: int) -> None:
-    """Force -k (x - x_0) - c v on the point, in the world; parameters are k, c and the three coordinates of x_0."""
+    """Add the force -k (x - x_0) - c v on the point, in the world; the parameters are k, c and x_0 (three)."""
     port = point_port(frame)
     stored, lost = load0(port.stored), load0(port.lost)
     for p in range(port.places):

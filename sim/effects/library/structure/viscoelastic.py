@@ -14,7 +14,10 @@ _METRES = [0.1, 0.1]  # m/rad: one radian moves a point one chord away
 
 
 def _law(frame: Any, moment: int) -> None:
-    """A Maxwell element about x and y, beside the spring and the damper: z' = r - z / tau, wrench -k z."""
+    """Add a Maxwell element about x and y, parallel to spring and damper: z' = r - z / tau, moment -k z.
+
+    r is the relative angular rate of the two bodies.
+    """
     port = connector_port(frame)
     stored, lost = load0(port.stored), load0(port.lost)
     for k in range(2):
@@ -35,7 +38,7 @@ def _law(frame: Any, moment: int) -> None:
 
 
 def _wing(scene: WingScene, values: Values) -> None:
-    """Acts on bending and torsion only, because the wing hardly strains in its plane and within its sections."""
+    """Add the law for bending and torsion only, because the wing hardly strains otherwise."""
     spring = Joints.of(scene.structure).out_of_plane(scene.lanes.stiffness * values["k"])
     scene.add_connector_law(_law, [*spring, 1.0 / values["tau"]], axes=[0, 1], states=_METRES)
 
