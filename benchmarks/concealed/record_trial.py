@@ -239,7 +239,7 @@ class Strength:
     def _sized(
         self, name: str, parameters: Mapping[str, float], target: float, noise: float
     ) -> tuple[dict[str, float], float]:
-        """Parameters with the strength at which refitted misfit / ``noise`` is near ``target``, and the ratio reached."""
+        """Parameters with the strength at which misfit / ``noise`` after a refit is near ``target``, and that ratio."""
 
         def sized(size: float) -> dict[str, float]:
             return {**parameters, "strength": size * parameters["strength"]}
