@@ -62,7 +62,7 @@ class Outcome:
 
 
 def run(spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, label: str) -> Outcome:
-    """Calibrate and judge, with progress on standard error."""
+    """Calibrate, and compute the result's misfits and standard errors; progress goes to standard error."""
     start, last = time.perf_counter(), None
     for last in calibrate(spec, dataset, evaluator):
         note = f"{label}: {last.stage}, generation {last.index}, {last.distance * 1e3:.3f} mm"
@@ -74,7 +74,7 @@ def run(spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, label: st
 
 
 def floor(spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, truth: Genome) -> tuple[float, float]:
-    """Mean distance (m) of the true genome's markers from the recorded ones, on fitted and held-out recordings."""
+    """Mean distance (m) of markers simulated with the true genes from the recorded ones, fitted and held out."""
     found = judge(spec, dataset, evaluator, truth.as_dict())
     if found.held_out_after is None:
         raise ValueError("the campaign has no held-out recording")
@@ -82,7 +82,7 @@ def floor(spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, truth: 
 
 
 def gene_table(result: Result, truth: Genome) -> list[dict[str, Any]]:
-    """Relative error (per cent) and standard error of each gene, with shares normalised."""
+    """Relative error and standard error (per cent) of each gene; genes that are shares are normalised to sum 1."""
     true = truth.normalised()
     return [
         {

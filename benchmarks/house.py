@@ -1,4 +1,4 @@
-"""How large the code is, how it is laid out, and which banned phrases it still holds.
+"""Measures the size and structure of the code, and finds banned phrases in it.
 
 ``python -m benchmarks.house [--json | --list]`` needs the standard library only. Product lines are those of the Python
 files of the product that are neither blank nor only a comment.

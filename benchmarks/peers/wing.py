@@ -25,7 +25,7 @@ _SAMPLES, _HARMONICS = 512, 40
 
 
 class PeerWing(NamedTuple):
-    """A wing with given genes under one condition, SI units. N bodies; numbers N and N + 1 are the front and the rear rod.
+    """A wing with given genes under one condition, SI units. N bodies; N and N + 1 are the front and the rear rod.
 
     Attributes:
         mass: [N] kg.
