@@ -171,7 +171,7 @@ def torsion_carried(structure: Structure) -> float:
 
 
 def twist_rate(beam: Beam, division: str) -> float:
-    """Twist per length in the middle half under a couple at the tip, relative to Saint-Venant's T / G J."""
+    """Twist per length in the middle half of a divided beam under tip moment T, relative to Saint-Venant's T / G J."""
     structure = cut_beam(beam, division)
     n, strips = structure.division.bodies[0], len(structure.division.bodies)
     load = np.zeros((len(structure.bodies), 6))
@@ -197,7 +197,7 @@ def observed_order(coarse: float, fine: float, refinement: float = 2.0) -> float
 
 
 def elastica_table(strips: tuple[int, ...] = STRIPS) -> list[dict[str, float]]:
-    """Error of tip deflection and shortening of the chain under large loads, relative to the length."""
+    """Error of the rigid-body chain's tip deflection and shortening under large loads, relative to its length."""
     rows = []
     for load in LOADS:
         truth = elastica(load)
@@ -292,7 +292,7 @@ def frequency_markdown(rows: list[Row]) -> str:
 
 
 def table(figures: dict[str, Any], rows: list[Row]) -> str:
-    """All tables, in markdown."""
+    """All ``figures`` and frequency errors ``rows`` as tables in markdown."""
     mm = 1e3
     bent = [
         f"{r['load']:g} | {r['strips']} | {100 * r['deflection']:+.4f} | {100 * r['shortening']:+.4f}"

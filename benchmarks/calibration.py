@@ -54,7 +54,7 @@ RUNS: tuple[tuple[EvaluatorKind, int | None, int | None], ...] = (
 
 @dataclass(frozen=True)
 class Outcome:
-    """One finished calibration."""
+    """One finished calibration: its last generation, its result, and its duration (s)."""
 
     last: Generation
     result: Result
@@ -98,7 +98,7 @@ def gene_table(result: Result, truth: Genome) -> list[dict[str, Any]]:
 
 
 def thesis_campaign() -> Dataset:
-    """The recordings of the search in the thesis (V-A): one in vacuum and one in the tunnel, of a wing of 24 bodies."""
+    """Simulated recordings as in van der Grinten's thesis (V-A): 24 bodies, one in vacuum and one in the tunnel."""
     model = FlexibleWing(robird_wing(), "24", numerics=REFERENCE)
     truth, conditions = true_genome(model, 2), (vacuum(10.0, 0.0524, 3.0), tunnel(0.0524, 3.0, 6.0))
     recordings = tuple(
@@ -118,7 +118,7 @@ def resume_is_identical(dataset: Dataset, evaluator: Evaluator) -> bool:
 
 
 def evaluators_are_identical(dataset: Dataset) -> bool:
-    """Whether all evaluators in RUNS return the same bits for the same individuals."""
+    """Whether all evaluators in RUNS return bit-identical results for the same individuals."""
     spec = CalibrationSpec(division="11")
     model, stage = model_for(dataset, spec), prepare(spec, dataset).stages[1]
     problem = Problem(model, stage.recordings, stage.free, base_genome(model))

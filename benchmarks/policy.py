@@ -88,7 +88,7 @@ def sample(wings: int) -> list[Trial]:
 
 
 def varied(name: str, factor: float) -> float:
-    """The threshold ``name`` times ``factor``; for a threshold that is a fraction, its odds are multiplied instead."""
+    """Value of the threshold ``name`` times ``factor``; for a probability p, p / (1 - p) is multiplied instead."""
     value = float(getattr(POLICY, name))
     if name not in PROBABILITIES:
         return value * factor

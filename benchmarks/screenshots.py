@@ -34,7 +34,7 @@ DRAWN_SECONDS = 60.0
 
 
 def main() -> None:
-    """Record, compute, take the screenshots; the last line is one JSON object."""
+    """Simulate the data, run the jobs, take the screenshots; the last line is one JSON object."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.screenshots", description=__doc__)
     parser.add_argument("--json", action="store_true", help="one JSON object as the last line (always printed)")
     parser.add_argument("--out", type=Path, default=OUT, help="folder for the screenshots")

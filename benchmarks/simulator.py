@@ -125,9 +125,9 @@ class Peer:
 
 
 def run_peer(peer: Peer, seconds: float) -> dict[str, Any]:
-    """Result of ``benchmarks.peers`` within ``seconds``.
+    """Run ``benchmarks.peers`` for the case ``peer`` in its own process and return its result.
 
-    Without a result ``cpu_ms_per_beat`` is None and there is a note.
+    Without a result within ``seconds``, ``cpu_ms_per_beat`` is None and there is a note.
     """
     command = [
         sys.executable, "-m", "benchmarks.peers", "--division", DIVISIONS[peer.bodies], "--medium", peer.medium,
@@ -162,7 +162,7 @@ def compare(cases: list[dict[str, Any]], seconds: float, progress: Progress) -> 
 
 
 def add_peer(row: dict[str, Any], engine: str, found: dict[str, Any]) -> None:
-    """Add the result of an engine to a case."""
+    """Add the result ``found`` of another engine to the table's ``row``."""
     cost = found["cpu_ms_per_beat"]
     ratio = None if cost is None else cost / row["ms_per_beat"]
     row[engine] = {name: found.get(name) for name in ("cpu_ms_per_beat", "error_mm", "method", "settings", "note")} | {
@@ -175,7 +175,7 @@ def add_peer(row: dict[str, Any], engine: str, found: dict[str, Any]) -> None:
 
 
 def installed(package: str) -> str:
-    """Version of a package, or "not installed"."""
+    """Version of the installed ``package``, or "not installed"."""
     try:
         return version(package)
     except PackageNotFoundError:
@@ -183,7 +183,7 @@ def installed(package: str) -> str:
 
 
 def cost_exponents(cases: list[dict[str, Any]]) -> dict[str, float]:
-    """By medium: least-squares slope of log(ms) over log(bodies), with four bodies along every chord."""
+    """Exponent p of the cost, proportional to bodies^p, by medium; fitted to cases with four bodies along the chord."""
     slopes = {}
     for medium in CONDITIONS:
         rows = [row for row in cases if row["medium"] == medium and row["bodies"] in GROWING]
@@ -279,7 +279,7 @@ def measure(*, quick: bool, peer_seconds: float) -> dict[str, Any]:
 
 
 def table(figures: dict[str, Any]) -> str:
-    """The figures as text."""
+    """The ``figures`` as a text table."""
     columns = [
         "bodies", "medium", "steps", "ms_per_beat", "error_mm", "gflops", "fraction_of_peak", "times_faster_than_scipy",
         "times_faster_than_engine", "beats_to_periodic", "beats_to_periodic_plain",

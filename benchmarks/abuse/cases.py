@@ -1,4 +1,4 @@
-"""A malformed or hostile request."""
+"""Description of one malformed or hostile request to the server."""
 
 from __future__ import annotations
 

@@ -261,7 +261,7 @@ class _Answers:
     lock: threading.Lock = field(default_factory=threading.Lock)
 
     def add(self, name: str, status: int, seconds: float, text: str) -> None:
-        """Record an answer."""
+        """Record the answer to the upload ``name``: status, duration, and text; other than 201 or 422 is a failure."""
         with self.lock:
             self.done += 1
             self.accepted += status == 201
@@ -318,7 +318,7 @@ class _Memory(_Thread):
         self._server, self.peak_mb = server, 0.0
 
     def look(self) -> None:
-        """Read the present memory."""
+        """Measure the present memory of the processes."""
         held = sum(_resident_mb(pid) for pid in (self._server.pid, *descendants(self._server.pid)))
         self.peak_mb = max(self.peak_mb, held)
 
@@ -341,7 +341,7 @@ class _Others(_Thread):
         self.failures: list[str] = []
 
     def look(self) -> None:
-        """Read, and sometimes upload."""
+        """Send one request to each path that is read, and sometimes upload a valid dataset."""
         with httpx.Client(base_url=self._url, timeout=ANSWER_SECONDS) as http:
             for path in self._paths:
                 seconds = self._timed(path, lambda path=path: http.get(path), 200, READ_SECONDS)  # type: ignore[misc]

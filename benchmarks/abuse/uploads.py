@@ -76,7 +76,7 @@ def small_archive() -> bytes:
 
 
 def netcdf_example() -> bytes:
-    """The same dataset as NetCDF."""
+    """The dataset of :func:`small_archive` as a NetCDF file."""
     return _netcdf(example_files())
 
 

@@ -48,7 +48,7 @@ class ValidValues:
         return only if only and dice.random() < OFTEN else dice.choice(KINDS)
 
     def spared(self, given: Mapping[str, Any]) -> Json:
-        """Path parameters of a deletion that do not name objects needed by other requests."""
+        """The path parameters ``given`` of a deletion, with ids of objects that other requests need made invalid."""
         return {name: _absent(value) if value in self._kept else value for name, value in given.items()}
 
     def parameters(self, given: Mapping[str, Any], kind: str, dice: random.Random) -> Json:

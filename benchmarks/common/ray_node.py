@@ -42,7 +42,7 @@ def environment(token: Path, **more: str) -> dict[str, str]:
 
 
 class Process(NamedTuple):
-    """A process of this machine."""
+    """A process of this machine as described in /proc: name, state letter, parent's id, environment variables."""
 
     name: str
     state: str

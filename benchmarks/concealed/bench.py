@@ -103,7 +103,7 @@ class Bench(ABC, Generic[Motion, Quality]):
 
     @abstractmethod
     def fitted(self, recording: Recording) -> Recording:
-        """The recording after the filtering that precedes every fit. Strengths and noise are measured on this."""
+        """The recording after the filtering that precedes every fit; strengths and noise are measured on the result."""
 
     @abstractmethod
     def simulated(self, condition: Condition, genome: Mapping[str, float], hidden: Concealed) -> Motion:
@@ -259,7 +259,7 @@ class WingBench(Bench[Beat, Filmset]):
     def shown(
         self, beat: Beat, condition: Condition, hidden: Concealed, quality: Filmset, rng: np.random.Generator
     ) -> Made:
-        """Film the beat."""
+        """Film the ``beat`` under ``condition``, with the faults ``hidden`` of cameras, clocks and trackers."""
         made = film(beat.tracks, self.rig, condition, quality.filming, rng, hidden, cameras=quality.cameras)
         return Made(made.recording, made.noise)
 
@@ -322,7 +322,7 @@ class VehicleBench(Bench[Array, Weighing]):
     def shown(
         self, beat: Array, condition: Condition, hidden: Concealed, quality: Weighing, rng: np.random.Generator
     ) -> Made:
-        """Record the forces with the balance."""
+        """Record the forces ``beat`` [n, 2] with the balance, with its faults ``hidden``."""
         made = weigh(beat, self.rig, condition, quality, rng, hidden)
         noise = self.fitted(replace(made.recording, values=made.recording.values - made.clean)).values
         return Made(made.recording, rms(noise.ravel()))

@@ -257,7 +257,7 @@ def _quiet(server: Server, ledger: Ledger, expected: dict[str, Json]) -> int:
 
 
 def _diagnoses(ledger: Ledger, fetch: Callable[[str], Json | None], expected: Json, deadline: float) -> int:
-    """Wait for the diagnoses and check their findings; returns the number of those that do not end."""
+    """Wait until ``deadline`` for the diagnoses and check their findings; returns the number that do not end."""
     left = [diagnosis for diagnosis, state in ledger.diagnoses.items() if state is None]
     while left and time.monotonic() < deadline:
         for diagnosis in list(left):

@@ -30,7 +30,7 @@ TICKS = os.sysconf("SC_CLK_TCK")
 
 @dataclass(frozen=True)
 class Load:
-    """A load: its name, reads per second, and number of event streams of the run."""
+    """A load to apply during a calibration: name, reads per second, number of event streams of the run."""
 
     name: str
     rate: float

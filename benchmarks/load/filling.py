@@ -141,7 +141,7 @@ def _length(past: list[Values], generations: int) -> Values:
 
 
 def _copy_generations(session: Session, model: str, have: list[str]) -> None:
-    """Copy the generations of ``model`` to all runs not in ``have``, in one statement because there are a million."""
+    """Copy the generations of the run ``model`` to all runs not in ``have``, in one SQL statement for speed."""
     names = [column.key for column in GenerationRow.__table__.columns]
     theirs = [RunRow.id if name == "run_id" else getattr(GenerationRow, name) for name in names]
     rows = select(*theirs).join(RunRow, literal(True)).where(GenerationRow.job_id == model, RunRow.id.not_in(have))

@@ -74,7 +74,7 @@ class Observed:
 
 
 def generate(traffic: Traffic) -> Observed:
-    """Read and stream events until the run ends."""
+    """Send the reads and follow the event streams of ``traffic`` until its run ends; returns the measurements."""
     start, took = time.monotonic(), time.process_time()
     observed = uvloop.run(asyncio.wait_for(_generate(traffic), LONGEST_SECONDS))
     observed.seconds, observed.processor_seconds = time.monotonic() - start, time.process_time() - took
@@ -139,7 +139,7 @@ class Reads:
         self._send()
 
     def lost(self, reader: _Reader, request: tuple[int, float] | None) -> None:
-        """The server closed an idle connection; a read just sent on it (``request``) is repeated, as clients do."""
+        """Called when the server closed the idle connection ``reader``; a read just sent on it is sent again."""
         self._open -= 1
         if request:
             self._waiting.appendleft(request)
@@ -178,7 +178,7 @@ class _Reader(asyncio.Protocol):
         self._reads.free(self)
 
     def send(self, request: bytes, number: int, due: float) -> None:
-        """Send a request."""
+        """Send the bytes ``request`` for path ``number``, which was due at the time ``due``."""
         self._pending, self._data = (number, due), b""
         self._transport.write(request)
 
@@ -216,7 +216,7 @@ def _request(port: int, path: str) -> bytes:
 
 
 class Watcher(asyncio.Protocol):
-    """One event stream of a run.
+    """Connection to one event stream of a run.
 
     It times each generation from the end of its computation (``started_at`` of the run plus ``elapsed_seconds`` of the
     generation, by the server's clock) through its durable storage to its arrival here.

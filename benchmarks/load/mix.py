@@ -29,7 +29,7 @@ class Stored:
 
 
 def walk(http: httpx.Client) -> Stored:
-    """Read all pages of the run list."""
+    """Read all pages of the server's run list, and return what is stored."""
     ids, cursors, generations, cursor = list[str](), list[str](), list[int](), None
     while True:
         page = http.get("/v1/runs", params={"limit": PAGE} | ({"cursor": cursor} if cursor else {})).json()

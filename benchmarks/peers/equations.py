@@ -60,7 +60,7 @@ def _dot(x: V3, y: V3) -> float:
 
 @allocating
 def _plus(x: V3, f: float, y: V3) -> V3:
-    """x + f y."""
+    """The vector x + f y."""
     return x[0] + f * y[0], x[1] + f * y[1], x[2] + f * y[2]
 
 
@@ -204,7 +204,7 @@ def _times(A: Array, n: int, x: V3) -> V3:
 
 @allocating
 def _solved(A: Array, n: int, x: V3) -> V3:
-    """A_n^-1 x for a 3 x 3 matrix, by Cramer's rule."""
+    """Solution y of A[n] y = x for the 3 x 3 matrix A[n], by Cramer's rule."""
     r0, r1, r2 = _axis(A, n, 0), _axis(A, n, 1), _axis(A, n, 2)
     c = _cross(r1, r2)
     f = 1.0 / _dot(r0, c)

@@ -49,9 +49,10 @@ def simulate(
     keep: bool = False,
     clock: Callable[[], None] = lambda: None,
 ) -> Run:
-    """Integrate from rest with relative tolerance ``tolerance``, and absolute ones scaled by typical values.
+    """Integrate ``beats`` beats from rest with scipy's ``method``.
 
-    ``clock`` is called after every step and may raise :class:`OutOfTimeError`. ``keep`` keeps the interpolation.
+    ``tolerance``: relative; the absolute tolerances are this times typical values. ``clock`` is called after every step
+    and may raise :class:`OutOfTimeError`. ``keep``: whether to keep the interpolation.
     """
     period = 2 * np.pi / wing.omega
     solver = _solver(wing, method, tolerance, beats * period)

@@ -1,4 +1,4 @@
-"""Beams as wings of foam, and the chain of rigid bodies that approximates them, under a large load at the tip."""
+"""A beam approximated by a chain of rigid bodies (a foam wing of the simulator), under a large load at its tip."""
 
 from __future__ import annotations
 
@@ -97,7 +97,10 @@ class _Chain:
 
 
 def spring_chain(beam: Beam, strips: int, load: float) -> tuple[float, float, float]:
-    """The results of `beam_theory.elastica` for the chain; ``load`` is P L^2 / E I of the uniform beam."""
+    """Deflection / L, shortening / L and tip rotation (rad) of the chain, as `beam_theory.elastica` for the beam.
+
+    ``load`` is P L^2 / E I of the uniform beam.
+    """
     chain = _Chain(beam, strips)
     inertia = beam.chord[0] * beam.thickness[0] ** 3 / 12
     R, p = chain.settle(load * beam.young * inertia / beam.length**2)

@@ -84,7 +84,10 @@ def located(
 
 
 def lifts(dataset: Dataset, finding: Finding, evaluator: Evaluator) -> tuple[Lift, ...]:
-    """Lift agreement in each test: of the nominal model calibrated on all fitted tests, and of the diagnosed model."""
+    """Correlation of modelled with recorded lift in each test, for nominal and diagnosed model.
+
+    The nominal model is calibrated on all fitted tests.
+    """
     spec = CalibrationSpec(preset=BASELINE, mode="joint", axes=AXES)
     *_, last = calibrate(spec, dataset, evaluator)
     before = _lift(dataset, spec, last.genome)

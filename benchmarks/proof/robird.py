@@ -121,7 +121,10 @@ def campaign(seed: int, hidden: Concealed = HIDDEN) -> Campaign:
 def stall(
     dataset: Dataset, evaluator: Evaluator, seconds: float = SEARCH_S, spec: CalibrationSpec | None = None
 ) -> Stall:
-    """Search the nominal model as in the thesis (population 50, structure in vacuum first) until it stalls."""
+    """Calibrate the nominal model by the genetic search of van der Grinten's thesis until it stalls.
+
+    Population 50, structural genes in vacuum first; ``seconds``: time limit.
+    """
     spec, began = spec or CalibrationSpec(division=DIVISION), time.monotonic()
     last, stalled, stages, best = None, True, list[str](), list[float]()
     with progress(f"{dataset.name}: the thesis's search") as tell:

@@ -104,7 +104,7 @@ def beside_truth(genes: Mapping[str, GeneValue], truth: Mapping[str, float]) -> 
 
 
 def over_floor(finding: Finding) -> dict[str, float | None]:
-    """Held-out misfit divided by the misfit expected from noise alone, before and after the diagnosis."""
+    """Held-out misfit divided by the smallest misfit that can be expected, before and after the diagnosis."""
     proof = finding.proof
     return {
         "heldout_before_over_floor": None if proof is None else proof.before.value,

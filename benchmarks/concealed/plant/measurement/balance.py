@@ -81,7 +81,7 @@ def draw_weighing(rng: np.random.Generator) -> Weighing:
 
 
 def silent(weighing: Weighing) -> Weighing:
-    """The same balance without noise."""
+    """The same balance without noise, drift and variation between beats."""
     return replace(weighing, sensor=0.0, rattle=0.0, wander=0.0, scatter=0.0, jitter=0.0)
 
 

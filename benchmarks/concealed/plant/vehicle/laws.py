@@ -66,7 +66,7 @@ class Flow:
     met: Complex = field(default_factory=lambda: _NONE)
 
     def turned(self, q: Complex) -> Complex:
-        """Transform ``q`` [n, E] from axes of the stroke to those of the chord, or back."""
+        """Transform complex vectors ``q`` [n, E] from axes of the stroke to those of the chord, or back."""
         return np.asarray(1j * np.exp(-1j * self.theta) * np.conj(q))
 
     @property

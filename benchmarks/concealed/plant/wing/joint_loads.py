@@ -53,7 +53,7 @@ def joint_loads(rig: Rig, m: Motion, load: Array) -> None:
 
 @compiled
 def angle_between(m: Motion, i: int, j: int, k: int) -> float:
-    """Angle (rad) of frame j relative to frame i, about axis k (0 or 1)."""
+    """Angle (rad) of frame ``j`` relative to frame ``i`` in the motion ``m``, about axis ``k`` (0 x, 1 y)."""
     u, v = (1, 2) if k == 0 else (2, 0)
     sine = dot(axis(m.R, i, v), axis(m.R, j, u)) - dot(axis(m.R, i, u), axis(m.R, j, v))
     return math.atan2(sine, dot(axis(m.R, i, u), axis(m.R, j, u)) + dot(axis(m.R, i, v), axis(m.R, j, v)))

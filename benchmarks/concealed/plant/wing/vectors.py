@@ -36,7 +36,7 @@ def dot(x: V3, y: V3) -> float:
 
 @compiled
 def plus(x: V3, f: float, y: V3) -> V3:
-    """x + f y."""
+    """The vector x + f y."""
     return x[0] + f * y[0], x[1] + f * y[1], x[2] + f * y[2]
 
 

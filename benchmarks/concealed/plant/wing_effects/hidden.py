@@ -67,7 +67,7 @@ class Truth:
 
 @dataclass(frozen=True)
 class Hidden:
-    """Effects hidden in a wing; none by default."""
+    """All effects hidden in one wing; none by default."""
 
     effects: tuple[Effect, ...] = ()
 
