@@ -136,10 +136,7 @@ def coverage(
 
 
 def luck(model: BladeElementWing, beats: list[Array], seed: int, evaluator: Evaluator) -> dict[str, float]:
-    """Influence of the noise's random seed: largest error (per cent) of any coefficient under any condition.
-
-    Median and maximum over DRAWS simulated campaigns with other seeds.
-    """
+    """Median and maximum, over DRAWS random seeds of the noise, of the largest error (per cent) of any coefficient."""
     largest = []
     for draw in range(DRAWS):
         errors = []
@@ -221,10 +218,7 @@ def widest(ranges: list[tuple[float, float] | None]) -> list[float] | None:
 def fits(
     seed: int, models: Mapping[str, BladeElementWing], evaluator: Evaluator
 ) -> tuple[dict[str, list[Fitted]], dict[str, Fitted]]:
-    """Fit every model to a simulated recording of every condition, low-passed at CUTOFF.
-
-    Returns these fits by model, and by model the fit to one recording low-passed at FINER_CUTOFF.
-    """
+    """Fits of each model to recordings of all conditions at CUTOFF, and to one recording at FINER_CUTOFF, by model."""
     vehicle = delfly()
     found: dict[str, list[Fitted]] = {name: [] for name in models}
     finer: dict[str, Fitted] = {}
@@ -302,10 +296,7 @@ def repeated_figures(model: BladeElementWing, repetitions: int, seed: int, evalu
 
 
 def rows(fitted: Mapping[str, list[Fitted]]) -> list[dict[str, Any]]:
-    """One row per condition, with the published values of Armanini et al. (2016), Tables 7 and 8, for comparison.
-
-    Coefficients, agreement of lift and drag, and where in the beat models without fling fail.
-    """
+    """One row per condition: coefficients, lift, drag, published values (Tables 7, 8), where fling is missed."""
     return [
         {
             "condition": one.trial.name,
