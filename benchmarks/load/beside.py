@@ -128,7 +128,7 @@ def per_read_us(loaded: Json, watched: Json) -> float | None:
     """Processor time of the server per read, us.
 
     Difference of the figures of a load with reads (``loaded``) and one with event streams only (``watched``), divided
-    by the number of reads; None if it cannot be computed.
+    by the number of reads; None if there were no reads.
     """
     number = loaded["reads"]["of"]
     more = loaded["server_processor_seconds"] - watched["server_processor_seconds"]

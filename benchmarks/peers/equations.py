@@ -99,7 +99,7 @@ def rotation(w: float, x: float, y: float, z: float, R: Array) -> None:
 
 @allocating
 def put_rods(wing: PeerWing, t: float, R: Array, p: Array, v: Array, w: Array) -> None:
-    """Set rows N and N + 1 of all arguments: the frames of the driving rods, which turn about x at the hinge."""
+    """Set rows N and N + 1 of R, p, v and w: the frames of the driving rods, which turn about x at the hinge."""
     n = len(wing.mass)
     for k in range(2):
         angle, rate = rod_motion(wing, t, k)
