@@ -1,1 +1,1 @@
-"""Claims as commands: ``python -m benchmarks.NAME --json`` prints one JSON object as its last line."""
+"""Benchmarks of the published claims: ``python -m benchmarks.NAME --json`` prints a JSON object as its last line."""

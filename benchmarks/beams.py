@@ -77,9 +77,10 @@ class Row:
 
 
 def modes(structure: Structure, moduli: dict[str, float], held: int) -> dict[Family, Array]:
-    """Frequencies (Hz, rising) of the bodies on their springs by family; the first ``held`` bodies are fixed.
+    """Natural frequencies (Hz, rising) of the bodies on their springs, by family of modes.
 
-    A mode belongs to the family whose rigid motion of whole strips has most of its kinetic energy.
+    ``moduli``: gene values by name; the first ``held`` bodies are fixed. A mode belongs to the family whose motion of
+    rigid strips (along the chord) has most of its kinetic energy.
     """
     n = len(structure.bodies)
     K = stiffness_matrix(structure, moduli).reshape(n, 6, n, 6)[held:, :, held:, :]
@@ -117,7 +118,7 @@ def modes(structure: Structure, moduli: dict[str, float], held: int) -> dict[Fam
 def frequency_errors(
     name: str, beam: Beam, families: tuple[Family, ...], slender: bool, chordwise: int, strips: int
 ) -> list[Row]:
-    """Frequency errors of one discretisation.
+    """Frequency errors of one discretisation of ``beam`` into ``strips`` times ``chordwise`` bodies, by family.
 
     With one body along the chord the beam hangs on the rods at the root. The two rods cannot hold more than two bodies,
     so otherwise the first strip is held instead, and the beam begins at that strip's middle.
@@ -136,7 +137,7 @@ def frequency_errors(
 
 
 def frequency_table(strips: tuple[int, ...] = STRIPS) -> list[Row]:
-    """All cases and discretisations, in the order of ``CASES``."""
+    """Frequency errors of all beams and discretisations, in the order of ``CASES``."""
     rows = [
         row
         for name, beam, families, slender in CASES
@@ -152,8 +153,9 @@ def frequency_table(strips: tuple[int, ...] = STRIPS) -> list[Row]:
 def torsion_carried(structure: Structure) -> float:
     """Fraction of the section's torsion constant that the connectors of a uniform sheet carry under uniform twist.
 
-    Twist kappa rotates neighbours along the span, and neighbours along the chord, by kappa times their distance: energy
-    of both per length, over G J kappa^2 / 2, for one strip in the middle.
+    A twist kappa (rad/m) rotates neighbours along the span, and neighbours along the chord, by kappa times their
+    distance. The result is the energy of both kinds of connectors per length, for one strip in the middle, divided by
+    G J kappa^2 / 2.
     """
     n, strip = structure.division.bodies[0], len(structure.division.bodies) // 2
     station = structure.wing.stations[0]
@@ -169,7 +171,7 @@ def torsion_carried(structure: Structure) -> float:
 
 
 def twist_rate(beam: Beam, division: str) -> float:
-    """Twist per length in the middle half under a couple at the tip, relative to Saint-Venant's T / G J."""
+    """Twist per length in the middle half of a divided beam under tip moment T, relative to Saint-Venant's T / G J."""
     structure = cut_beam(beam, division)
     n, strips = structure.division.bodies[0], len(structure.division.bodies)
     load = np.zeros((len(structure.bodies), 6))
@@ -195,7 +197,7 @@ def observed_order(coarse: float, fine: float, refinement: float = 2.0) -> float
 
 
 def elastica_table(strips: tuple[int, ...] = STRIPS) -> list[dict[str, float]]:
-    """Error of tip deflection and shortening of the chain under large loads, relative to the length."""
+    """Error of the rigid-body chain's tip deflection and shortening under large loads, relative to its length."""
     rows = []
     for load in LOADS:
         truth = elastica(load)
@@ -231,10 +233,10 @@ def wing_tracks(wing: Wing, division: str, numerics: Numerics = WING_NUMERICS) -
 
 
 def wing_table(strips: dict[int, tuple[int, ...]], numerics: Numerics = WING_NUMERICS) -> list[dict[str, Any]]:
-    """Mean and largest distance (m) over a beat between markers with n and with 2 n strips.
+    """Mean and largest distance (m) over a beat between markers with n and with 2 n strips, one row per discretisation.
 
-    ``order`` compares a mean distance with the one before it. The distance from the limit is the sum of all that
-    follow.
+    ``order``: convergence order from two successive mean distances. The distance from the limit of many strips is the
+    sum of this and all following distances.
     """
     rows: list[dict[str, Any]] = []
     for name, wing in WINGS.items():
@@ -255,7 +257,7 @@ def wing_table(strips: dict[int, tuple[int, ...]], numerics: Numerics = WING_NUM
 
 
 def chord_table(divisions: tuple[str, ...]) -> list[dict[str, Any]]:
-    """Mean and largest distance (m) over a beat of the Robird's markers from those with ``FINEST``."""
+    """Mean and largest distance (m) over a beat of the Robird's markers from those with the discretisation FINEST."""
     finest, rows = wing_tracks(WINGS["robird"], FINEST), []
     for division in divisions:
         distance = np.linalg.norm(wing_tracks(WINGS["robird"], division) - finest, axis=-1)
@@ -273,9 +275,9 @@ def _markdown(head: list[str], rows: list[str]) -> str:
 
 
 def frequency_markdown(rows: list[Row]) -> str:
-    """A row per family, chord division and mode.
+    """Markdown table: a row per family, number of bodies along the chord, and mode.
 
-    Error in per cent by number of strips, and the order of the last refinement.
+    Columns: error in per cent by number of strips, and the convergence order of the last refinement.
     """
     strips, lines = sorted({r.strips for r in rows}), []
     for key in dict.fromkeys((r.case, r.family, r.chordwise) for r in rows):
@@ -290,7 +292,7 @@ def frequency_markdown(rows: list[Row]) -> str:
 
 
 def table(figures: dict[str, Any], rows: list[Row]) -> str:
-    """All tables, in markdown."""
+    """All ``figures`` and frequency errors ``rows`` as tables in markdown."""
     mm = 1e3
     bent = [
         f"{r['load']:g} | {r['strips']} | {100 * r['deflection']:+.4f} | {100 * r['shortening']:+.4f}"

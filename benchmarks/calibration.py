@@ -54,7 +54,7 @@ RUNS: tuple[tuple[EvaluatorKind, int | None, int | None], ...] = (
 
 @dataclass(frozen=True)
 class Outcome:
-    """One finished calibration."""
+    """One finished calibration: its last generation, its result, and its duration (s)."""
 
     last: Generation
     result: Result
@@ -62,7 +62,7 @@ class Outcome:
 
 
 def run(spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, label: str) -> Outcome:
-    """Calibrate and judge, with progress on standard error."""
+    """Calibrate, and compute the result's misfits and standard errors; progress goes to standard error."""
     start, last = time.perf_counter(), None
     for last in calibrate(spec, dataset, evaluator):
         note = f"{label}: {last.stage}, generation {last.index}, {last.distance * 1e3:.3f} mm"
@@ -74,7 +74,7 @@ def run(spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, label: st
 
 
 def floor(spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, truth: Genome) -> tuple[float, float]:
-    """Mean distance (m) of the true genome's markers from the recorded ones, on fitted and held-out recordings."""
+    """Mean distance (m) of markers simulated with the true genes from the recorded ones, fitted and held out."""
     found = judge(spec, dataset, evaluator, truth.as_dict())
     if found.held_out_after is None:
         raise ValueError("the campaign has no held-out recording")
@@ -82,7 +82,7 @@ def floor(spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, truth: 
 
 
 def gene_table(result: Result, truth: Genome) -> list[dict[str, Any]]:
-    """Relative error (per cent) and standard error of each gene, with shares normalised."""
+    """Relative error and standard error (per cent) of each gene; genes that are shares are normalised to sum 1."""
     true = truth.normalised()
     return [
         {
@@ -98,7 +98,7 @@ def gene_table(result: Result, truth: Genome) -> list[dict[str, Any]]:
 
 
 def thesis_campaign() -> Dataset:
-    """The recordings of the search in the thesis (V-A): one in vacuum and one in the tunnel, of a wing of 24 bodies."""
+    """Simulated recordings as in van der Grinten's thesis (V-A): 24 bodies, one in vacuum and one in the tunnel."""
     model = FlexibleWing(robird_wing(), "24", numerics=REFERENCE)
     truth, conditions = true_genome(model, 2), (vacuum(10.0, 0.0524, 3.0), tunnel(0.0524, 3.0, 6.0))
     recordings = tuple(
@@ -118,7 +118,7 @@ def resume_is_identical(dataset: Dataset, evaluator: Evaluator) -> bool:
 
 
 def evaluators_are_identical(dataset: Dataset) -> bool:
-    """Whether all evaluators in RUNS return the same bits for the same individuals."""
+    """Whether all evaluators in RUNS return bit-identical results for the same individuals."""
     spec = CalibrationSpec(division="11")
     model, stage = model_for(dataset, spec), prepare(spec, dataset).stages[1]
     problem = Problem(model, stage.recordings, stage.free, base_genome(model))

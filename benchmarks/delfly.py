@@ -65,7 +65,11 @@ LIFT_CORRELATION = (0.97, 0.97, 0.97, 0.96, 0.96, 0.94, 0.92, 0.85)
 
 @dataclass(frozen=True)
 class Fitted:
-    """A model fitted to one recording, and its agreement."""
+    """A model fitted to one recording.
+
+    ``agreement``: correlation and error of each quantity; ``misfit_range``: interval of the beat (t*) in which it
+    misses physics, or None.
+    """
 
     trial: Trial
     recording: Recording
@@ -89,13 +93,13 @@ class Fitted:
 
 
 def problem_of(model: BladeElementWing, recording: Recording) -> Problem:
-    """Coefficients estimated from X with fixed drag, as in Armanini et al. (2016)."""
+    """Fit problem: lift coefficients estimated from the force along x with fixed drag, as in Armanini et al. (2016)."""
     drag = {name: value for name, value in DRAG.items() if name in {gene.name for gene in model.genes}}
     return Problem(model, (recording,), model.searched, base_genome(model, drag), ("x",))
 
 
 def fit(model: BladeElementWing, recording: Recording, trial: Trial, evaluator: Evaluator) -> Fitted:
-    """Estimate, starting from the nominal coefficients, and judge."""
+    """Estimate the coefficients, starting from their nominal values, and compute the agreement of the forces."""
     problem = problem_of(model, recording)
     found = estimate(problem, evaluator, {})
     best = replace(problem, base=problem.base.replace(found.values))
@@ -132,10 +136,7 @@ def coverage(
 
 
 def luck(model: BladeElementWing, beats: list[Array], seed: int, evaluator: Evaluator) -> dict[str, float]:
-    """Largest error of a coefficient under any condition, per cent, in campaigns with other seeds.
-
-    Median and maximum.
-    """
+    """Median and maximum, over DRAWS random seeds of the noise, of the largest error (per cent) of any coefficient."""
     largest = []
     for draw in range(DRAWS):
         errors = []
@@ -148,7 +149,7 @@ def luck(model: BladeElementWing, beats: list[Array], seed: int, evaluator: Eval
 
 
 def systematic(model: BladeElementWing, evaluator: Evaluator) -> dict[str, float]:
-    """Largest error of a coefficient under any condition, per cent, due to errors that are constant in a recording."""
+    """Largest error (per cent) of any coefficient under any condition, by kind of systematic measurement error."""
     still = Balance(every=10, beats=10, sensor=0.0, participation=0.0, rattle=0.0, drift=0.0, scatter=0.0, timing=0.0)
     largest = dict.fromkeys(
         ("finer_truth", "resonance", "zero_off_by_1_mn", "phase_off_by_a_thousandth_of_a_beat"), 0.0
@@ -172,7 +173,7 @@ def systematic(model: BladeElementWing, evaluator: Evaluator) -> dict[str, float
 
 
 def milliseconds(model: BladeElementWing, batch: int = 64, rounds: int = 7) -> float:
-    """Processor time of one individual with its own wing motion, in a batch; the best of several rounds."""
+    """Processor time (ms) of one individual with its own wing motion, in a batch; the best of several rounds."""
     rng, best = np.random.default_rng(0), np.inf
     nominal = np.array([gene.nominal for gene in model.genes])
     width = np.array([gene.upper - gene.lower for gene in model.genes])
@@ -188,7 +189,7 @@ def milliseconds(model: BladeElementWing, batch: int = 64, rounds: int = 7) -> f
 
 
 def global_errors(law: GlobalModel) -> dict[str, float]:
-    """Largest relative difference from a local estimate, per cent, by coefficient."""
+    """Largest relative difference (per cent) of the global model from the local estimates, by coefficient."""
     return {gene.name: 100 * gene.largest_error for gene in law.genes}
 
 
@@ -217,7 +218,7 @@ def widest(ranges: list[tuple[float, float] | None]) -> list[float] | None:
 def fits(
     seed: int, models: Mapping[str, BladeElementWing], evaluator: Evaluator
 ) -> tuple[dict[str, list[Fitted]], dict[str, Fitted]]:
-    """Every model on every condition at CUTOFF, and on one of them at FINER_CUTOFF."""
+    """Fits of each model to recordings of all conditions at CUTOFF, and to one recording at FINER_CUTOFF, by model."""
     vehicle = delfly()
     found: dict[str, list[Fitted]] = {name: [] for name in models}
     finer: dict[str, Fitted] = {}
@@ -232,7 +233,7 @@ def fits(
 
 
 def agreement_figures(fitted: Mapping[str, list[Fitted]], finer: Mapping[str, Fitted]) -> dict[str, Any]:
-    """Errors of the coefficients, where models without a term fail, and agreement of lift."""
+    """Figures: errors of the coefficients, interval of the beat where incomplete models fail, agreement of lift."""
     figures: dict[str, Any] = {
         "coefficient_error_percent": max(abs(e) for one in fitted["proposed"] for e in one.errors.values()),
         "misfit_tstar_range": widest([one.misfit_range for one in fitted["without_fling"]]),
@@ -295,7 +296,7 @@ def repeated_figures(model: BladeElementWing, repetitions: int, seed: int, evalu
 
 
 def rows(fitted: Mapping[str, list[Fitted]]) -> list[dict[str, Any]]:
-    """One row per condition: coefficients and Table 8, lift and Table 7, drag, and where the fling is missed."""
+    """One row per condition: coefficients, lift, drag, published values (Tables 7, 8), where fling is missed."""
     return [
         {
             "condition": one.trial.name,
@@ -328,7 +329,7 @@ def rows(fitted: Mapping[str, list[Fitted]]) -> list[dict[str, Any]]:
 
 
 def measure(seed: int, repetitions: int, evaluator: Evaluator) -> dict[str, Any]:
-    """All figures except those of the estimators."""
+    """All figures of the benchmark except those of the estimators."""
     start, vehicle = time.perf_counter(), delfly()
     models = {
         "proposed": BladeElementWing(vehicle),

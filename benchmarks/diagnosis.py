@@ -1,8 +1,8 @@
-"""Duration of one diagnosis: twelve recordings, a wing of 24 bodies, a plant with a finer discretisation.
+"""Duration of one diagnosis: twelve recordings, a wing of 24 bodies, data of a finer discretisation.
 
-``python -m benchmarks.diagnosis --json`` films the concealed trials' plant under twelve conditions, with one hidden
-effect, and diagnoses the files as a user does. It prints the time, the longest interval between two progress reports,
-and the ratio of true to estimated remaining time at half of the work.
+``python -m benchmarks.diagnosis --json`` simulates recordings with the plant of ``benchmarks.concealed`` under twelve
+conditions, with one hidden effect, and diagnoses the files as a user does. It prints the time, the longest interval
+between two progress reports, and the ratio of true to estimated remaining time at half of the work.
 """
 
 from __future__ import annotations
@@ -39,7 +39,10 @@ HALF = 0.5  # fraction of the work at which the estimated remaining time is chec
 
 
 def recorded(division: str, plant: str, seed: int) -> Dataset:
-    """Twelve recordings of a plant with random parameters; the same seed gives the same bits."""
+    """Dataset of twelve simulated recordings with random parameters; the same seed gives bit-identical data.
+
+    ``division``, ``plant``: discretisations of the model to be diagnosed and of the simulated wing.
+    """
     bench = WingBench(Build("wing", division, plant))
     genome = bench.genome(np.random.default_rng([seed, 1]))
     recordings = tuple(record_all(bench, (*FITTED, *HELD_OUT), genome, HIDDEN, seed))
@@ -78,7 +81,7 @@ def measured(path: Path, division: str, evaluator: EvaluatorKind, workers: int) 
 
 
 def _stages(reports: Sequence[tuple[float, Progress]]) -> dict[str, float]:
-    """Seconds per kind of stage, by its first two words."""
+    """Seconds spent in each kind of stage; the kind is the first two words of the stage's label in ``reports``."""
     spent: dict[str, float] = {}
     for (at, one), (after, _) in pairwise(reports):
         name = " ".join(one.stage.split()[:2])

@@ -47,10 +47,10 @@ LENGTHS = np.array(
 
 @dataclass(frozen=True)
 class Moved:
-    """Change that an effect makes to a rig's recordings.
+    """Change that an effect makes to the recordings of a rig.
 
-    ``size``: RMS change; ``left``: RMS residual after the refit, mm or mN; ``columns`` [D, sizes]: change by each of
-    the effect's size parameters, m or N.
+    ``size``: RMS change; ``left``: RMS residual after the nominal genes are refitted, both mm or mN; ``columns`` [D,
+    sizes]: change by each of the effect's size parameters, m or N.
     """
 
     size: float
@@ -92,7 +92,7 @@ def cost_ratio(rig: Rig, effect: Effect) -> float:
 
 
 def displacement(rig: Rig, effect: Effect, values: dict[str, float], recordings: tuple[Recording, ...]) -> Array:
-    """[D]: change of all recordings by the effect with its genes at ``values``, m or N."""
+    """Change [D] (m or N) of all recorded values by the effect with its genes at ``values``."""
     model = rig.model(effect)
     genome = base_genome(model, values)
     changed = []
@@ -105,7 +105,7 @@ def displacement(rig: Rig, effect: Effect, values: dict[str, float], recordings:
 
 
 def moved(rig: Rig, effect: Effect) -> Moved:
-    """Change by the effect, residual after a refit, and directions."""
+    """The change by ``effect`` at its typical size, the residual after a refit, and the change per parameter."""
     recordings, typical = rig.recordings(rig.stands_for(effect)), effect.typical(rig.description)
     whole = displacement(rig, effect, typical, recordings)
     size = rig.unit * rig.rms(whole)
@@ -118,7 +118,7 @@ def moved(rig: Rig, effect: Effect) -> Moved:
 
 
 def refitted(rig: Rig, effect: Effect, recordings: tuple[Recording, ...], whole: Array) -> float:
-    """RMS residual (m or N) of the nominal genes fitted to recordings with the effect."""
+    """RMS residual (m or N) after the nominal genes are fitted to ``recordings`` changed by ``whole`` [D]."""
     model = rig.model(None, without=rig.stands_for(effect))
     slopes, total, samples = sensitivities(rig, rig.stands_for(effect)), 0.0, 0
     for part, slope in zip(rig.parts(rig.changed(recordings, whole)), slopes, strict=True):
@@ -129,7 +129,10 @@ def refitted(rig: Rig, effect: Effect, recordings: tuple[Recording, ...], whole:
 
 
 def _fit(problem: Problem, slope: Array) -> tuple[float, int]:
-    """Least squares with the Jacobian at the nominal genome, trying several step lengths at once."""
+    """Least-squares fit with the constant Jacobian ``slope``, trying several step lengths at once.
+
+    Returns the sum of squares and the number of samples.
+    """
     genes, evaluator = free_genes(problem), InProcessEvaluator()
     unit, best, inverse = (
         unit_at(genes, np.array([gene.nominal for gene in genes]))[None],
@@ -163,7 +166,7 @@ def sensitivities(rig: Rig, without: str) -> list[Array]:
 
 @cache
 def nominal_directions(rig: Rig, without: str) -> Array:
-    """[D, F]: orthonormal basis of the changes that the nominal genes can make."""
+    """Orthonormal basis [D, .] of the changes of all recorded values that the nominal genes can make (linearised)."""
     basis, spread, _ = np.linalg.svd(block_diag(*sensitivities(rig, without)), full_matrices=False)
     return np.asarray(basis[:, spread > 1e-6 * spread[0]])
 
@@ -174,9 +177,9 @@ def angle(a: Array, b: Array) -> float:
 
 
 def freed(rig: Rig, one: Moved, known: Array) -> Array:
-    """Orthonormal basis of the effect's changes without those that the nominal genes can make.
+    """Orthonormal basis [D, .] of the effect's changes ``one`` without those that the nominal genes can make.
 
-    Changes below SEEN are zero.
+    ``known``: of :func:`nominal_directions`. Changes below SEEN are omitted.
     """
     free = one.columns - known @ (known.T @ one.columns)
     seen = [rig.unit * rig.rms(column) > SEEN for column in free.T]
@@ -200,7 +203,7 @@ def _task(kind: str, name: str, quick: bool) -> Moved:
 
 
 def measure(names: Iterable[str], *, quick: bool = False, costs: bool = True) -> dict[str, Any]:
-    """The whole table, with progress on standard error."""
+    """All rows of the table for the effects ``names``; progress goes to standard error."""
     names, began = list(names), time.monotonic()
     tasks = [(k, n) for k in RIGS for n in names if EFFECTS[n].applies_to(rig_of(k, quick).description)]
     ratios: dict[tuple[str, str], float | None] = dict.fromkeys(tasks)
@@ -222,7 +225,7 @@ def measure(names: Iterable[str], *, quick: bool = False, costs: bool = True) ->
 def row(
     name: str, found: dict[str, dict[str, Moved]], ratios: dict[tuple[str, str], float | None], *, quick: bool
 ) -> dict[str, Any]:
-    """One row: changes of tracks in mm, and of forces in mN."""
+    """One row of the table for effect ``name``: changes of tracks in mm, and of forces in mN."""
     line: dict[str, Any] = {"name": name, "family": EFFECTS[name].family}
     for kind, prefix, unit in (("wing", "", "mm"), ("vehicle", "vehicle_", "mn")):
         one = found[kind].get(name)

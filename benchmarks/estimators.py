@@ -48,7 +48,10 @@ class Point:
 
 
 def trace(label: str, states: Iterable[tuple[int, float]]) -> list[Point]:
-    """Points of a search that yields the number of individuals evaluated so far and their sum of squares."""
+    """Run the search ``states`` and return its points.
+
+    The search yields the number of individuals evaluated so far and a sum of squares.
+    """
     start, points, best = time.perf_counter(), list[Point](), np.inf
     for evaluations, squares in states:
         best = min(best, squares)
@@ -61,7 +64,10 @@ def trace(label: str, states: Iterable[tuple[int, float]]) -> list[Point]:
 def from_random(
     spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, seed: int
 ) -> Iterable[tuple[int, float]]:
-    """Gauss-Newton from a random start, uniform over the genes' ranges (in unit coordinates)."""
+    """Gauss-Newton from a random start, uniform over the genes' ranges (in unit coordinates).
+
+    Yields the number of individuals evaluated so far and the present sum of squares (m^2).
+    """
     (stage,), model = prepare(spec, dataset).stages, model_for(dataset, spec)
     problem = Problem(model, stage.recordings, stage.free, base_genome(model))
     genes = free_genes(problem)
@@ -74,12 +80,12 @@ def from_random(
 
 
 def reached(points: list[Point], floor: float) -> Point | None:
-    """The first point within AS_GOOD of the floor; None if there is none."""
+    """The first point whose sum of squares is at most AS_GOOD times ``floor``; None if there is none."""
     return next((point for point in points if point.squares <= AS_GOOD * floor), None)
 
 
 def row(method: str, points: list[Point], floor: float) -> dict[str, Any]:
-    """Cost until the floor is reached (None: never), and at the end."""
+    """Row of the table: cost of ``method`` until the floor is reached (None: never), and at the end of the search."""
     first = reached(points, floor)
     return {
         "method": method,

@@ -1,4 +1,4 @@
-"""How large the code is, how it is laid out, and which banned phrases it still holds.
+"""Measures the size and structure of the code, and finds banned phrases in it.
 
 ``python -m benchmarks.house [--json | --list]`` needs the standard library only. Product lines are those of the Python
 files of the product that are neither blank nor only a comment.
@@ -66,7 +66,7 @@ IDIOMS = {
 
 
 def files(*parts: str, suffixes: tuple[str, ...] = (".py",)) -> Iterator[Path]:
-    """Files of these folders that git knows, without those behind links."""
+    """Files under the folders ``parts`` with these suffixes that git tracks, without symbolic links."""
     listed = subprocess.run(["git", "ls-files", *parts], cwd=ROOT, capture_output=True, text=True, check=True).stdout  # noqa: S603, S607
     for name in listed.splitlines():
         path = ROOT / name
@@ -75,13 +75,13 @@ def files(*parts: str, suffixes: tuple[str, ...] = (".py",)) -> Iterator[Path]:
 
 
 def code_lines(path: Path) -> int:
-    """Lines that are neither blank nor only a comment."""
+    """Number of lines of ``path`` that are neither blank nor only a comment."""
     lines = path.read_text(encoding="utf-8").splitlines()
     return sum(1 for line in lines if line.strip() and not line.strip().startswith("#"))
 
 
 def function_lengths(path: Path) -> list[int]:
-    """Lines of each function from its ``def`` to its end."""
+    """Number of lines of each function in ``path``, from its ``def`` to its end."""
     tree = ast.parse(path.read_text(encoding="utf-8"))
     return [
         (node.end_lineno or node.lineno) - node.lineno + 1
@@ -98,7 +98,7 @@ def module_of(path: Path) -> str:
 
 
 def imports() -> dict[str, set[str]]:
-    """For each module of the product, the modules that it imports, in functions too; not the packages it lies in."""
+    """Product modules that each product module imports, also within functions; its own parent packages are omitted."""
     known = {module_of(path): path for path in files(*PRODUCT)}
     graph: dict[str, set[str]] = defaultdict(set)
     for module, path in known.items():
@@ -186,12 +186,15 @@ def phrases_in(text: str) -> Iterator[tuple[int, str, str]]:
 
 
 def _lines(path: Path) -> Iterator[tuple[int, str]]:
-    """A document as one text, so that a phrase broken over two lines counts; quotations and code spans are blanked."""
+    """Yield (1, whole text) of a document, with quotations and code spans blanked.
+
+    As one text, so that a phrase broken over two lines is found.
+    """
     yield 1, re.sub(r"(?m)^>.*$|`[^`\n]+`", "", path.read_text(encoding="utf-8"))
 
 
 def _prose(path: Path) -> Iterator[tuple[int, str]]:
-    """Strings and comments of a Python file, each with its first line; comments that follow each other as one."""
+    """Yield (first line number, text) of each string and comment of a Python file; adjacent comments are joined."""
     tokens = tokenize.generate_tokens(io.StringIO(path.read_text(encoding="utf-8")).readline)
     strings = (tokenize.STRING, getattr(tokenize, "FSTRING_MIDDLE", tokenize.STRING))  # 3.12 and later
     comment: tuple[int, list[str]] = (0, [])
@@ -208,7 +211,7 @@ def _prose(path: Path) -> Iterator[tuple[int, str]]:
 
 
 def help_seconds() -> float:
-    """Shortest time of ``wingfit --help``, s."""
+    """Shortest duration of the command ``wingfit --help`` in several runs, s."""
     command = [str(Path(sys.executable).with_name("wingfit")), "--help"]
     times = []
     for _ in range(HELP_RUNS):
@@ -219,7 +222,7 @@ def help_seconds() -> float:
 
 
 def measure() -> dict[str, Any]:
-    """All figures."""
+    """All figures of this benchmark, by name."""
     product = list(files(*PRODUCT))
     lengths = [length for path in product for length in function_lengths(path)]
     large = large_files()
@@ -243,7 +246,7 @@ def measure() -> dict[str, Any]:
 
 
 def main() -> None:
-    """Measure and print."""
+    """Command line: measure, and print the figures or the list of phrases."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.house", description=__doc__)
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     parser.add_argument(

@@ -43,7 +43,7 @@ class Said(NamedTuple):
 
     @classmethod
     def of(cls, outcome: Outcome) -> Said:
-        """``failed`` where there is no finding."""
+        """The conclusion of ``outcome``; its verdict is "failed" if there is no finding."""
         found = outcome.finding
         return cls("failed", ()) if found is None else cls(found.verdict, tuple(sorted(found.named)))
 
@@ -76,7 +76,10 @@ def main() -> None:
 
 
 def sample(wings: int) -> list[Trial]:
-    """Vehicles of the quick concealed suite, at their strength and fainter, and as many wings, coarse models first."""
+    """Sample: vehicle trials of the quick blind test, copies of them with weaker effects, and ``wings`` wing trials.
+
+    Wings with the coarsest models are taken first.
+    """
     trials = plan(SEED, quick=True)
     vehicles = [one for one in trials if not one.build.division]
     faint = [replace(one, name=f"{one.name}{FAINT_NAME}", target=FAINT * one.target) for one in vehicles if one.hidden]
@@ -85,7 +88,7 @@ def sample(wings: int) -> list[Trial]:
 
 
 def varied(name: str, factor: float) -> float:
-    """The threshold ``name`` times ``factor``; for a threshold that is a fraction, its odds are multiplied instead."""
+    """Value of the threshold ``name`` times ``factor``; for a probability p, p / (1 - p) is multiplied instead."""
     value = float(getattr(POLICY, name))
     if name not in PROBABILITIES:
         return value * factor
@@ -94,7 +97,10 @@ def varied(name: str, factor: float) -> float:
 
 
 def changes(trials: list[Trial], folders: Folders, jobs: int, only: list[str]) -> dict[str, Any]:
-    """What each threshold changes, halved and doubled."""
+    """Diagnose ``trials`` with each threshold halved and doubled; returns the conclusions that change, by threshold.
+
+    ``only``: names of the thresholds to vary, all if empty.
+    """
     thresholds = [one for one in described() if not only or one["name"] in only]
     if unknown := set(only) - {one["name"] for one in described()}:
         raise SystemExit(f"unknown threshold {', '.join(sorted(unknown))}; `--only` takes names of Policy's fields")
@@ -128,7 +134,7 @@ def changes(trials: list[Trial], folders: Folders, jobs: int, only: list[str]) -
 
 
 def conclusions(tasks: list[Task], folder: Path, jobs: int) -> list[Said]:
-    """The conclusion of each task; ``folder`` keeps them, so that an interrupted run continues where it was."""
+    """Run each task and return its conclusion; they are cached in ``folder``, so that an interrupted run can resume."""
     folder.mkdir(parents=True, exist_ok=True)
     files = [folder / f"{one.trial}-{_digest(one.policy)}.json" for one in tasks]
     missing = [pair for pair in zip(tasks, files, strict=True) if not pair[1].exists()]
@@ -149,7 +155,7 @@ def _digest(policy: Policy) -> str:
 
 
 def _right(trial: Trial, folders: Folders, said: Said) -> bool:
-    """Whether the policy as it is concludes what was hidden."""
+    """Whether the conclusion ``said`` is right for what is hidden in ``trial``."""
     hidden = read(folders.answer(trial.name)).names
     wanted = RIGHT.get(trial.group)
     return said.verdict == wanted if wanted else set(said.named) == set(hidden)

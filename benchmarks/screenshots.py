@@ -34,7 +34,7 @@ DRAWN_SECONDS = 60.0
 
 
 def main() -> None:
-    """Record, compute, take the screenshots; the last line is one JSON object."""
+    """Simulate the data, run the jobs, take the screenshots; the last line is one JSON object."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.screenshots", description=__doc__)
     parser.add_argument("--json", action="store_true", help="one JSON object as the last line (always printed)")
     parser.add_argument("--out", type=Path, default=OUT, help="folder for the screenshots")
@@ -56,7 +56,7 @@ def main() -> None:
 
 
 def worked(url: str, dataset: Path) -> dict[str, tuple[str, str]]:
-    """Submit the jobs; address of every page, and the id of the figure that is drawn last on it."""
+    """Upload ``dataset``, run the jobs, and return for each page its address and the id of the figure drawn last."""
     with Client(url) as client:
         its = client.upload_dataset(dataset)["id"]
         runs = [
@@ -83,7 +83,7 @@ def worked(url: str, dataset: Path) -> dict[str, tuple[str, str]]:
 
 
 def photographed(url: str, pages: dict[str, tuple[str, str]], out: Path) -> list[str]:
-    """Each page in light colours, the diagnosis also in dark colours and on a phone; names of the files."""
+    """Save screenshots to ``out``: each page in light colours, the diagnosis also dark and on a phone; file names."""
     from playwright.sync_api import sync_playwright  # needed here alone
 
     path = next((found for name in NAMES if (found := shutil.which(name))), None)

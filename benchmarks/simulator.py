@@ -58,7 +58,7 @@ _SILENCE = 3.0  # multiple of its time limit after which a peer process is kille
 
 
 class Progress:
-    """Number of stages, and remaining time of the present one, on standard error."""
+    """Shows the number of the present stage and its remaining time on standard error."""
 
     def __init__(self, stages: int) -> None:
         self.stages, self.stage, self.label = stages, 0, ""
@@ -66,14 +66,14 @@ class Progress:
 
     @contextmanager
     def during(self, label: str) -> Iterator[None]:
-        """Run a stage."""
+        """Context manager for one stage of the benchmark, called ``label``."""
         self.stage, self.label, self.stage_began = self.stage + 1, label, time.monotonic()
         self._say("")
         yield
         self._say(f", {time.monotonic() - self.stage_began:.0f} s", last=True)
 
     def __call__(self, done: int, of: int) -> None:
-        """``done`` of ``of`` parts of the stage are done."""
+        """Show that ``done`` of ``of`` parts of the stage are done, and the remaining time."""
         left = (time.monotonic() - self.stage_began) / done * (of - done)
         self._say(f", {done}/{of}, about {left:.0f} s left")
 
@@ -82,7 +82,10 @@ class Progress:
 
 
 def case(bodies: int, medium: str, operations: int) -> dict[str, Any]:
-    """One row of the table, without peak and other engines; ``operations`` of one step of a group of lanes."""
+    """One row of the table: cost and accuracy with ``bodies`` bodies in ``medium``; peak and other engines still None.
+
+    ``operations``: of one step of LANES individuals, which are simulated at once.
+    """
     subject = Subject(DIVISIONS[bodies], CONDITIONS[medium])
     converged = reference(subject, TOLERANCE)
     steps, error = fewest_steps(subject, converged, TOLERANCE)
@@ -114,7 +117,7 @@ def case(bodies: int, medium: str, operations: int) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Peer:
-    """A case for another engine: engine, bodies, medium."""
+    """A case to measure with another engine: its name, number of bodies, medium."""
 
     engine: str
     bodies: int
@@ -122,9 +125,9 @@ class Peer:
 
 
 def run_peer(peer: Peer, seconds: float) -> dict[str, Any]:
-    """Result of ``benchmarks.peers`` within ``seconds``.
+    """Run ``benchmarks.peers`` for the case ``peer`` in its own process and return its result.
 
-    Without a result ``cpu_ms_per_beat`` is None and there is a note.
+    Without a result within ``seconds``, ``cpu_ms_per_beat`` is None and there is a note.
     """
     command = [
         sys.executable, "-m", "benchmarks.peers", "--division", DIVISIONS[peer.bodies], "--medium", peer.medium,
@@ -159,7 +162,7 @@ def compare(cases: list[dict[str, Any]], seconds: float, progress: Progress) -> 
 
 
 def add_peer(row: dict[str, Any], engine: str, found: dict[str, Any]) -> None:
-    """Add the result of an engine to a case."""
+    """Add the result ``found`` of another engine to the table's ``row``."""
     cost = found["cpu_ms_per_beat"]
     ratio = None if cost is None else cost / row["ms_per_beat"]
     row[engine] = {name: found.get(name) for name in ("cpu_ms_per_beat", "error_mm", "method", "settings", "note")} | {
@@ -172,7 +175,7 @@ def add_peer(row: dict[str, Any], engine: str, found: dict[str, Any]) -> None:
 
 
 def installed(package: str) -> str:
-    """Version of a package, or "not installed"."""
+    """Version of the installed ``package``, or "not installed"."""
     try:
         return version(package)
     except PackageNotFoundError:
@@ -180,7 +183,7 @@ def installed(package: str) -> str:
 
 
 def cost_exponents(cases: list[dict[str, Any]]) -> dict[str, float]:
-    """By medium: least-squares slope of log(ms) over log(bodies), with four bodies along every chord."""
+    """Exponent p of the cost, proportional to bodies^p, by medium; fitted to cases with four bodies along the chord."""
     slopes = {}
     for medium in CONDITIONS:
         rows = [row for row in cases if row["medium"] == medium and row["bodies"] in GROWING]
@@ -191,7 +194,7 @@ def cost_exponents(cases: list[dict[str, Any]]) -> dict[str, float]:
 
 
 def search_seconds() -> float:
-    """Duration of the thesis's search.
+    """Duration (s) of the genetic search of van der Grinten's thesis.
 
     24 bodies, population 50, until it stalls, one vacuum and one tunnel recording.
     """
@@ -204,7 +207,7 @@ def search_seconds() -> float:
 
 
 def energy_errors(cases: list[dict[str, Any]]) -> dict[str, float]:
-    """By medium: energy error over 20 beats with the steps of the default accuracy."""
+    """Relative energy error over 20 beats, by medium, with the number of steps of the default accuracy."""
     rows = {row["medium"]: row for row in cases if row["bodies"] == ENERGY_BODIES}
     return {
         medium: energy_error(Subject(DIVISIONS[ENERGY_BODIES], CONDITIONS[medium]), row["default_steps"])
@@ -213,7 +216,7 @@ def energy_errors(cases: list[dict[str, Any]]) -> dict[str, float]:
 
 
 def light_damping() -> dict[str, int | None]:
-    """Beats to the periodic motion in vacuum with a fifth of the damping, with and without acceleration."""
+    """Beats to the periodic motion in vacuum with a fifth of the damping, with and without Anderson acceleration."""
     subject = Subject(DIVISIONS[ENERGY_BODIES], CONDITIONS["vacuum"], LIGHT)
     steps = len(by_default(subject).beat.tracks)
     windows = {"beats_to_periodic": Numerics().window, "beats_to_periodic_plain": 0}
@@ -221,7 +224,7 @@ def light_damping() -> dict[str, int | None]:
 
 
 def costs(sizes: tuple[int, ...], progress: Progress) -> tuple[list[dict[str, Any]], dict[str, float]]:
-    """The cases of these numbers of bodies, and the figures that all share."""
+    """Rows of :func:`case` for the numbers of bodies ``sizes`` in each medium, and figures common to all rows."""
     peak, cases, differences = flops.peak_gflops(), [], []
     for bodies in sizes:
         counted = flops.count_step(DIVISIONS[bodies])
@@ -236,7 +239,7 @@ def costs(sizes: tuple[int, ...], progress: Progress) -> tuple[list[dict[str, An
 
 
 def outcomes_of_random_genomes(every: int, progress: Progress) -> dict[str, Any]:
-    """How simulations of random genomes end, with every ``every``-th genome and condition only."""
+    """Summary of simulations of random gene values; only every ``every``-th genome and condition is used."""
     genomes = random_genomes.draw(FlexibleWing(robird_wing()).genes, GENOMES // every, SEED)
     todo = random_genomes.tasks(genomes, random_genomes.CAMPAIGN[::every])
     return random_genomes.summary(todo, random_genomes.run(todo, WORKERS, progress))
@@ -276,7 +279,7 @@ def measure(*, quick: bool, peer_seconds: float) -> dict[str, Any]:
 
 
 def table(figures: dict[str, Any]) -> str:
-    """The figures as text."""
+    """The ``figures`` as a text table."""
     columns = [
         "bodies", "medium", "steps", "ms_per_beat", "error_mm", "gflops", "fraction_of_peak", "times_faster_than_scipy",
         "times_faster_than_engine", "beats_to_periodic", "beats_to_periodic_plain",

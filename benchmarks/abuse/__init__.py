@@ -1,1 +1,1 @@
-"""Malformed and hostile requests: the server refuses them in words, lives on, and spends no memory on them."""
+"""Malformed and hostile requests: tests that the server refuses them, keeps running, and uses little memory."""

@@ -78,7 +78,10 @@ def _measured(server: Server, st: str | None, options: argparse.Namespace, scrat
 
 
 def abused(http: httpx.Client, port: int, names: dict[str, str], cases: list[Case]) -> Json:
-    """Answers of the server at ``port`` to ``cases``: number per status, and failures."""
+    """Send ``cases`` to the server at ``port``; returns the number of answers by status, and the list of failures.
+
+    ``names``: ids of existing objects that are put into the paths.
+    """
     statuses, failures = Counter[int](), list[str]()
     for number, case in enumerate(cases):
         status, wrong = _sent(http, port, case, names)
@@ -94,7 +97,7 @@ def abused(http: httpx.Client, port: int, names: dict[str, str], cases: list[Cas
 
 
 def _sent(http: httpx.Client, port: int, case: Case, names: Json) -> tuple[int, str]:
-    """Status of the answer (0 if a bare socket got none), and what is wrong with it."""
+    """Send one case; returns the status of the answer (0 if a bare socket got none), and what is wrong, or ""."""
     if case.raw:
         return _raw(port, case.raw), ""
     path, more = case.path, dict(case.more)

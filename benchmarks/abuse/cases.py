@@ -1,4 +1,4 @@
-"""A malformed or hostile request."""
+"""Description of one malformed or hostile request to the server."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ class Case:
     Attributes:
         name: what is wrong with it.
         method: of HTTP.
-        path: with its query; ``{dataset}``, ``{run}`` and ``{recording}`` are replaced by existing ones.
-        more: arguments of the HTTP client.
+        path: URL path with its query; ``{dataset}``, ``{run}`` and ``{recording}`` are replaced by existing ids.
+        more: further keyword arguments of the HTTP client.
         raw: bytes to send on a bare socket instead.
         answer: "refused" if it must be refused, "any" if it may be, "accepted" if it must not be.
     """
@@ -29,5 +29,5 @@ class Case:
 
 
 def upload(name: str, data: bytes, filename: str = "hostile.zip", **more: Any) -> Case:
-    """An upload of ``data``."""
+    """A case that uploads ``data`` as a dataset file called ``filename``; ``more``: other attributes of the case."""
     return Case(f"upload: {name}", more={"files": {"file": (filename, data)}}, **more)

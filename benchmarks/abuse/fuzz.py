@@ -45,13 +45,15 @@ request-timeout = {STREAM_SECONDS}
 
 
 def program() -> str | None:
-    """Path of schemathesis: beside this Python, or on the search path."""
+    """Path of the schemathesis program: beside this Python, or on PATH; None if it is not installed."""
     beside = Path(sys.executable).with_name("st")
     return str(beside) if beside.is_file() else shutil.which("st")
 
 
 def fuzzed(st: str, http: httpx.Client, named: dict[str, str], cases: int, seed: int, scratch: Path) -> Json:
-    """Run at least ``cases`` cases; number of cases and failures.
+    """Fuzz the server with at least ``cases`` requests; returns the number of requests and the failures.
+
+    ``st``: path of schemathesis; ``named``: ids of existing objects; ``scratch``: folder for its files.
 
     The same ``seed`` gives the same cases, apart from ids.
     """
@@ -69,12 +71,12 @@ def fuzzed(st: str, http: httpx.Client, named: dict[str, str], cases: int, seed:
 
 
 def counted(report: Json) -> int:
-    """Number of requests that a round sent."""
+    """Number of requests in the ``report`` of one run of schemathesis."""
     return int(report["test_cases"]["generated"])
 
 
 def judged(report: Json) -> list[str]:
-    """Failures in the report of a round; a round that ended early or omitted an operation is a failure too."""
+    """Failures in the report of one run of schemathesis; that it ended early or omitted an operation counts too."""
     found = [(one, f" in {', '.join(one['operations'])}") for one in report["failures"]]
     found += [(one, "") for one in report["errors"]]
     failures = [f"fuzz: {one['title']}, {one['count']} times{where}" for one, where in found]
@@ -87,7 +89,7 @@ def judged(report: Json) -> list[str]:
 
 
 def _given(values: Json, seed: int, folder: Path) -> Path:
-    """Write the input of the hooks and the configuration."""
+    """Write the valid ``values`` for the hooks, and schemathesis' configuration, to ``folder``, which is returned."""
     folder.mkdir()
     (folder / "good.json").write_text(json.dumps({"good": values, "seed": seed}), encoding="utf-8")
     (folder / "tracks.zip").write_bytes(uploads.small_archive())
@@ -97,7 +99,10 @@ def _given(values: Json, seed: int, folder: Path) -> Path:
 
 
 def _rounds(st: str, http: httpx.Client, cases: int, seed: int, folder: Path) -> Iterator[Json]:
-    """Reports until there are enough cases. Only the first round has the deterministic phases."""
+    """Run schemathesis repeatedly until it has sent ``cases`` requests, and yield each report.
+
+    Only the first run has the deterministic phases.
+    """
     url = str(http.base_url.join(SPECIFICATION))
     calls = sum(len(methods) for methods in http.get(SPECIFICATION).json()["paths"].values())
     missing = cases
@@ -142,7 +147,7 @@ def _round(st: str, url: str, phases: str, examples: int, seed: int, folder: Pat
 
 @contextmanager
 def _relieved(url: str) -> Iterator[None]:
-    """Cancel waiting jobs during the block."""
+    """Context manager: waiting jobs of the server at ``url`` are cancelled repeatedly during the block."""
     done = threading.Event()
 
     def relieve() -> None:
@@ -161,7 +166,7 @@ def _relieved(url: str) -> Iterator[None]:
 
 
 def _mistakes(http: httpx.Client) -> list[str]:
-    """Jobs that failed by an error of the server."""
+    """Descriptions of the jobs that failed by an error of the server."""
     failed = [one for kind in ("runs", "diagnoses") for one in _all(http, f"/v1/{kind}?state=FAILED&limit=200")]
     return [f"fuzz: {one['id']}: {one['error']}" for one in failed if MISTAKE in (one["error"] or "")]
 

@@ -1,6 +1,6 @@
 """Hooks that schemathesis loads (``SCHEMATHESIS_HOOKS``).
 
-Put valid values into those parts that are meant to be valid.
+They put valid values into those parts of a generated request that are meant to be valid.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ VALUES = _valid_values()
 
 
 def before_call(context: Any, case: Any, kwargs: dict[str, Any]) -> None:  # noqa: ARG001  as they call it
-    """Put values into the valid parts; those that were made invalid on purpose stay."""
+    """Put valid values into the request ``case``; parts that schemathesis made invalid on purpose stay as they are."""
     dice = VALUES.dice(case.method, case.path, case.path_parameters, case.query, str(case.body))
     kind = VALUES.kind(case.path, dice)
     valid = _valid(case)
@@ -49,7 +49,7 @@ def before_call(context: Any, case: Any, kwargs: dict[str, Any]) -> None:  # noq
 
 
 def _valid(case: Any) -> set[str]:
-    """The parts that are valid."""
+    """Names of the parts of the request ``case`` (path, query, headers, body) that are meant to be valid."""
     made = case.meta.components.items() if case.meta else ()
     return {where.value for where, part in made if part.mode is GenerationMode.POSITIVE}
 

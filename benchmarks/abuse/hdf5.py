@@ -39,7 +39,10 @@ UPLOAD_EVERY = 25
 
 
 def abused(http: httpx.Client, server: Server, names: dict[str, str], seed: int, mutated: int = MUTATED) -> Json:
-    """Upload all files; time of the slowest, peak memory, and delays of other clients."""
+    """Upload ``mutated`` changed files and all crafted ones.
+
+    Returns the time of the slowest upload, the server's peak memory, and the delays that other clients observed.
+    """
     files = [*crafted(), *_mutated(seed, mutated)]
     answers = _Answers(len(files))
     with _Others(str(http.base_url), names) as others, _Memory(server) as memory, ThreadPoolExecutor(AT_ONCE) as pool:
@@ -67,7 +70,7 @@ def abused(http: httpx.Client, server: Server, names: dict[str, str], seed: int,
 
 
 def _mutated(seed: int, count: int) -> Iterator[tuple[str, bytes]]:
-    """Valid files with one changed byte: half of them anywhere, half in the heaps that hold the texts."""
+    """Yield ``count`` (name, bytes) of valid files with one changed byte: half anywhere, half in the text heaps."""
     rng, good = np.random.default_rng([seed, 5]), uploads.netcdf_example()
     heaps = [at for at in range(len(good)) if good.startswith(HEAP, at)]
     for number in range(count):
@@ -82,7 +85,7 @@ def _mutated(seed: int, count: int) -> Iterator[tuple[str, bytes]]:
 
 
 def crafted() -> Iterator[tuple[str, bytes]]:
-    """Valid HDF5 files with hostile contents."""
+    """Yield (name, bytes) of valid HDF5 files with hostile contents."""
     for name, make in CRAFTED.items():
         yield f"crafted NetCDF, {name}", _changed(make)
     good = uploads.netcdf_example()
@@ -107,7 +110,7 @@ def _group(file: h5py.File) -> Any:
 
 
 def _with(name: str, **options: Any) -> Make:
-    """A variable of the same shape with other storage options."""
+    """Function that stores the variable ``name`` of a file again, same shape, with other storage ``options``."""
 
     def make(file: h5py.File) -> None:
         group = _group(file)
@@ -126,7 +129,7 @@ def _huge_attribute(file: h5py.File) -> None:
 
 
 def _bomb(times: int) -> Make:
-    """A chunk that unpacks to 500 MB or more, whatever the variable declares, compressed ``times`` times."""
+    """Function that writes a chunk of data, compressed ``times`` times, that unpacks to 500 MB or more."""
 
     def make(file: h5py.File) -> None:
         group = _group(file)
@@ -152,7 +155,7 @@ def _zeros(mib: int) -> bytes:
 
 
 def _large(instants: int, **options: Any) -> Make:
-    """As many numbers as are allowed, in a file of some kilobytes."""
+    """Function that declares variables of ``instants`` samples without storing them, so that the file stays small."""
 
     def make(file: h5py.File) -> None:
         group = _group(file)
@@ -247,7 +250,7 @@ CRAFTED: dict[str, Make] = {
 
 @dataclass
 class _Answers:
-    """Answers to the uploads."""
+    """Collects the answers to the uploads: statuses, slowest time, failures."""
 
     total: int
     done: int = 0
@@ -258,7 +261,7 @@ class _Answers:
     lock: threading.Lock = field(default_factory=threading.Lock)
 
     def add(self, name: str, status: int, seconds: float, text: str) -> None:
-        """Record an answer."""
+        """Record the answer to the upload ``name``: status, duration, and text; other than 201 or 422 is a failure."""
         with self.lock:
             self.done += 1
             self.accepted += status == 201
@@ -284,7 +287,7 @@ def _upload(url: str, name: str, data: bytes, answers: _Answers) -> None:
 
 
 class _Thread:
-    """Repeats an action during a ``with`` block."""
+    """Thread that repeats :meth:`look` during a ``with`` block."""
 
     def __init__(self, seconds: float) -> None:
         self._seconds, self._over = seconds, threading.Event()
@@ -308,14 +311,14 @@ class _Thread:
 
 
 class _Memory(_Thread):
-    """Peak memory of the server and its descendants together."""
+    """Records the peak memory of the server and its descendants together."""
 
     def __init__(self, server: Server) -> None:
         super().__init__(LOOK_SECONDS)
         self._server, self.peak_mb = server, 0.0
 
     def look(self) -> None:
-        """Read the present memory."""
+        """Measure the present memory of the processes."""
         held = sum(_resident_mb(pid) for pid in (self._server.pid, *descendants(self._server.pid)))
         self.peak_mb = max(self.peak_mb, held)
 
@@ -328,7 +331,7 @@ def _resident_mb(pid: int) -> float:
 
 
 class _Others(_Thread):
-    """Other clients of the server."""
+    """Other clients of the server during the uploads; records how long they wait for answers."""
 
     def __init__(self, url: str, names: dict[str, str]) -> None:
         super().__init__(OTHERS_SECONDS)
@@ -338,7 +341,7 @@ class _Others(_Thread):
         self.failures: list[str] = []
 
     def look(self) -> None:
-        """Read, and sometimes upload."""
+        """Send one request to each path that is read, and sometimes upload a valid dataset."""
         with httpx.Client(base_url=self._url, timeout=ANSWER_SECONDS) as http:
             for path in self._paths:
                 seconds = self._timed(path, lambda path=path: http.get(path), 200, READ_SECONDS)  # type: ignore[misc]

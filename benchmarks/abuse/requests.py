@@ -228,7 +228,7 @@ RAW = (
 
 
 def cases() -> Iterator[Case]:
-    """All requests."""
+    """Yield all hostile requests of this module."""
     for path, good in BODIES.items():
         yield from _bodies(path, good)
     for path in GETS:

@@ -60,7 +60,7 @@ TEXTS = (
 
 
 def cases(seed: int) -> Iterator[Case]:
-    """All uploads; the same seed gives the same bytes."""
+    """Yield all hostile uploads; the same seed gives the same bytes."""
     good = example_files()
     yield from _archives(good)
     yield from _damaged("zip", zipped(good), np.random.default_rng([seed, 1]))
@@ -76,12 +76,12 @@ def small_archive() -> bytes:
 
 
 def netcdf_example() -> bytes:
-    """The same dataset as NetCDF."""
+    """The dataset of :func:`small_archive` as a NetCDF file."""
     return _netcdf(example_files())
 
 
 def example_files() -> dict[str, bytes]:
-    """The files of the example dataset with its first recording only."""
+    """Contents, by file name, of the example dataset with its first recording only."""
     import yaml
 
     description = yaml.safe_load((EXAMPLE / YAML).read_text(encoding="utf-8"))

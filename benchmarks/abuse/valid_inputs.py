@@ -1,4 +1,4 @@
-"""Valid objects on the server: datasets of both kinds, finished runs and a diagnosis, and a key."""
+"""Creates valid objects on the server for the fuzzer: datasets of both kinds, finished runs, a diagnosis, a key."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ DIAGNOSIS = {"without": ["clap_and_peel"], "suspects": ["clap_and_peel"], "refit
 
 
 def names(http: httpx.Client) -> dict[str, str]:
-    """Ids of a dataset of each kind, and of a finished run on each."""
+    """Upload a dataset of each kind ("tracks", "forces"), calibrate each, and return the ids by name."""
     dataset = http.post("/v1/datasets", files={"file": ("valid.zip", uploads.small_archive())}).json()
     forces = http.post("/v1/datasets", files={"file": ("valid.zip", archive("delfly"))}).json()
     return {

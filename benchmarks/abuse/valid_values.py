@@ -39,26 +39,26 @@ class ValidValues:
         self._kept = frozenset(kept + [good[kind][name] for kind in KINDS for name in ("dataset_id", "run_id")])
 
     def dice(self, *request: object) -> random.Random:
-        """Random numbers that depend only on the seed and the request."""
+        """Random number generator that depends only on the seed and the request."""
         return random.Random(f"{self._seed} {request!r}")  # noqa: S311  no secret
 
     def kind(self, path: str, dice: random.Random) -> str:
-        """Kind of the objects that a request names; mostly the kind that its path is for."""
+        """Kind ("tracks" or "forces") of the objects that a request will name; mostly the kind that its path is for."""
         only = next((kind for end, kind in OF_KIND.items() if path.endswith(end)), None)
         return only if only and dice.random() < OFTEN else dice.choice(KINDS)
 
     def spared(self, given: Mapping[str, Any]) -> Json:
-        """Path parameters of a deletion that do not name objects needed by other requests."""
+        """The path parameters ``given`` of a deletion, with ids of objects that other requests need made invalid."""
         return {name: _absent(value) if value in self._kept else value for name, value in given.items()}
 
     def parameters(self, given: Mapping[str, Any], kind: str, dice: random.Random) -> Json:
-        """Parameters of a path or a query."""
+        """Valid values for the ``given`` parameters of a path or a query."""
         fillers = _fillers(self._good, kind, dice)
         fillers = {**fillers, "name": lambda: dice.choice(self._good["effects"])}
         return {name: self._filled(name, value, fillers, dice) for name, value in given.items()}
 
     def headers(self, given: Mapping[str, Any], dice: random.Random) -> Json:
-        """Headers; an idempotency key that was sent before would be refused with another body."""
+        """Valid values for the ``given`` headers, with a new idempotency key, because a used one would be refused."""
         fresh = REPEAT_KEY in given and dice.random() < OFTEN
         return {**given, **({REPEAT_KEY: f"{dice.getrandbits(64):x}"} if fresh else {})}
 
@@ -70,7 +70,7 @@ class ValidValues:
         return {"files": {"file": ("good.zip", dice.choice(self._archives))}, "data": fields}
 
     def body(self, given: Any, kind: str, dice: random.Random) -> Any:
-        """A JSON body; its computations are made small."""
+        """The ``given`` JSON body with valid values; computations that it requests are made small."""
         if not isinstance(given, dict):
             return given
         small = given | {name: min(given[name], most) for name, most in LARGEST.items() if name in given}
@@ -79,12 +79,12 @@ class ValidValues:
         return self._of_one_kind(small, kind, dice) if dice.random() < OFTEN else small
 
     def _filled(self, name: str, value: Any, fillers: Fillers, dice: random.Random) -> Any:
-        """A valid value; an id that the fuzzer took from an answer of the server mostly stays."""
+        """A valid value for the field ``name``; an id that the fuzzer took from an answer mostly stays."""
         served = isinstance(value, str) and ID.fullmatch(value) and value not in self._good["examples"]
         return fillers[name]() if name in fillers and dice.random() < (SELDOM if served else OFTEN) else value
 
     def _of_one_kind(self, given: Json, kind: str, dice: random.Random) -> Json:
-        """A body whose fields all belong to a wing, or all to a vehicle."""
+        """The body ``given`` without the fields that do not belong to ``kind`` ("tracks" or "forces")."""
         fillers = _fillers(self._good, kind, dice)
         filled = {name: fillers[name]() if name in fillers else value for name, value in given.items()}
         excluded = FOREIGN[kind] + (IDLE if filled.get("method") == "gauss_newton" else ())
@@ -92,7 +92,7 @@ class ValidValues:
 
 
 def _fillers(good: Json, kind: str, dice: random.Random) -> Fillers:
-    """Functions that make a valid value of a parameter or field, by its name."""
+    """Functions that make a valid value, by name of the parameter or field, for a ``kind`` of dataset."""
     known, genes, names = good[kind], good[kind]["genes"], list(good[kind]["genes"])
     return {
         "dataset_id": lambda: known["dataset_id"],

@@ -11,7 +11,7 @@ EXAMPLES = REPOSITORY / "examples"
 
 
 def archive(example: str) -> bytes:
-    """An example's folder as a zip archive, the same bytes every time."""
+    """The folder of an example dataset as a zip archive, the same bytes every time."""
     packed, folder = io.BytesIO(), EXAMPLES / example
     files = [folder / "dataset.yaml", *(folder / "recordings").iterdir()]
     with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as zipped:

@@ -1,4 +1,4 @@
-"""Where a figure was measured: processor and commit."""
+"""Processor and commit with which a figure was measured, for reports."""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Ray nodes as processes on this machine. Each is found and ended by its own mark, with all that it spawned."""
+"""Ray nodes as processes on this machine.
+
+A unique text in the environment of a node's processes, its mark, identifies them all, so that they can be killed.
+"""
 
 from __future__ import annotations
 
@@ -39,7 +42,7 @@ def environment(token: Path, **more: str) -> dict[str, str]:
 
 
 class Process(NamedTuple):
-    """A process of this machine."""
+    """A process of this machine as described in /proc: name, state letter, parent's id, environment variables."""
 
     name: str
     state: str
@@ -66,7 +69,7 @@ def free_port() -> int:
 
 
 def marked(mark: str) -> dict[int, str]:
-    """Living processes with ``mark`` in their environment, and their descendants, with their names.
+    """Names by id of the living processes with ``mark`` in their environment, and of their descendants.
 
     The mark alone would miss the processes that Ray renames, because renaming overwrites their environment.
     """
@@ -102,11 +105,11 @@ class Node:
         return self._process.poll() is None
 
     def pids(self) -> dict[int, str]:
-        """Living processes of this node, with their names."""
+        """Names of the living processes of this node, by process id."""
         return marked(self.mark)
 
     def raylet(self) -> int | None:
-        """Process id of its scheduler; None if there is none."""
+        """Process id of the node's scheduler (raylet); None if there is none."""
         return next((pid for pid, name in self.pids().items() if name == "raylet"), None)
 
     def kill(self) -> None:

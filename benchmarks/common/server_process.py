@@ -1,4 +1,4 @@
-"""A server as a process of its own with a data folder, and the ways to kill it."""
+"""The server as a separate process with a data folder, for benchmarks that restart and kill it."""
 
 from __future__ import annotations
 
@@ -47,7 +47,10 @@ class Server:
         self.fail_point = ""
 
     def start(self, fail_point: str = "") -> None:
-        """Start and wait until it answers. With a fail point it may end before."""
+        """Start the server and wait until it answers.
+
+        ``fail_point``: name of a place in the server's code at which it kills itself, possibly before it answers.
+        """
         self.fail_point = fail_point
         with (self.folder / "server.log").open("ab") as log:
             self._process = subprocess.Popen(
@@ -69,7 +72,7 @@ class Server:
             time.sleep(0.02)
 
     def answers(self) -> bool:
-        """Whether it answers now."""
+        """Whether the server answers now."""
         with suppress(httpx.TransportError):
             return httpx.get(f"http://127.0.0.1:{self.port}/v1/health", timeout=5.0).status_code == 200
         return False
@@ -80,11 +83,11 @@ class Server:
         return float(next(line.split()[1] for line in lines if line.startswith("VmHWM:"))) / 1024
 
     def tail(self) -> str:
-        """The end of its log."""
+        """The end of the server's log."""
         return (self.folder / "server.log").read_text(errors="replace")[-2000:]
 
     def died(self, seconds: float) -> bool:
-        """Whether it ends by itself within ``seconds``."""
+        """Wait at most ``seconds``; returns whether the server ended by itself."""
         assert self._process is not None  # noqa: S101  # started
         with suppress(subprocess.TimeoutExpired):
             self._process.wait(seconds)
@@ -118,7 +121,7 @@ class Server:
         return [pid for pid, command in _commands(descendants(self.pid)) if _evaluates(command)]
 
     def stop(self) -> None:
-        """SIGTERM, and SIGKILL if it does not end within DIE_SECONDS."""
+        """Send SIGTERM to the server, and SIGKILL if it does not end within DIE_SECONDS."""
         assert self._process is not None  # noqa: S101  # started
         self._process.terminate()
         with suppress(subprocess.TimeoutExpired):

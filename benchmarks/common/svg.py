@@ -30,7 +30,7 @@ class Line:
 
 @dataclass(frozen=True)
 class Panel:
-    """One pair of axes; ``shaded`` is an interval of x, ``holds`` are values of y that the axis includes."""
+    """One pair of axes with its curves; ``shaded``: interval of x; ``holds``: values that the y axis must include."""
 
     title: str
     x: str
@@ -42,7 +42,7 @@ class Panel:
 
 
 def svg(panels: Sequence[Panel], *, columns: int = 0) -> str:
-    """Panels in rows of ``columns``; all in one row by default."""
+    """SVG text of the panels in rows of ``columns`` panels; all in one row by default."""
     across = columns or len(panels)
     width, height = WIDTH * across, HEIGHT * -(-len(panels) // across)
     parts = [

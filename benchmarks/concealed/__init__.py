@@ -1,1 +1,1 @@
-"""Concealed trials: recordings with hidden physics, sealed answers, and the diagnosis run as a user runs it."""
+"""Blind test of the diagnosis: simulated recordings with hidden physics, diagnosed without knowledge of the answers."""

@@ -1,7 +1,8 @@
-"""Concealed trials of the diagnosis.
+"""Blind test of the diagnosis: it must name physics hidden in datasets of an independent simulator, the plant.
 
-``python -m benchmarks.concealed --json`` runs the whole suite; the last line is one JSON object. ``--make DIR --n K``
-only writes K datasets for development into DIR, with their answers beside them, from seeds that no suite uses.
+``python -m benchmarks.concealed --json`` runs all trials (datasets); the last line is one JSON object.
+``--make DIR --n K`` only writes K datasets for development into DIR, with their answers, from seeds that the test does
+not use.
 """
 
 from __future__ import annotations

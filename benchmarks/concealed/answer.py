@@ -1,4 +1,7 @@
-"""The answer of a trial: what was hidden in its dataset. Plain data, sealed before anything is diagnosed."""
+"""The answer of a trial: what was hidden in its dataset. Plain data; its hash is published before any diagnosis.
+
+"The plant" is the simulator that produces the datasets, "the library" the set of effects that a diagnosis can name.
+"""
 
 from __future__ import annotations
 
@@ -20,12 +23,13 @@ class Secret:
     Attributes:
         name: of the effect in the library; for an effect that the library does not have, the plant's own name.
         listed: whether the library has the effect.
-        side: physics, or a fault of the measurement.
-        strength: size of the effect, in the plant's own unit.
+        side: "physics", or "measurement" for a fault of the measurement.
+        strength: size of the effect, in the unit that the plant uses for it.
         parameters: everything the plant needs to simulate the effect again.
         span, chord: place on the wing, as fractions; None for an effect without a place.
         phase: in beats from the start of the beat as a dataset defines it; None for an effect without a phase.
-        values: true values of the library's genes, for those with the same meaning in the plant and in the library.
+        values: true values, by name, of the genes (parameters) of the library's effect that have the same meaning in
+            the plant.
     """
 
     name: str
@@ -45,20 +49,22 @@ class Answer:
 
     Attributes:
         trial: its name.
-        group: the group it is counted in.
+        group: the group of trials it is counted in, from GROUPS.
         rig: "wing" or "vehicle".
-        division: discretisation of the model to be diagnosed.
+        division: discretisation (bodies of the wing) of the model to be diagnosed.
         plant: discretisation of the plant.
         secrets: what was hidden; empty in a null trial.
         genome: true values of the nominal genes.
-        target: strength d that was aimed at; strength: the d that the scorer's refit measured.
+        target: strength d aimed at: RMS misfit of the refitted nominal model, divided by the RMS noise.
+        strength: strength d that the refit of :mod:`.strength` measured.
         strength_of_division: misfit / noise after the nominal model is refitted to a plant with nothing hidden; caused
-            by
-            the coarser discretisation of the model and by the differences between two solvers.
-        noise: RMS noise of one channel in the fitted recordings, m or N; noise_held_out: in the held-out ones.
-        conditions: of the recordings, by name.
-        seed: of the trial; attempt: number of the draw that the plant could simulate; level: factor on the drawn noise.
-            With these three the rig can be recorded again.
+            by the coarser discretisation of the model and by the differences between two solvers.
+        noise: RMS noise of one channel in the fitted recordings, m or N.
+        noise_held_out: the same in the held-out recordings.
+        conditions: condition of each recording, by the recording's name.
+        seed: random seed of the trial.
+        attempt: number of the random draw, the first that the plant could simulate.
+        level: factor on the drawn noise. With seed, attempt and level the rig can be recorded again.
     """
 
     trial: str

@@ -1,4 +1,7 @@
-"""Test benches: a common interface to both plants, with what can be hidden in each and how each is recorded."""
+"""Common interface to the two plants (independent simulators of a wing and of a vehicle) with their measurement.
+
+A bench simulates a plant with hidden effects and records it with simulated cameras or a balance.
+"""
 
 from __future__ import annotations
 
@@ -50,7 +53,7 @@ KEPT = 64  # simulated beats that are cached
 
 
 class Made(NamedTuple):
-    """A recording, and the RMS of its noise after the filtering that precedes a fit, m or N."""
+    """A recording, and the RMS of its noise (m or N) after the filtering that precedes a fit."""
 
     recording: Recording
     noise: float
@@ -58,9 +61,10 @@ class Made(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Bench(ABC, Generic[Motion, Quality]):
-    """A plant with its cameras or balance.
+    """A plant (simulator that produces test data) with its cameras or balance.
 
-    ``Motion`` is the type of one simulated beat, ``Quality`` that of the settings of cameras or balance.
+    ``build`` says which rig, discretisation and terms; ``beats`` caches simulated wing beats. ``Motion`` is the type of
+    one simulated beat, ``Quality`` that of the settings of cameras or balance.
     """
 
     build: Build
@@ -69,7 +73,7 @@ class Bench(ABC, Generic[Motion, Quality]):
     @property
     @abstractmethod
     def rig(self) -> Wing | Vehicle:
-        """The rig as its user describes it, with estimates of the nominal genes."""
+        """The rig as described in the dataset, with estimates of the nominal model's parameters (genes)."""
 
     @property
     @abstractmethod
@@ -99,33 +103,33 @@ class Bench(ABC, Generic[Motion, Quality]):
 
     @abstractmethod
     def fitted(self, recording: Recording) -> Recording:
-        """The recording after the filtering that precedes every fit. Strengths and noise are measured on this."""
+        """The recording after the filtering that precedes every fit; strengths and noise are measured on the result."""
 
     @abstractmethod
     def simulated(self, condition: Condition, genome: Mapping[str, float], hidden: Concealed) -> Motion:
-        """Simulate a beat of the plant with the effects ``hidden``."""
+        """One beat of the plant simulated under ``condition`` with parameters ``genome`` and the effects ``hidden``."""
 
     @abstractmethod
     def shown(
         self, beat: Motion, condition: Condition, hidden: Concealed, quality: Quality, rng: np.random.Generator
     ) -> Made:
-        """Record a beat, with the faults ``hidden`` in the measurement."""
+        """A recording of ``beat`` by cameras or balance, with the faults ``hidden`` in the measurement."""
 
     @cached_property
     def laws(self) -> dict[str, Law]:
-        """Everything that can be hidden, by name."""
+        """All effects that can be hidden, physics and faults of the measurement, by name."""
         return {**self.physics, **self.faults}
 
     @cached_property
     def model(self) -> Model:
-        """The nominal model that will be diagnosed; the scorer refits it."""
+        """The nominal model that will be diagnosed; it is refitted to measure the strength of hidden effects."""
         spec = CalibrationSpec(without=self.build.without)
         if self.build.division:
             spec = replace(spec, division=self.build.division)
         return model_for(Dataset("nominal", self.rig, ()), spec)
 
     def model_beside(self, genome: Mapping[str, float]) -> Model:  # noqa: ARG002
-        """The same model, set up for individuals near ``genome``."""
+        """The same model, set up to simulate parameter values near ``genome`` faster, if the rig allows it."""
         return self.model
 
     def phase(self, beat: Motion, name: str, parameters: Parameters) -> float | None:  # noqa: ARG002
@@ -146,12 +150,12 @@ class Bench(ABC, Generic[Motion, Quality]):
         return type(self)(replace(self.build, plant=self.build.division))
 
     def genome(self, rng: np.random.Generator) -> dict[str, float]:
-        """Random true values of the genes. Genes that the model does not search keep their estimates."""
+        """Random true values of the model's parameters, by name; those that it does not fit keep their estimates."""
         drawn = {gene.name: float(gene.nominal * SPREAD ** rng.uniform(-1.0, 1.0)) for gene in self.model.genes}
         return {g.name: drawn[g.name] if g.name in self.model.searched else g.nominal for g in self.model.genes}
 
     def beat(self, condition: Condition, genome: Mapping[str, float], hidden: Concealed) -> Motion:
-        """A beat of the plant, cached. Faults of the measurement do not change it."""
+        """As :meth:`simulated`, but cached, and faults of the measurement in ``hidden`` are ignored."""
         inside = {name: values for name, values in hidden.items() if name in self.physics}
         key = (condition, tuple(genome.items()), tuple((n, tuple(v.items())) for n, v in inside.items()))
         if key not in self.beats:
@@ -168,13 +172,13 @@ class Bench(ABC, Generic[Motion, Quality]):
         quality: Quality,
         rng: np.random.Generator,
     ) -> Made:
-        """Simulate and record one condition, with everything in ``hidden``."""
+        """Simulate and record one condition, with all physics and measurement faults in ``hidden``."""
         wrong = {name: values for name, values in hidden.items() if name in self.faults}
         return self.shown(self.beat(condition, genome, hidden), condition, wrong, quality, rng)
 
 
 class Filmset(NamedTuple):
-    """Camera settings, and the pair of cameras."""
+    """Settings of the wing's measurement: how it is filmed, and the poses of the pair of cameras."""
 
     filming: Filming
     cameras: Cameras
@@ -189,9 +193,9 @@ class WingBench(Bench[Beat, Filmset]):
         return robird_wing()
 
     def model_beside(self, genome: Mapping[str, float]) -> FlexibleWing:
-        """The model whose search for a periodic motion starts from that of ``genome``.
+        """The nominal model, whose search for a periodic motion starts from the motion with parameters ``genome``.
 
-        Neighbours need half the beats.
+        Parameters near ``genome`` then need half as many simulated beats.
         """
         found = wing_model(Dataset("nominal", self.rig, ()), CalibrationSpec(division=self.build.division))
         return replace(found, near=tuple(genome[gene.name] for gene in found.genes))
@@ -207,12 +211,15 @@ class WingBench(Bench[Beat, Filmset]):
         return {name: _law(kind, self.rig) for name, kind in KINDS.items()}
 
     def limits(self, name: str) -> tuple[float, float]:
-        """As in the base class, but the plant's own effects define their upper limit themselves."""
+        """Limits as multiples of the typical strength; for physics the upper one is :attr:`Kind.largest`."""
         low, high = super().limits(name)
         return low, KINDS[name].largest / KINDS[name].typical if name in KINDS else high
 
     def phase(self, beat: Beat, name: str, parameters: Parameters) -> float | None:
-        """Converts the drive phase, which plant and cameras use, to the phase counted from the start of the beat."""
+        """Phase (beats) at which an effect acts, from the start of the beat as a dataset defines it; None if always.
+
+        Plant and cameras count phases from drive phase 0 instead.
+        """
         if name in beat.turns:
             return beat.phase(beat.turns[name])
         if "turn" in parameters:
@@ -224,25 +231,25 @@ class WingBench(Bench[Beat, Filmset]):
         return Filmset(draw_filming(rng), draw_cameras(self.rig, rng))
 
     def quieter(self, quality: Filmset, level: float) -> Filmset:
-        """Tracks with less noise."""
+        """The same settings with the noise of the tracks multiplied by ``level``."""
         noise = level * quality.filming.noise.level
         return quality._replace(filming=with_noise(quality.filming, noise))
 
     def least(self, quality: Filmset) -> float:
-        """The best trackers reach a noise of LEAST_NOISE_M."""
+        """The ``level`` at which the noise is LEAST_NOISE_M, that of the best trackers; at most 1."""
         return min(1.0, LEAST_NOISE_M / quality.filming.noise.level)
 
     def ideal(self, quality: Filmset) -> Filmset:
-        """No noise, and all markers visible in all frames."""
+        """The same settings without noise, and with all markers visible in all frames."""
         perfect = replace(with_noise(quality.filming, 0.0), lost=0, gap_rate=0.0)
         return quality._replace(filming=perfect)
 
     def fitted(self, recording: Recording) -> Recording:
-        """Tracks are fitted unfiltered."""
+        """The recording unchanged: tracks are fitted unfiltered."""
         return recording
 
     def simulated(self, condition: Condition, genome: Mapping[str, float], hidden: Concealed) -> Beat:
-        """A beat with the tracks of all markers."""
+        """One beat with the true tracks of all markers."""
         effects = tuple(
             Effect(name, values["strength"], {key: value for key, value in values.items() if key != "strength"})
             for name, values in hidden.items()
@@ -252,13 +259,13 @@ class WingBench(Bench[Beat, Filmset]):
     def shown(
         self, beat: Beat, condition: Condition, hidden: Concealed, quality: Filmset, rng: np.random.Generator
     ) -> Made:
-        """Film the beat."""
+        """Film the ``beat`` under ``condition``, with the faults ``hidden`` of cameras, clocks and trackers."""
         made = film(beat.tracks, self.rig, condition, quality.filming, rng, hidden, cameras=quality.cameras)
         return Made(made.recording, made.noise)
 
 
 def _law(kind: Kind, wing: Wing) -> Law:
-    """Describe an effect of the wing's plant by the same class as effects of the vehicle and faults of cameras."""
+    """Convert the description of a wing's effect to the class used for the vehicle's effects and measurement faults."""
 
     def values(parameters: Parameters) -> Mapping[str, float]:
         shape = {name: value for name, value in parameters.items() if name != "strength"}
@@ -283,46 +290,46 @@ class VehicleBench(Bench[Array, Weighing]):
 
     @property
     def physics(self) -> Mapping[str, Law]:
-        """Effects in the wings and the air, except those that the nominal model already contains."""
+        """Effects in the wings and the air that can be hidden."""
         return VEHICLE_LAWS
 
     def quality(self, rng: np.random.Generator) -> Weighing:
-        """Random balance, over BALANCE_BEATS beats."""
+        """Settings of a random balance that records BALANCE_BEATS beats."""
         return replace(draw_weighing(rng), beats=BALANCE_BEATS)
 
     def quieter(self, quality: Weighing, level: float) -> Weighing:
-        """Multiply everything that does not repeat with the beat."""
+        """The same settings with noise, drift and variation between beats multiplied by ``level``."""
         smaller = {name: level * getattr(quality, name) for name in ("sensor", "rattle", "wander", "scatter", "jitter")}
         return replace(quality, **smaller)
 
     def least(self, quality: Weighing) -> float:  # noqa: ARG002
-        """A third of the noise, which the mean over nine times as many beats would have."""
+        """1/3: the mean over nine times as many beats would have a third of the noise."""
         return 1 / 3
 
     def ideal(self, quality: Weighing) -> Weighing:
-        """No noise."""
+        """The same balance without noise, drift and variation between beats."""
         return silent(quality)
 
     def fitted(self, recording: Recording) -> Recording:
-        """Forces are low-passed at the multiple of the flap frequency used by Armanini et al. (2016), section 3.4."""
+        """Recording low-passed at the multiple of the flap frequency used by Armanini et al. (2016), section 3.4."""
         return as_fitted(CalibrationSpec(), recording)
 
     def simulated(self, condition: Condition, genome: Mapping[str, float], hidden: Concealed) -> Array:
-        """Forces [n, 2] (N) over a beat."""
+        """Forces [n, 2] along body x and z (N) over one beat."""
         terms = tuple(term for term in PROPOSED if term not in self.build.without)
         return simulate_vehicle(self.rig, genome, condition, hidden, terms=terms)
 
     def shown(
         self, beat: Array, condition: Condition, hidden: Concealed, quality: Weighing, rng: np.random.Generator
     ) -> Made:
-        """Record the forces with the balance."""
+        """Record the forces ``beat`` [n, 2] with the balance, with its faults ``hidden``."""
         made = weigh(beat, self.rig, condition, quality, rng, hidden)
         noise = self.fitted(replace(made.recording, values=made.recording.values - made.clean)).values
         return Made(made.recording, rms(noise.ravel()))
 
 
 def bench_of(build: Build) -> Bench[Beat, Filmset] | Bench[Array, Weighing]:
-    """The bench for a build."""
+    """The bench of the rig named in ``build``."""
     return VehicleBench(build) if build.rig == "vehicle" else WingBench(build)
 
 
@@ -333,7 +340,10 @@ def record_all(
     hidden: Concealed,
     seed: int,
 ) -> Iterator[Recording]:
-    """A recording under each of ``conditions``, all with the same settings; the same seed gives the same bits."""
+    """Yield a recording under each of ``conditions``, all with the same settings of cameras or balance.
+
+    The same ``seed`` gives bit-identical recordings.
+    """
     quality = bench.quality(np.random.default_rng([seed, 2]))
     for number, condition in enumerate(conditions):
         made = bench.recording(condition, genome, hidden, quality, np.random.default_rng([seed, 3, number]))

@@ -1,9 +1,10 @@
-"""Two general methods on the same trials: sparse regression of the residual, and a Gaussian process.
+"""Two general methods on the same blind trials, for comparison: sparse regression of the residual, Gaussian process.
 
-Both get what a diagnosis starts from: the residual of the refitted nominal model, and the change that each effect of
-the library makes to the recordings. pysindy (de Silva et al. 2020; Kaptanoglu et al. 2022) is used as documented:
-sequentially thresholded least squares with a cross-validated threshold. scikit-learn's Gaussian process models the
-discrepancy (Kennedy and O'Hagan 2001): it can detect and predict missing physics, but not name it.
+Both get the input of a diagnosis: the residual of the refitted nominal model, and the change that each effect of the
+library (the effects that a diagnosis can name) makes to the recordings. pysindy (de Silva et al. 2020; Kaptanoglu et
+al. 2022) is used as documented: sequentially thresholded least squares with a cross-validated threshold. scikit-learn's
+Gaussian process models the discrepancy (Kennedy and O'Hagan 2001): it can detect and predict missing physics, but not
+name it.
 """
 
 from __future__ import annotations
@@ -38,7 +39,11 @@ ROUNDS = 2  # of the refit; each computes a new Jacobian
 
 @dataclass(frozen=True)
 class PeerOutcome:
-    """Result of a comparison method: effects with weights, largest first, and RMS held-out misfit, m or N."""
+    """Result of a comparison method (``peer``) on one trial.
+
+    ``detected``: whether it found missing physics; ``named``: effects with non-zero weights, largest first; ``before``,
+    ``after``: RMS misfit to the held-out recordings without and with its correction, m or N.
+    """
 
     peer: str
     trial: str
@@ -53,9 +58,14 @@ class PeerOutcome:
 class Material:
     """Input of the comparison methods.
 
-    Residuals [D] of the fitted and [H] of the held-out recordings, and features [D, E], [H, E] of the suspected
-    effects, all projected on the complement of what the nominal genes can change. ``owner`` [D] is the number of each
-    sample's recording, ``names`` [E] the effect of each feature.
+    Attributes:
+        residual: [D] of the refitted nominal model at all D samples of the fitted recordings, m or N.
+        features: [D, E] change of these samples by each of E effects. Both are projected on the orthogonal complement
+            of the changes that the nominal model's parameters can make.
+        owner: [D] number of each sample's recording.
+        names: [E] effect of each feature.
+        left_out, left_out_features: [H], [H, E] the same for the held-out recordings, not projected.
+        places, left_out_places: [D, 8], [H, 8] phase, channel and condition of each sample, as from :func:`_places`.
     """
 
     residual: Array
@@ -69,7 +79,7 @@ class Material:
 
 
 def run(task: Task) -> tuple[PeerOutcome, PeerOutcome]:
-    """Run both methods on a dataset, in this process."""
+    """Results of sparse regression and Gaussian process on the dataset of ``task``, computed in this process."""
     material, start = gathered(task), time.perf_counter()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # optimisers that reach their last iteration
@@ -80,7 +90,7 @@ def run(task: Task) -> tuple[PeerOutcome, PeerOutcome]:
 
 
 def gathered(task: Task) -> Material:
-    """Refit the nominal model, and compute residuals and features."""
+    """Refit the nominal model to the dataset of ``task``, and compute the input of both methods."""
     dataset = load_dataset(task.dataset)
     spec = CalibrationSpec(without=task.without)
     spec = replace(spec, division=task.division) if task.division else spec
@@ -118,7 +128,11 @@ def gathered(task: Task) -> Material:
 def features(
     refit: Refit, suspects: tuple[Suspect, ...], recordings: tuple[Recording, ...]
 ) -> tuple[tuple[str, ...], Array]:
-    """Change [D, E] of the recordings (fitted ones first) per size parameter, and the suspect of each column."""
+    """Features of the suspected effects: effect name of each column, and the columns [D, E].
+
+    A column is the change of all recorded values (fitted recordings first, m or N) by NUDGE times the typical value of
+    one of the effect's size parameters. Effects that cannot be simulated are omitted.
+    """
     ordered = (*refit.recordings, *(one for one in recordings if one.name not in {r.name for r in refit.recordings}))
     names, columns = [], []
     for suspect in suspects:
@@ -139,7 +153,7 @@ def features(
 
 
 def _places(recording: Recording) -> Array:
-    """Coordinates [T C, 8] of every sample: phase, channel and condition."""
+    """Input coordinates [T C, 8] of the Gaussian process at each of T times C samples: phase, channel and condition."""
     condition, channels = recording.condition, recording.values.shape[1]
     angle = 2 * np.pi * condition.flap_frequency * recording.times
     when = np.stack([np.cos(angle), np.sin(angle)], axis=1)
@@ -154,7 +168,10 @@ def _places(recording: Recording) -> Array:
 
 
 def sparse_regression(trial: str, material: Material) -> PeerOutcome:
-    """Sequentially thresholded least squares; the threshold is chosen by leave-one-recording-out prediction."""
+    """Fit the residual by sequentially thresholded least squares on the features (pysindy).
+
+    The threshold is chosen by cross-validation, leaving one recording out at a time.
+    """
     norms = np.linalg.norm(material.features, axis=0)
     usable = norms > 1e-3 * norms.max()
     names = [name for name, use in zip(material.names, usable, strict=True) if use]
@@ -185,7 +202,7 @@ def _thresholded(x: Array, y: Array, threshold: float) -> Array:
 
 
 def gaussian_process(trial: str, material: Material) -> PeerOutcome:
-    """Gaussian process over phase, channel and condition; "detected" if it improves the BIC."""
+    """Fit the residual by a Gaussian process of phase, channel and condition; "detected" if that improves the BIC."""
     rng = np.random.default_rng(len(material.residual))
     some = rng.permutation(len(material.residual))[:POINTS]
     size = rms(material.residual) or 1.0
@@ -202,7 +219,7 @@ def gaussian_process(trial: str, material: Material) -> PeerOutcome:
 
 
 def mark(outcome: PeerOutcome, answer: Answer) -> Mark:
-    """Score a comparison method as the diagnosis is scored."""
+    """Score the result of a comparison method by the same rules as a diagnosis."""
     verdict = "adequate" if not outcome.detected else "named" if outcome.named else "unnamed"
     plain = replace(blank(answer, verdict), alarm=outcome.detected, named=outcome.named, top=outcome.named[:1])
     held_out, worse = outcome.after / answer.noise_held_out, outcome.after > WORSE * outcome.before

@@ -1,8 +1,8 @@
-"""Record the trials: simulate and record each plant, save the dataset for the diagnosis, and seal the answer.
+"""Make the blind trials: simulate and record a rig, save the dataset for the diagnosis, and seal the answer.
 
 Parameters of the rig, conditions, recording quality and the shape of the hidden effect are drawn at random. The
-strength of the effect is searched, so that the scorer's refit of the nominal model leaves the misfit aimed at. The same
-trial always gives the same bits.
+strength of the effect is chosen such that the refitted nominal model (:mod:`.strength`) keeps the intended misfit. The
+same trial always gives bit-identical data.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ LITTLE = 0.85  # fraction of the target d below which the noise is lowered, as f
 
 @dataclass(frozen=True)
 class Order:
-    """A trial to be recorded, the path of its dataset, and the folder for its sealed answer."""
+    """A trial to be recorded, the path for its ``dataset``, and the folder ``sealed`` for its answer."""
 
     trial: Trial
     dataset: Path
@@ -43,9 +43,9 @@ class Order:
 
 @dataclass(frozen=True)
 class Addition:
-    """One more recording of a trial's rig under ``condition``.
+    """Request for one more recording of a trial's rig, under ``condition``.
 
-    The path of its dataset, and that of the extended dataset.
+    Paths: ``dataset`` of the trial; ``longer``, the extended dataset to be written; ``sealed``, the folder of answers.
     """
 
     trial: Trial
@@ -57,9 +57,11 @@ class Addition:
 
 @dataclass(frozen=True, eq=False)
 class Specimen:
-    """A rig on its bench with everything that determines its recordings.
+    """A simulated rig on its bench with everything that determines its recordings.
 
-    ``level`` multiplies the noise that was drawn. An ``ideal`` specimen is recorded without noise and without gaps.
+    ``genome``: true parameters of the rig; ``hidden``: the hidden effects. Random numbers follow from ``seed`` and
+    ``attempt``. ``level`` multiplies the noise that was drawn. An ``ideal`` specimen is recorded without noise and
+    gaps.
     """
 
     bench: Bench[Any, Any]
@@ -78,11 +80,11 @@ class Specimen:
 
     @property
     def least_level(self) -> float:
-        """Smallest possible ``level``."""
+        """Smallest ``level`` of the noise that real equipment reaches."""
         return self.bench.least(replace(self, level=1.0, ideal=False).quality)
 
     def made(self, number: int, condition: Condition) -> Made:
-        """Recording ``number``, under ``condition``."""
+        """Simulate the recording with this ``number`` in the dataset, under ``condition``."""
         rng = np.random.default_rng([self.seed, self.attempt, 3, number])
         found = self.bench.recording(condition, self.genome, self.hidden, self.quality, rng)
         return found._replace(recording=replace(found.recording, name=name_of(condition)))
@@ -117,7 +119,7 @@ class Specimen:
 
 
 def make(order: Order) -> str:
-    """Record a trial, save its dataset and seal its answer; returns the SHA-256 of the answer.
+    """Record a trial, save its dataset and its answer; returns the SHA-256 of the answer.
 
     RuntimeError if the plant cannot be simulated in any of ATTEMPTS draws.
     """
@@ -183,11 +185,18 @@ def _made(trial: Trial, attempt: int) -> tuple[Dataset, Answer]:
 
 @dataclass(frozen=True, eq=False)
 class Strength:
-    """Residuals of the refitted nominal model when something is hidden in a bare specimen, under the fitted conditions.
+    """Finds the strength of a hidden effect at which the refitted nominal model has a given misfit.
 
     The change due to a hidden effect is simulated with the discretisation of the model, which is cheaper and gives the
-    same change. A strength is searched first with the model linearised at the true genome, then by full refits.
-    ``ends`` caches RMS residual and genes at the end of each full refit; later refits can start from them.
+    same change. A strength is searched first with the model linearised at the true parameters, then by full refits.
+
+    Attributes:
+        bare: the specimen without hidden effects, recorded without noise; ``coarse``: discretised like the model.
+        conditions: of the fitted recordings.
+        refit: refits the nominal model to these recordings.
+        plain: [D] all values recorded from ``coarse``, m or N.
+        changes: cache of :meth:`change`.
+        ends: cache of RMS residual (m or N) and parameters at the end of each full refit; later refits start from them.
     """
 
     bare: Specimen
@@ -200,7 +209,7 @@ class Strength:
 
     @classmethod
     def of(cls, bare: Specimen, fitted: Sequence[Condition]) -> Strength:
-        """Set up for ``bare``, with the nominal model at its own true genome."""
+        """Set up for the specimen ``bare`` under the conditions ``fitted``; the model starts at the true parameters."""
         ideal = replace(bare, ideal=True)
         coarse = replace(ideal, bench=bare.bench.coarse())
         recordings = ideal.fitted(fitted)
@@ -209,16 +218,16 @@ class Strength:
         return cls(ideal, tuple(fitted), refit, coarse, plain)
 
     def change(self, hidden: Concealed) -> Array:
-        """[D] change of all recordings due to ``hidden``, cached."""
+        """[D] change of all recorded values (m or N) due to the effects ``hidden``, cached."""
         key = _key(hidden)
         if key not in self.changes:
             self.changes[key] = stacked(replace(self.coarse, hidden=hidden).fitted(self.conditions)) - self.plain
         return self.changes[key]
 
     def set(self, bare: Specimen, drawn: Concealed, target: float) -> Specimen:
-        """The specimen with each effect of ``drawn`` at strength d = ``target``.
+        """The specimen ``bare`` with each effect of ``drawn`` at the strength where misfit / noise is ``target``.
 
-        Its noise is lowered if that is not reached.
+        If no allowed strength reaches it, the noise is lowered.
         """
         hidden, level, noise = {}, bare.level, bare.noise(self.conditions)
         for name, parameters in drawn.items():
@@ -230,7 +239,7 @@ class Strength:
     def _sized(
         self, name: str, parameters: Mapping[str, float], target: float, noise: float
     ) -> tuple[dict[str, float], float]:
-        """Parameters with the strength whose refit leaves ``target`` times the noise, and the ratio that is reached."""
+        """Parameters with the strength at which misfit / ``noise`` after a refit is near ``target``, and that ratio."""
 
         def sized(size: float) -> dict[str, float]:
             return {**parameters, "strength": size * parameters["strength"]}
@@ -252,7 +261,7 @@ class Strength:
         return sized(size), found
 
     def final(self, specimen: Specimen) -> float:
-        """RMS residual of a full refit with everything hidden in ``specimen``, m or N.
+        """RMS residual (m or N) of a full refit with all effects hidden in ``specimen``; 0 if there are none.
 
         For a single effect it is cached.
         """
@@ -267,7 +276,7 @@ class Strength:
         return self.ends[_key(hidden)][0]
 
     def division(self) -> float:
-        """RMS residual of the linearised refit with nothing hidden, m or N: the effect of discretisation and solver.
+        """RMS misfit (m or N) with nothing hidden, after a linearised refit: error of discretisation and solver.
 
         With equal discretisation only the solvers differ; that difference is small and is not refitted.
         """

@@ -1,4 +1,4 @@
-"""The diagnosis as a user runs it: a dataset on disk goes in, a finding comes out. No answer is known here."""
+"""Runs the diagnosis as a user would: dataset on disk in, finding out. This module has no access to the answers."""
 
 from __future__ import annotations
 
@@ -16,7 +16,11 @@ from wingfit.workers import make_evaluator
 
 @dataclass(frozen=True)
 class Task:
-    """A request: a dataset, the division of a wing's model, the terms that a vehicle's model leaves out, thresholds."""
+    """A diagnosis to run.
+
+    ``dataset``: path; ``division``: discretisation of a wing's model, "" for a vehicle; ``without``: force terms that a
+    vehicle's model omits; ``policy``: thresholds of the diagnosis.
+    """
 
     trial: str
     dataset: Path
@@ -36,7 +40,7 @@ class Outcome:
 
 
 def run(task: Task) -> Outcome:
-    """Diagnose in this process. An exception of the diagnosis becomes the ``reason``."""
+    """Run the diagnosis ``task`` in this process. An exception in it becomes the ``reason`` of the outcome."""
     start, finding, reason = time.perf_counter(), None, ""
     calibration = CalibrationSpec(without=task.without)
     if task.division:

@@ -21,9 +21,9 @@ class Mark:
     """Score of one trial. Entries that do not apply to a trial are None.
 
     Attributes:
-        trial, group, rig: as in the answer.
+        trial, group, rig: as in :class:`.answer.Answer`.
         truth: names of the hidden effects.
-        target, strength: d aimed at, and d measured by the scorer's refit.
+        target, strength: misfit / noise of the hidden effect that was aimed at, and that a refit measured.
         verdict, named: as in the finding; "failed" if the diagnosis gave none.
         top: effects of the most probable hypothesis other than the nominal model.
         alarm: the verdict is not "adequate".
@@ -32,10 +32,12 @@ class Mark:
         wrong: the verdict names an effect that was not hidden.
         side: physics or measurement, according to the verdict; None if it does not decide.
         right_side: whether that is correct.
-        held_out: misfit / noise on held-out recordings; worse: larger than with the refitted nominal model.
-        span, chord, phase: distance from the true place, in units of R and c, and in degrees.
-        covered, intervals: number of 90 % intervals that contain the truth, and number of intervals.
+        held_out: misfit / noise on held-out recordings; worse: whether the misfit is larger than with the refitted
+            nominal model.
+        span, chord, phase: distance of the reported from the true place, in spans, chords and degrees of the beat.
+        covered, intervals: number of 90 % intervals that contain the true value, and number of intervals.
         finer, division, plant: as in the answer.
+        seconds: duration of the diagnosis.
         remark: why there is no finding, or other notes for the list of failures.
     """
 
@@ -70,7 +72,7 @@ class Mark:
 
 
 def blank(answer: Answer, verdict: str, remark: str = "") -> Mark:
-    """A score with the entries of the answer, and everything else counted as missed."""
+    """A score with the entries of the answer; all that the diagnosis should have found counts as missed."""
     missed = bool(answer.secrets)
     return Mark(
         trial=answer.trial,
@@ -102,7 +104,7 @@ def failed(answer: Answer, remark: str) -> Mark:
 
 
 def mark(finding: Finding, answer: Answer) -> Mark:
-    """Score a finding."""
+    """Score a finding of the diagnosis against the answer of its trial."""
     top = tuple(leading.effects) if (leading := _leading(finding)) else ()
     named = finding.named if finding.verdict in NAMING else ()
     credited = set(named or top)
@@ -134,7 +136,7 @@ def _leading(finding: Finding) -> Hypothesis | None:
 
 
 def _side(finding: Finding) -> Side | None:
-    """The side that a verdict takes; an ambiguous verdict takes one if all effects of its set are on that side."""
+    """The side ("physics" or "measurement") of all effects that the verdict names; None if it names none or both."""
     if finding.verdict not in (*NAMING, "ambiguous") or not finding.named:
         return None
     sides = {side_of(name) for name in finding.named}
@@ -148,7 +150,9 @@ def side_of(effect: str) -> Side:
 
 
 def _proof(finding: Finding, answer: Answer) -> tuple[float | None, bool | None]:
-    """Held-out misfit / noise, and whether the misfit is worse than that of the refitted nominal model.
+    """Held-out misfit / noise, and whether the misfit exceeds WORSE times that of the refitted nominal model.
+
+    (None, None) without held-out recordings.
 
     Only the noise that was added to these recordings counts as noise, not the error of the first discretisation: a
     diagnosis may choose a finer one.
@@ -196,7 +200,10 @@ def _holds(gene: GeneValue, true: float) -> bool | None:
 
 
 def _distances(finding: Finding, answer: Answer) -> tuple[float | None, float | None, float | None]:
-    """Distances (span, chord, phase) between reported and true place; infinite if no place is reported."""
+    """Distances along span, chord (fractions) and beat (degrees) between reported and true place of the hidden effect.
+
+    Each is infinite if no place is reported, and None if there is no true one.
+    """
     where = finding.where
     span = _place(finding, answer, "station") or (where.span if where else None)
     chord = _place(finding, answer, "chord") or (where.chord if where else None)
@@ -209,7 +216,7 @@ def _distances(finding: Finding, answer: Answer) -> tuple[float | None, float | 
 
 
 def _place(finding: Finding, answer: Answer, parameter: str) -> Interval | None:
-    """The place according to a gene of the named effect, if it has such a gene."""
+    """Estimated value of the gene ``parameter`` ("station", "chord") of the hidden effect; None if it is not named."""
     secret = answer.secrets[0]
     if finding.verdict not in NAMING or secret.name not in finding.named:
         return None
@@ -226,5 +233,5 @@ def _apart(
 
 
 def beats_apart(a: float, b: float) -> float:
-    """Distance of two phases, in beats, at most 0.5."""
+    """Distance of two phases ``a``, ``b`` (beats) on the cycle, at most 0.5 beats."""
     return abs((a - b + 0.5) % 1.0 - 0.5)

@@ -1,6 +1,7 @@
-"""Sealed answers: one file each, with their hashes in a manifest that is closed before the first diagnosis.
+"""Sealed answers of the blind trials: proof that the answers did not change after the first diagnosis.
 
-Each file contains a random number too, so that an answer cannot be found by hashing guesses.
+Each answer is a JSON file; a manifest holds the SHA-256 of all files, and its own hash is printed before the first
+diagnosis. Each file contains a random number too, so that an answer cannot be found by hashing guesses.
 """
 
 from __future__ import annotations
@@ -36,9 +37,9 @@ def digest(text: str) -> str:
 
 
 def close(hashes: Mapping[str, str], folder: Path) -> str:
-    """Write the manifest of all hashes and return its own hash, which is printed before the diagnosis.
+    """Write the manifest of ``hashes`` (by trial) into ``folder``, and return its own SHA-256.
 
-    BrokenSealError if the folder was closed before and an answer has changed since.
+    BrokenSealError if the folder already has a manifest with another hash for one of these trials.
     """
     path = folder / MANIFEST
     before = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
@@ -50,10 +51,10 @@ def close(hashes: Mapping[str, str], folder: Path) -> str:
 
 
 def open_seal(trial: str, folder: Path, manifest: str) -> Answer:
-    """The answer of ``trial``.
+    """The answer of ``trial``, read from ``folder``.
 
-    BrokenSealError if the answer does not match the manifest in ``folder``, or that does not match the hash
-    ``manifest``.
+    BrokenSealError if the answer's hash differs from that in the folder's manifest, or the manifest's own hash from
+    ``manifest``, which :func:`close` returned.
     """
     listed = (folder / MANIFEST).read_text(encoding="utf-8")
     if digest(listed) != manifest:
@@ -70,5 +71,5 @@ def open_seal(trial: str, folder: Path, manifest: str) -> Answer:
 
 
 def read(path: Path) -> Answer:
-    """An answer for the plant's own use, to record its rig again."""
+    """The answer in the file ``path``, without a check; for simulating further recordings of the same rig."""
     return Answer.from_json(json.loads(path.read_text(encoding="utf-8"))["answer"])

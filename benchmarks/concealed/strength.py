@@ -1,6 +1,9 @@
-"""Strength d of a hidden effect: misfit after the best refit of the nominal model, divided by the noise.
+"""Measures the strength d of a hidden effect: RMS misfit after the best refit of the nominal model / RMS noise.
 
-The scorer's own refit, of noise-free data. It shares nothing with the diagnosis.
+The refit is of noise-free data and independent of the code of the diagnosis.
+
+Arrays: D recorded values of all recordings, F refitted genes (model parameters), B individuals (sets of genes). Unit
+coordinates run from 0 to 1 over a gene's range.
 """
 
 from __future__ import annotations
@@ -56,7 +59,7 @@ class Refit:
         return np.array([float(gene.to_unit(self.start[gene.name])) for gene in self.genes])
 
     def observed(self, units: Array, recordings: Sequence[Recording]) -> Array:
-        """Recorded values [B, D] of individuals [B, F] (unit coordinates).
+        """Simulated values [B, D] (m or N) of ``recordings`` for the individuals ``units`` [B, F] (unit coordinates).
 
         NaN for an individual that cannot be simulated.
         """
@@ -76,12 +79,12 @@ class Refit:
 
     @cached_property
     def nominal(self) -> Array:
-        """[D] at the true values; RuntimeError if they cannot be simulated."""
+        """Simulated values [D] of all recordings at the true genes; RuntimeError if they cannot be simulated."""
         return np.asarray(_whole(self.observed(self.unit[None], self.recordings))[0])
 
     @cached_property
     def tangent(self) -> Array:
-        """Jacobian [D, F] at the true values."""
+        """Jacobian [D, F] of the simulated values by the unit coordinates, at the true genes."""
         return self.tangent_at(self.unit, self.recordings)
 
     def tangent_at(self, unit: Array, recordings: Sequence[Recording]) -> Array:
@@ -94,16 +97,16 @@ class Refit:
         return np.asarray(((seen[:n] - seen[n:]) / width[:, None]).T)
 
     def _slopes(self, unit: Array, recordings: Sequence[Recording], seen: Array) -> Array:
-        """Jacobian [D, F] by one-sided differences from the values ``seen`` [D] at ``unit``.
+        """Jacobian [D, F] at ``unit`` by one-sided differences from the simulated values ``seen`` [D] there.
 
-        Accurate enough for steps.
+        Less accurate than :meth:`tangent_at`, but sufficient for Gauss-Newton steps.
         """
         sign = np.where(unit > 1.0 - STEP, -1.0, 1.0)
         around = self.observed(unit + STEP * np.diag(sign), recordings)
         return np.asarray(((_whole(around) - seen) * sign[:, None] / STEP).T)
 
     def linear(self, change: Array) -> float:
-        """RMS residual of a linearised refit to a change [D] of the recordings, genes within their ranges.
+        """RMS residual (m or N) of a linearised refit to a ``change`` [D] of the recordings, genes within their ranges.
 
         It needs no simulation once the Jacobian is known.
         """
@@ -112,7 +115,7 @@ class Refit:
         return rms(slopes @ _bounded(slopes, -change[known], self.unit, 0.0) - change[known])
 
     def full(self, change: Array, *, rounds: int = 1, near: Sequence[Array] = ()) -> tuple[float, Array]:
-        """RMS residual of a full refit, and the genes [F] (unit coordinates) where it ends.
+        """RMS residual (m or N) of a full, nonlinear refit, and the genes [F] (unit coordinates) where it ends.
 
         The data are the nominal model's own values plus ``change``, so a coarse discretisation of the model has no
         influence. The refit starts from the best of the true values and all ``near`` [F].
@@ -163,12 +166,15 @@ class Refit:
 
 
 def _left(residual: Array, known: npt.NDArray[np.bool_]) -> float:
-    """RMS residual; infinite for an individual that could not be simulated."""
+    """RMS of ``residual`` [D]; infinite for an individual that could not be simulated.
+
+    ``known`` [D]: mask of the samples that were recorded.
+    """
     return rms(residual) if np.isfinite(residual[known]).all() else math.inf
 
 
 def _order(residuals: Array, known: npt.NDArray[np.bool_]) -> list[int]:
-    """Rows of ``residuals`` that could be simulated, smallest RMS first."""
+    """Row numbers of ``residuals`` [B, D] that could be simulated, smallest RMS first."""
     left = [_left(one, known) for one in residuals]
     return [int(k) for k in np.argsort(left) if left[k] < math.inf]
 
@@ -198,7 +204,7 @@ def _bounded(slopes: Array, residual: Array, unit: Array, damping: float) -> Arr
 
 
 def with_values(recordings: Sequence[Recording], values: Array) -> tuple[Recording, ...]:
-    """The recordings with the values [D] in place of their own."""
+    """Copies of the recordings with ``values`` [D] in place of their own; the inverse of :func:`stacked`."""
     ends = np.cumsum([one.values.size for one in recordings])[:-1]
     parts = np.split(values, ends)
     return tuple(
@@ -222,9 +228,9 @@ def strength_for(
 ) -> tuple[float, float]:
     """The strength at which ``misfit`` is near ``target``, and the misfit there, by a secant method in logarithms.
 
-    If the limits exclude it, the limit is returned; if the misfit does not depend on the strength, the largest
-    strength. An ArithmeticError of ``misfit`` means that the rig cannot be simulated at that strength, and the step is
-    halved; one at ``start`` is passed on.
+    ``start``: first strength; ``limits``: smallest and largest strength, of which one is returned if ``target`` lies
+    beyond it; ``tries``: number of secant steps. An ArithmeticError of ``misfit`` means that the rig cannot be
+    simulated at that strength, and the step is halved; one at ``start`` is passed on.
     """
     low, high = limits
     at = min(max(start, low), high)

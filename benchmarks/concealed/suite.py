@@ -1,7 +1,7 @@
-"""The whole suite: record and seal, diagnose, record the advised conditions, open the answers, score.
+"""Runs the whole blind test: make datasets and answers, diagnose, follow the advice, compare with the answers, score.
 
-Recording and diagnosing run in different processes. The first phase is complete, with the manifest of hashes closed and
-its own hash printed, before the second begins.
+Datasets are made and diagnosed in different processes. All answers are complete, and the hash of their manifest is
+printed, before the first diagnosis begins.
 """
 
 from __future__ import annotations
@@ -99,9 +99,10 @@ def each(
     label: str,
     keep: Callable[[Out], None] | None = None,
 ) -> list[Out]:
-    """Results in the order of ``items``; progress and remaining time go to standard error.
+    """Call ``work`` on each of ``items`` in parallel; returns the results in the order of ``items``.
 
-    ``keep`` is called with each result as soon as it is there.
+    ``keep`` is called with each result as soon as it is available. Progress and remaining time, under the name
+    ``label``, go to standard error.
     """
     start, running = time.monotonic(), [executor.submit(work, item) for item in items]
     done: set[Future[Out]] = set()
@@ -114,7 +115,7 @@ def each(
 
 
 def make(trials: Sequence[Trial], folders: Folders, jobs: int) -> str:
-    """Record the datasets and seal the answers; returns the hash of the manifest.
+    """Make the datasets and answers of ``trials``, in ``jobs`` processes; returns the hash of the answers' manifest.
 
     Trials that the folder already holds, made with the same seed, are not made again.
     """
@@ -145,7 +146,10 @@ def _made(trial: Trial, folders: Folders) -> bool:
 
 
 def conduct(trials: Sequence[Trial], root: Path, jobs: int, *, peers: bool = False) -> dict[str, Table]:
-    """Run the suite in the folder ``root``; one table per method, that of the diagnosis first."""
+    """Run the whole test in the folder ``root``, with ``jobs`` processes.
+
+    Returns the scores by method: "wingfit", the diagnosis, first, then with ``peers`` the comparison methods.
+    """
     start, folders = time.perf_counter(), Folders(root)
     folders.findings.mkdir(parents=True, exist_ok=True)
     manifest = make(trials, folders, jobs)
@@ -168,7 +172,7 @@ def conduct(trials: Sequence[Trial], root: Path, jobs: int, *, peers: bool = Fal
 
 
 def _peers(trials: Sequence[Trial], folders: Folders, jobs: int) -> dict[str, list[PeerOutcome]]:
-    """Results of the comparison methods on the same datasets."""
+    """Results of the comparison methods on the same datasets, by method, in the order of ``trials``."""
     from benchmarks.concealed.peers import run as run_peers  # needs the extra [peers]
 
     folders.peers.mkdir(exist_ok=True)
@@ -205,7 +209,10 @@ def _table_of_peer(outcomes: Sequence[PeerOutcome], answers: Mapping[str, Answer
 
 
 def diagnosed(tool: Executor, labelled: Sequence[tuple[Trial, str]], folders: Folders, what: str) -> list[Outcome]:
-    """Diagnose the datasets with these labels and store the findings."""
+    """Diagnose the datasets of (trial, label) pairs and store the findings; returns the outcomes in the same order.
+
+    ``what`` names the step in the progress display. Findings of an earlier run are used again.
+    """
     tasks = [task(trial, label, folders) for trial, label in labelled]
     stored = {one.trial: found for one in tasks if (found := _stored(one, folders)) is not None}
 
@@ -236,7 +243,7 @@ def _stored(request: Task, folders: Folders) -> Outcome | None:
 
 
 def task(trial: Trial, label: str, folders: Folders) -> Task:
-    """What the user of a trial's rig knows."""
+    """The diagnosis request for the dataset ``label`` of a trial: only what a user would know, without the answer."""
     build = trial.build
     return Task(label, folders.dataset(label), build.division, build.without)
 
@@ -252,7 +259,8 @@ def follow_up(
 ) -> dict[str, Outcome]:
     """Record each rig once more, under the advised and under a random condition, and diagnose again.
 
-    Outcomes by label.
+    ``first``: outcomes of the first diagnoses by trial. Returns the new outcomes by label, ``TRIAL-advised`` and
+    ``TRIAL-random``.
     """
     wanted = [
         (trial, label, condition)

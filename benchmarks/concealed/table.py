@@ -1,4 +1,4 @@
-"""All scores in one table, with counts and Wilson intervals, and the figures of the JSON object."""
+"""Summary of the scores of all blind trials: rates with counts and Wilson intervals, as a table and as JSON."""
 
 from __future__ import annotations
 
@@ -47,18 +47,18 @@ class Rate:
 
 
 def rate(marks: Iterable[Mark], good: Callable[[Mark], bool | None]) -> Rate:
-    """Rate of the scores that are ``good``, among those for which ``good`` is not None."""
+    """Rate of the scores for which ``good`` returns True, among those for which it does not return None."""
     known = [bool(found) for one in marks if (found := good(one)) is not None]
     return Rate(sum(known), len(known))
 
 
 def of(marks: Iterable[Mark], group: str) -> list[Mark]:
-    """Scores of one group of trials."""
+    """Those of ``marks`` that belong to one group of trials."""
     return [one for one in marks if one.group == group]
 
 
 def at(marks: Iterable[Mark], d: int) -> list[Mark]:
-    """Scores whose strength lies in bin ``d``."""
+    """Those of ``marks`` whose strength (misfit / noise) lies in the bin ``d`` of BINS."""
     low, high = BINS[d]
     return [one for one in marks if low <= one.strength < high]
 
@@ -70,11 +70,14 @@ def seen(marks: Iterable[Mark]) -> list[Mark]:
 
 @dataclass(frozen=True)
 class Advised:
-    """An ambiguous trial, and whether one more recording resolved it.
+    """A trial whose first diagnosis was ambiguous, and whether one more recording resolved it.
 
-    Under the advised condition, and under a random one.
-
-    ``verdict`` is that of the first diagnosis; ``advice`` is the advised condition, None if none was advised.
+    Attributes:
+        truth: names of the hidden effects.
+        verdict, named: of the first diagnosis.
+        advice: the recording that it recommended, in words; None if it recommended none.
+        resolved: whether the diagnosis named the truth after that recording.
+        by_chance: the same after a recording under a random condition.
     """
 
     trial: str
@@ -88,9 +91,10 @@ class Advised:
 
 @dataclass(frozen=True)
 class Table:
-    """All scores.
+    """All scores of one method.
 
-    ``advised`` holds the ambiguous trials only, out of ``advice_trials`` trials that were made to be ambiguous.
+    ``marks``: one score per trial; ``advised``: trials whose first diagnosis was ambiguous; ``advice_trials``: number
+    of trials that were designed to be ambiguous; ``seconds``: duration of the whole test.
     """
 
     marks: tuple[Mark, ...]
@@ -100,7 +104,7 @@ class Table:
 
     @property
     def rates(self) -> dict[str, Rate]:
-        """Every rate by its name."""
+        """Every rate of the table, by its name there."""
         listed, unlisted = of(self.marks, "listed"), seen(of(self.marks, "unlisted"))
         return {
             "null: false alarms": rate(of(self.marks, "null"), lambda m: m.alarm),
@@ -166,7 +170,7 @@ class Table:
         ]
 
     def as_json(self) -> dict[str, Any]:
-        """The figures under the names documented in docs/concealed.md."""
+        """The figures of the JSON output, under the names documented in docs/concealed.md."""
         rates, marks = self.rates, self.marks
         return {
             "null": {"n": len(of(marks, "null")), "false_alarms": rates["null: false alarms"].hits},
@@ -210,7 +214,7 @@ class Table:
         }
 
     def rows(self) -> dict[str, str]:
-        """The table for readers: each figure by its name."""
+        """The rows of the printed table: value as text by name of the row."""
         figures = self.as_json()
         place = figures["place"]
         return {
@@ -225,7 +229,7 @@ class Table:
 
 
 def side_by_side(tables: Mapping[str, Table]) -> str:
-    """Tables of several methods in columns, under the names of the methods."""
+    """The printed text of the tables of several methods, one column per method, headed by its name."""
     columns = {name: table.rows() for name, table in tables.items()}
     names = dict.fromkeys(row for column in columns.values() for row in column)
     lines = [["", *columns], *([name, *(column.get(name, "") for column in columns.values())] for name in names)]
@@ -256,7 +260,7 @@ def wrongs(one: Mark) -> str:
 
 
 def of_rig(one: Mark) -> str:
-    """The rig of a trial with the discretisations of model and plant."""
+    """Label of a trial's rig with the discretisations of model and plant, such as "wing 4 of 8x1"."""
     return f"{one.rig} {one.division} of {one.plant}".removesuffix("  of ")
 
 

@@ -1,4 +1,4 @@
-"""The plan of the trials: what is hidden in which rig, how strongly, and under which conditions it is recorded."""
+"""The plan of the blind trials: which effect is hidden in which rig, how strongly, and the conditions of recordings."""
 
 from __future__ import annotations
 
@@ -36,10 +36,10 @@ FLIGHT = (
 
 @dataclass(frozen=True)
 class Build:
-    """A rig, with the discretisations of model and plant.
+    """A rig, with the discretisations of the diagnosed model and of the plant (the simulator that makes the data).
 
-    "wing" has the ``division`` of the model and that of the ``plant``; for "vehicle" both are "". ``without`` names
-    terms that neither the vehicle's model nor its plant has, in addition to what is hidden.
+    ``division`` (model) and ``plant``: bodies of the wing, as "8x4"; both "" for a vehicle. ``without``: force terms
+    omitted both from the vehicle's model and from its plant, in addition to what is hidden.
     """
 
     rig: Literal["wing", "vehicle"]
@@ -65,10 +65,10 @@ class Trial:
 
     Attributes:
         name: does not reveal what is hidden.
-        group: the group it is counted in.
+        group: the group it is counted in, such as "null" (nothing hidden) or "pairs" (two effects hidden).
         build: rig, model and plant.
-        hidden: names of the hidden effects, as the plants call them; empty in a null trial.
-        target: strength d aimed at, of each hidden effect.
+        hidden: names of the hidden effects in the plant; empty in a null trial.
+        target: intended strength of each hidden effect, misfit / noise after the nominal model is refitted.
         poor: whether its conditions are few and similar, so that several effects may explain the data.
         seed: of everything that is drawn for this trial.
     """
@@ -130,9 +130,9 @@ QUICK_KINDS = 3  # the quick sample contains every third of the listed and of th
 
 
 def plan(seed: int, *, quick: bool = False, only: Sequence[str] = ()) -> tuple[Trial, ...]:
-    """All trials of a suite; neither their order nor their names reveal anything.
+    """All trials of a test in random order, with names that reveal nothing; the same ``seed`` gives the same trials.
 
-    The same seed gives the same trials.
+    ``quick``: a small sample; ``only``: names of the groups to include, all if empty.
     """
     counts = QUICK if quick else COUNTS
     thinned = QUICK_KINDS if quick else 1
@@ -143,9 +143,9 @@ def plan(seed: int, *, quick: bool = False, only: Sequence[str] = ()) -> tuple[T
 
 
 def _group(group: Group, n: int, thinned: int) -> Iterator[Trial]:
-    """Unnamed trials of a group.
+    """The trials of a group, still without name and seed.
 
-    ``n`` in all or, for listed and unlisted effects, ``n`` of each ``thinned``-th effect.
+    ``n`` trials in all; for groups "listed" and "unlisted", ``n`` trials of every ``thinned``-th effect.
     """
     if group == "null":
         builds = [one for pair in zip((*SMALL, ELEVEN_FINER), cycle(VEHICLES), strict=False) for one in pair]
@@ -171,7 +171,7 @@ def _group(group: Group, n: int, thinned: int) -> Iterator[Trial]:
 
 
 def _each(group: Group, names: Sequence[str], builds: Sequence[Build], n: int) -> Iterator[Trial]:
-    """``n`` trials of each of ``names``, with targets and builds in turn."""
+    """``n`` trials of each effect in ``names``, cycling through TARGETS and ``builds``."""
     turn = count()
     for first, name in enumerate(names):
         for k in range(n):
@@ -181,7 +181,7 @@ def _each(group: Group, names: Sequence[str], builds: Sequence[Build], n: int) -
 def _mixed(
     group: Group, wing: Sequence[tuple[str, ...]], vehicle: Sequence[tuple[str, ...]], n: int
 ) -> Iterator[Trial]:
-    """``n`` trials with the effects in turn; wings and vehicles in proportion to their numbers of effects."""
+    """``n`` trials that cycle through the tuples of hidden effects in ``wing`` and ``vehicle``."""
     kinds = [(names, True) for names in wing] + [(names, False) for names in vehicle]
     step = next(step for step in range(4, len(kinds) + 4) if math.gcd(step, len(kinds)) == 1)
     for k in range(n):  # with a stride, so that the first few contain both rigs
@@ -203,7 +203,7 @@ def conditions(trial: Trial, rng: np.random.Generator) -> list[tuple[Condition, 
 
 
 def _campaign(rng: np.random.Generator) -> list[tuple[Condition, bool]]:
-    """Three recordings in the chamber and two in the tunnel, and one held out of each, at another frequency or lag."""
+    """Conditions of three recordings in the vacuum chamber and two in the wind tunnel, plus one held out of each."""
     slow, fast = rng.permutation(FREQUENCIES[:2])[0], rng.permutation(FREQUENCIES[3:])[0]
     lags, speeds = rng.permutation(LAGS), np.sort(rng.permutation(SPEEDS)[:3])
     middle = FREQUENCIES[2]
@@ -219,7 +219,7 @@ def _campaign(rng: np.random.Generator) -> list[tuple[Condition, bool]]:
 
 
 def _alike(rng: np.random.Generator) -> list[tuple[Condition, bool]]:
-    """Two recordings at one frequency and one pressure or airspeed, and a similar one that is held out."""
+    """Conditions that differ in phase lag only: two fitted recordings, and a held-out one."""
     frequency, lags = float(rng.choice(FREQUENCIES[1:4])), rng.permutation(LAGS)
     if rng.uniform() < 0.5:
         pressure = float(rng.choice([THIN_PA, THICK_PA]))

@@ -1,1 +1,1 @@
-"""What a server acknowledged is there after any death of it, and runs end as if undisturbed."""
+"""Tests that the server loses nothing it acknowledged when it is killed, and that runs end with the same results."""

@@ -90,7 +90,7 @@ def main() -> None:
 
 
 def undisturbed(folder: Path) -> dict[str, Json]:
-    """Results of every workload on a server that is not disturbed."""
+    """Result of every workload, by name, on a server that is not disturbed; the reference for :func:`season`."""
     folder.mkdir()
     server, ends = Server(folder, "in_process"), {}
     server.start()
@@ -109,7 +109,10 @@ def undisturbed(folder: Path) -> dict[str, Json]:
 
 
 def season(kind: str, kills: int, seed: int, folder: Path, expected: dict[str, Json]) -> Json:
-    """Kills of one kind while clients use the server, then a quiet phase, then the checks."""
+    """Kill ``kills`` times in one way while clients use the server, wait until all jobs have ended, then check.
+
+    ``expected``: results of undisturbed runs. Returns counts of jobs, equal and different results, and losses.
+    """
     folder.mkdir()
     cluster = Cluster(folder) if EVALUATORS[kind] == "ray" else None
     token, address = (cluster.token, cluster.address) if cluster else (None, "")
@@ -169,7 +172,7 @@ def _of_worker(server: Server, _: Cluster | None, rng: np.random.Generator) -> N
 
 
 def _stop_of_worker(server: Server, _: Cluster | None, rng: np.random.Generator) -> bool:
-    """Stop a worker; whether it is replaced."""
+    """Stop a worker (SIGSTOP); returns whether the server replaces it."""
     worker = _some_worker(server, rng)
     try:
         os.kill(worker, signal.SIGSTOP)
@@ -254,7 +257,7 @@ def _quiet(server: Server, ledger: Ledger, expected: dict[str, Json]) -> int:
 
 
 def _diagnoses(ledger: Ledger, fetch: Callable[[str], Json | None], expected: Json, deadline: float) -> int:
-    """Wait for the diagnoses and check their findings; returns the number of those that do not end."""
+    """Wait until ``deadline`` for the diagnoses and check their findings; returns the number that do not end."""
     left = [diagnosis for diagnosis, state in ledger.diagnoses.items() if state is None]
     while left and time.monotonic() < deadline:
         for diagnosis in list(left):

@@ -25,11 +25,14 @@ ANSWERED = frozenset(range(200, 500))
 
 
 class OverError(Exception):
-    """The client was asked to stop."""
+    """Raised in a client's thread once :meth:`Client.leave` was called, to abandon a request."""
 
 
 class Client(threading.Thread):
-    """A user with runs of its own, so that its requests have an order."""
+    """Thread that acts as one user at random: uploads, submits, watches, pauses, cancels, and records all answers.
+
+    Each client acts only on runs that it submitted, so that the order of the requests for a run is known.
+    """
 
     def __init__(self, number: int, seed: int, port: int, ledger: Ledger, expected: Mapping[str, Json]) -> None:
         super().__init__(name=f"client-{number}", daemon=True)
@@ -173,7 +176,7 @@ class Client(threading.Thread):
 def settle(
     ledger: Ledger, run: str, now: Json, fetch: Callable[[str], Json | None], expected: Mapping[str, Json]
 ) -> None:
-    """Check a finished run."""
+    """Check a finished run (its state is ``now``): allowed final state, and result equal to the undisturbed one."""
     known = ledger.runs[run]
     if now["state"] not in known.endings:
         ledger.lose(f"run {run} is {now['state']}, must be {' or '.join(known.endings)}: {now['error']}")
@@ -185,7 +188,7 @@ def settle(
 def settle_diagnosis(
     ledger: Ledger, diagnosis: str, now: Json, fetch: Callable[[str], Json | None], expected: Json
 ) -> None:
-    """Check a finished diagnosis."""
+    """Check a finished diagnosis (its state is ``now``): it succeeded, with the finding of the undisturbed one."""
     if now["state"] != "SUCCEEDED":
         ledger.lose(f"diagnosis {diagnosis} is {now['state']}: {now['error']}")
     else:
@@ -201,7 +204,7 @@ def finding(diagnosis: str, fetch: Callable[[str], Json | None]) -> Json:
 
 
 def outcome(run: str, fetch: Callable[[str], Json | None]) -> Json:
-    """All numbers of a successful run without times."""
+    """Result of a successful run without times; ``fetch`` returns the JSON of a path of the API."""
     history = fetch(f"/v1/runs/{run}/history?limit=10000") or {"items": []}
     return {
         "history": [without_times(item) for item in history["items"]],

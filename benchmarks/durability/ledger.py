@@ -16,7 +16,7 @@ class KnownRun:
 
     Attributes:
         work: name of its workload.
-        generations: of its history, by sequence number, as first seen.
+        generations: entries of its history, by sequence number, as first seen.
         endings: allowed final states: SUCCEEDED; also CANCELLED once that was requested, only CANCELLED once
             acknowledged.
         final: its final state, once seen.
@@ -30,7 +30,7 @@ class KnownRun:
 
 @dataclass
 class Ledger:
-    """Everything that was acknowledged so far; thread-safe."""
+    """Record of everything that the server acknowledged, and of losses; shared by all clients, thread-safe."""
 
     datasets: dict[str, str] = field(default_factory=dict)
     runs: dict[str, KnownRun] = field(default_factory=dict)
@@ -54,7 +54,7 @@ class Ledger:
             self.acknowledged += 1
 
     def history(self, run: str, items: list[Json]) -> None:
-        """Compare a history with the one seen before, and store it."""
+        """Compare the history ``items`` of a run with the entries seen before, record changes as losses, store it."""
         with self.lock:
             seen = self.runs[run].generations
             now = {item["sequence"]: without_times(item) for item in items}
@@ -65,7 +65,7 @@ class Ledger:
             seen.update(now)
 
     def result(self, run: str, found: Json, expected: Json) -> None:
-        """Compare the result of a run or diagnosis with the undisturbed one."""
+        """Compare the result ``found`` of a run or diagnosis with the undisturbed one, ``expected``, and count it."""
         with self.lock:
             self.results += 1
             self.identical += found == expected
@@ -74,5 +74,5 @@ class Ledger:
 
 
 def without_times(item: Json) -> Json:
-    """``item`` without its times."""
+    """Copy of a JSON object without fields that contain times, which differ between equal runs."""
     return {key: value for key, value in item.items() if key not in TIMES}

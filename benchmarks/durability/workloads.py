@@ -10,7 +10,7 @@ Json = dict[str, Any]
 
 @dataclass(frozen=True)
 class Work:
-    """A run to submit on the dataset ``example``."""
+    """A run to submit: name, example dataset to upload, and body of the request without the dataset's id."""
 
     name: str
     example: str

@@ -1,1 +1,1 @@
-"""Load: reads, event streams and pages beside a calibration, over a database as after years of use."""
+"""Load test of the server: reads and event streams during a calibration, with a database as after years of use."""

@@ -42,7 +42,7 @@ ANSWERED = 0.99  # required fraction of the requested reads per second
 
 @dataclass(frozen=True)
 class Size:
-    """The size of the database, the loads and the calibration."""
+    """Sizes of the load test: database, requests and calibration."""
 
     runs: int
     generations: int
@@ -54,7 +54,7 @@ class Size:
 
     @property
     def loads(self) -> Sequence[Load]:
-        """The loads beside each calibration; a single watcher of the undisturbed run notices its end."""
+        """The loads to apply during a calibration; the first is only one event stream, which notices the run's end."""
         return (Load(NONE, 0.0, 1), Load(WATCHED, 0.0, self.watchers), Load(READ, self.rate, self.watchers))
 
 
@@ -89,7 +89,7 @@ def main() -> None:
 
 
 def served(scratch: Path, size: Size, rounds: int) -> Json:
-    """The figures of a server over a filled database: pages, then the loads."""
+    """Start a server with a filled database and measure it: response times of pages, then the effect of each load."""
     server = Server(scratch, "processes")
     try:
         filled, dataset = _filled(server, size)
@@ -127,7 +127,7 @@ def served(scratch: Path, size: Size, rounds: int) -> Json:
 
 
 def missed(report: Json) -> list[str]:
-    """What is beyond its limit, and reads and streams that failed; one line each."""
+    """One line for each figure of ``report`` that is beyond its limit, and for reads and streams that failed."""
     read = report["beside"][READ]
     faults = [
         f"{name} is {report[name]}, must be at most {limit:g}"
@@ -144,7 +144,10 @@ def missed(report: Json) -> list[str]:
 
 
 def _filled(server: Server, size: Size) -> tuple[Filled, str]:
-    """Let the server compute a run, copy the run, and start the server again; the copies and the id of the dataset."""
+    """Let the server compute a run, copy it many times in the database, and restart the server.
+
+    Returns a description of the copies, and the id of the dataset.
+    """
     server.start()
     with Client(f"http://127.0.0.1:{server.port}") as client:
         dataset = client.upload_dataset(ROBIRD)["id"]

@@ -1,4 +1,4 @@
-"""The same calibration alternately undisturbed and beside each load: what each costs the other.
+"""Runs the same calibration with and without each load, to measure how much each slows the other.
 
 The same seed gives the same computation, bit for bit, so the times of two runs differ only by the load and by other
 work on the machine. Therefore the loads alternate, in reversed order every second round.
@@ -30,7 +30,7 @@ TICKS = os.sysconf("SC_CLK_TCK")
 
 @dataclass(frozen=True)
 class Load:
-    """A load: its name, reads per second, and number of event streams of the run."""
+    """A load to apply during a calibration: name, reads per second, number of event streams of the run."""
 
     name: str
     rate: float
@@ -43,10 +43,10 @@ class Trial:
 
     Attributes:
         seconds: from the first generation to the last.
-        evaluations: number in that time.
+        evaluations: number of simulated individuals in that time.
         processor_seconds: processor time of the server without its workers, from before the run to after it.
-        kinds: kind of each read, by the number of its path.
-        observed: what the load generator observed.
+        kinds: kind of each read, by the index of its path in the load generator's list.
+        observed: response times and losses, as measured by the load generator.
     """
 
     seconds: float
@@ -57,7 +57,10 @@ class Trial:
 
 
 def beside(server: Server, client: Client, body: Json, stored: Stored, loads: Sequence[Load], rounds: int) -> Json:
-    """Alternate the ``loads``, of which the first is none; the figures of each load by its name."""
+    """Run the calibration ``body`` under each of ``loads``, ``rounds`` times; returns the figures by name of the load.
+
+    The first load is the reference, without reads.
+    """
     trials: dict[str, list[Trial]] = {load.name: [] for load in loads}
     with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
         pool.submit(os.getpid).result()  # start the process before it is needed
@@ -122,7 +125,11 @@ def _figures(load: Load, trials: Sequence[Trial], alone: Sequence[Trial]) -> Jso
 
 
 def per_read_us(loaded: Json, watched: Json) -> float | None:
-    """Processor time of the server per read, us: the difference to the load with event streams only."""
+    """Processor time of the server per read, us.
+
+    Difference of the figures of a load with reads (``loaded``) and one with event streams only (``watched``), divided
+    by the number of reads; None if there were no reads.
+    """
     number = loaded["reads"]["of"]
     more = loaded["server_processor_seconds"] - watched["server_processor_seconds"]
     return round(1e6 * more / number, 1) if number else None

@@ -12,7 +12,7 @@ ROBIRD = EXAMPLES / "robird"
 
 
 def search(division: str, population: int, generations: int, **more: Any) -> Json:
-    """The body of a genetic search that does not end before its last generation."""
+    """Request body of a genetic search that always computes all its ``generations``."""
     size = {"division": division, "population": population, "max_generations": generations, "stall": generations}
     return size | {"mode": "joint", "tolerance": 0.0, "seed": 1} | more
 
@@ -23,7 +23,7 @@ SHORT = search("4", 8, 12, recordings=["vac-0010mbar-lag0-2.0hz"])
 
 
 def computed(client: Client, run_id: str) -> tuple[float, int]:
-    """Wait for a run to end; the seconds and evaluations from its first generation to its last."""
+    """Wait for a run to end; returns the seconds, and the evaluations, from its first generation to its last."""
     ended = client.wait(run_id)
     if ended["state"] != "SUCCEEDED":
         raise RuntimeError(f"the calibration {ended['state']}: {ended['error']}")

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 
 def percentile(values: Sequence[float], percent: float) -> float | None:
-    """The smallest of ``values`` that at least ``percent`` per cent of them do not exceed; None if there are none."""
+    """Percentile of ``values``: the smallest that ``percent`` per cent do not exceed; None if there are none."""
     if not values:
         return None
     return sorted(values)[max(1, math.ceil(percent / 100 * len(values))) - 1]

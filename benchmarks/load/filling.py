@@ -67,7 +67,7 @@ def fill(folder: Path, runs: int, generations: int, longest: int) -> Filled:
 
 
 def _datasets(session: Session, dataset_id: str) -> list[str]:
-    """The ids of the dataset and of its copies, which are stored."""
+    """Store copies of a dataset; returns the ids of the dataset and its copies."""
     row, body = store.one(session, DatasetRow, dataset_id), store.archive(session, dataset_id)
     copies = [_unnumbered(row) | {"id": store.new_id("ds"), "name": f"{row.name} {n}"} for n in range(2, DATASETS + 1)]
     session.execute(insert(DatasetRow), copies)
@@ -76,7 +76,10 @@ def _datasets(session: Session, dataset_id: str) -> list[str]:
 
 
 def _copies(original: Values, datasets: list[str], number: int) -> list[Values]:
-    """``number`` rows of runs, one every 50 minutes until now, on all datasets, each with its own seed."""
+    """``number`` database rows of runs like ``original``, one every 50 minutes until now, each with its own seed.
+
+    They are distributed over ``datasets``.
+    """
     until, copies = datetime.now(UTC), []
     for place in range(number):
         ended = until - (number - place) * INTERVAL
@@ -108,7 +111,7 @@ def _unnumbered(row: DatasetRow) -> Values:
 
 
 def _generations(past: list[Values], run: Values) -> list[Values]:
-    """The generations of ``run``: those of another run (``past``) repeated."""
+    """Database rows of the generations of ``run``: those of another run (``past``), repeated to its length."""
     return [
         past[(sequence - 1) % len(past)]
         | {
@@ -125,7 +128,10 @@ def _generations(past: list[Values], run: Values) -> list[Values]:
 
 
 def _length(past: list[Values], generations: int) -> Values:
-    """Generations, evaluations and seconds of a run after ``generations``, at the pace of another run (``past``)."""
+    """Counters of a run after ``generations`` generations, at the pace of another run (``past``).
+
+    The fields are generations, evaluations and seconds.
+    """
     part = generations / len(past)
     return {
         "generations": generations,
@@ -135,7 +141,7 @@ def _length(past: list[Values], generations: int) -> Values:
 
 
 def _copy_generations(session: Session, model: str, have: list[str]) -> None:
-    """Copy the generations of ``model`` to all runs not in ``have``, in one statement because there are a million."""
+    """Copy the generations of the run ``model`` to all runs not in ``have``, in one SQL statement for speed."""
     names = [column.key for column in GenerationRow.__table__.columns]
     theirs = [RunRow.id if name == "run_id" else getattr(GenerationRow, name) for name in names]
     rows = select(*theirs).join(RunRow, literal(True)).where(GenerationRow.job_id == model, RunRow.id.not_in(have))

@@ -1,4 +1,4 @@
-"""The load generator: reads and event streams while a run is computed, in one process that takes little itself.
+"""The load generator: sends reads and follows event streams while a run is computed, in one process of small cost.
 
 Reads are due at even intervals whether the server keeps up or not (an open loop), and each is timed from when it was
 due. So a late answer also counts for the reads that waited behind it, as it would for users.
@@ -48,12 +48,12 @@ class Traffic:
 
 @dataclass
 class Observed:
-    """What the load generator observed.
+    """Measurements of the load generator during one run.
 
     Attributes:
-        seconds: duration.
+        seconds: duration of the run.
         reading_seconds: time during which reads became due.
-        latencies: number of the path, and time from when the read was due to its answer (s), of each answer.
+        latencies: (index of the path, time in s from when the read was due to its answer) of each answer.
         refused: number of answers that were not 200.
         unanswered: number of reads that were due and got no answer.
         late: longest delay of this process in noticing that a read was due, s.
@@ -74,7 +74,7 @@ class Observed:
 
 
 def generate(traffic: Traffic) -> Observed:
-    """Read and stream events until the run ends."""
+    """Send the reads and follow the event streams of ``traffic`` until its run ends; returns the measurements."""
     start, took = time.monotonic(), time.process_time()
     observed = uvloop.run(asyncio.wait_for(_generate(traffic), LONGEST_SECONDS))
     observed.seconds, observed.processor_seconds = time.monotonic() - start, time.process_time() - took
@@ -98,7 +98,7 @@ async def _generate(traffic: Traffic) -> Observed:
 
 
 class Reads:
-    """An open loop: reads become due independently of earlier answers."""
+    """Sends the reads in an open loop: each becomes due at its time, independently of earlier answers."""
 
     def __init__(self, traffic: Traffic, observed: Observed) -> None:
         self._traffic, self._observed = traffic, observed
@@ -134,12 +134,12 @@ class Reads:
         self._next = self._loop.call_later(max(due - now, 0.001), self._tick)
 
     def free(self, reader: _Reader) -> None:
-        """``reader`` is ready for a request."""
+        """Called when ``reader`` is ready for a request: sends the oldest read that waits, if any."""
         self._idle.append(reader)
         self._send()
 
     def lost(self, reader: _Reader, request: tuple[int, float] | None) -> None:
-        """The server closed an idle connection; a read just sent on it (``request``) is repeated, as clients do."""
+        """Called when the server closed the idle connection ``reader``; a read just sent on it is sent again."""
         self._open -= 1
         if request:
             self._waiting.appendleft(request)
@@ -148,7 +148,7 @@ class Reads:
             self._idle.remove(reader)
 
     def answered(self, number: int, status: int, seconds: float) -> None:
-        """Note an answer that came ``seconds`` after it was due."""
+        """Record an answer to path ``number`` that came ``seconds`` after the read was due."""
         self._observed.latencies.append((number % len(self._requests), seconds))
         self._observed.refused += status != 200
 
@@ -165,7 +165,7 @@ class Reads:
 
 
 class _Reader(asyncio.Protocol):
-    """One persistent connection."""
+    """One persistent HTTP connection, which sends one read at a time."""
 
     def __init__(self, reads: Reads) -> None:
         self._reads = reads
@@ -178,12 +178,12 @@ class _Reader(asyncio.Protocol):
         self._reads.free(self)
 
     def send(self, request: bytes, number: int, due: float) -> None:
-        """Send a request."""
+        """Send the bytes ``request`` for path ``number``, which was due at the time ``due``."""
         self._pending, self._data = (number, due), b""
         self._transport.write(request)
 
     def data_received(self, data: bytes) -> None:
-        """Take a part of the answer, and report it once it is complete."""
+        """Receive a part of an answer, and report the answer once it is complete."""
         self._data = self._data + data if self._data else data
         status = answered(self._data)
         if status and self._pending:
@@ -202,7 +202,7 @@ class _Reader(asyncio.Protocol):
 
 
 def answered(data: bytes) -> int:
-    """The status of the answer in ``data``; 0 while it is incomplete."""
+    """HTTP status of the answer in the received bytes ``data``; 0 while it is incomplete."""
     end = data.find(HEAD_END)
     length = LENGTH.search(data, 0, end + 2) if end > 0 else None
     return int(data[9:12]) if length and len(data) - end - len(HEAD_END) >= int(length[1]) else 0
@@ -216,7 +216,7 @@ def _request(port: int, path: str) -> bytes:
 
 
 class Watcher(asyncio.Protocol):
-    """One event stream of a run.
+    """Connection to one event stream of a run.
 
     It times each generation from the end of its computation (``started_at`` of the run plus ``elapsed_seconds`` of the
     generation, by the server's clock) through its durable storage to its arrival here.
@@ -245,7 +245,7 @@ class Watcher(asyncio.Protocol):
         self._transport.write(_request(self._port, f"/v1/runs/{self._run}/events"))
 
     def data_received(self, data: bytes) -> None:
-        """Note when each event arrived."""
+        """Record when each event arrived."""
         now = time.time()
         self._data += data
         end = 0
@@ -260,7 +260,7 @@ class Watcher(asyncio.Protocol):
             self._transport.close()
 
     def connection_lost(self, exc: Exception | None) -> None:  # noqa: ARG002  as asyncio calls it
-        """The stream has ended."""
+        """Record that the stream has ended."""
         self._over.set()
         if not self.ended.done():
             self.ended.set_result(None)

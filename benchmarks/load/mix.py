@@ -1,4 +1,4 @@
-"""The mix of reads: a few people follow the present run, others look at old ones.
+"""The mix of read requests in the load test: a few users follow the present run, others look at old ones.
 
 Of ten reads six are of a run, two of a page of 50 runs, and two of a page of 50 generations. Half of the runs and
 histories are those of the present run; nine tenths of the run lists are the first page. The others are drawn at random
@@ -29,7 +29,7 @@ class Stored:
 
 
 def walk(http: httpx.Client) -> Stored:
-    """Read all pages of the run list."""
+    """Read all pages of the server's run list, and return what is stored."""
     ids, cursors, generations, cursor = list[str](), list[str](), list[int](), None
     while True:
         page = http.get("/v1/runs", params={"limit": PAGE} | ({"cursor": cursor} if cursor else {})).json()
@@ -42,7 +42,7 @@ def walk(http: httpx.Client) -> Stored:
 
 
 def reads(stored: Stored, present: str, number: int, seed: int) -> list[tuple[str, str]]:
-    """``number`` reads, each as its kind and its path."""
+    """``number`` random reads, each as (kind, URL path); ``present``: id of the present run."""
     rng = np.random.default_rng(seed)
     return [_read(KINDS[kind], stored, present, rng) for kind in rng.choice(len(KINDS), number, p=SHARES)]
 

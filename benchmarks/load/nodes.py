@@ -1,4 +1,4 @@
-"""The same calibration alternately on one and on two Ray nodes of one processor each, on this machine."""
+"""Measures how a calibration scales from one to two Ray nodes of one processor each, on this machine."""
 
 from __future__ import annotations
 
@@ -18,7 +18,10 @@ SETTLE_SECONDS = 120.0
 
 
 def scaling(folder: Path, work: Json, short: Json, rounds: int) -> Json:
-    """The pace with one and with two nodes; the efficiency is the second over twice the first."""
+    """Evaluations per second of the calibration ``work`` with one and with two nodes, alternately in ``rounds`` rounds.
+
+    The efficiency is the pace with two nodes divided by twice that with one. ``short``: calibration for warming up.
+    """
     folder.mkdir()
     cluster = Cluster(folder)
     server = Server(folder, "ray", cluster.token, cluster.address)
@@ -46,7 +49,7 @@ def scaling(folder: Path, work: Json, short: Json, rounds: int) -> Json:
 
 
 def _set_nodes(cluster: Cluster, nodes: int, now: int) -> int:
-    """Change the number of nodes by one from ``now`` to ``nodes``, where they differ."""
+    """Start or kill a node if the number of nodes ``now`` differs from ``nodes``; returns ``nodes``."""
     if nodes < now:
         cluster.kill_node()
     elif nodes > now:
@@ -55,7 +58,7 @@ def _set_nodes(cluster: Cluster, nodes: int, now: int) -> int:
 
 
 def _settle(client: Client, short: Json, nodes: int) -> None:
-    """Compute short runs until the server knows the nodes and the nodes are warm."""
+    """Compute short runs until the server uses all ``nodes`` and their code is compiled."""
     deadline = time.monotonic() + SETTLE_SECONDS
     while True:
         computed(client, client.submit_run(**short)["id"])

@@ -22,7 +22,7 @@ PAGES, LARGEST_PAGES = 100, 20
 
 
 def pages(port: int, stored: Stored, filled: Filled, dataset_id: str) -> Json:
-    """Response times of each kind of page."""
+    """Response times (ms) and largest size of each kind of page, by its name."""
     rng = np.random.default_rng(1)
     cursors = rng.permutation(stored.cursors)
     last = max(0, filled.longest_generations - HISTORY_PAGE - PAGES)
@@ -45,7 +45,10 @@ def pages(port: int, stored: Stored, filled: Filled, dataset_id: str) -> Json:
 
 
 def timed(port: int, paths: list[str]) -> Json:
-    """Response times of ``paths``, one after the other, and the size of the largest response."""
+    """Request ``paths`` one after the other; response times (ms) and size of the largest response.
+
+    RuntimeError if a status is not 200.
+    """
     connection, took, longest = http.client.HTTPConnection("127.0.0.1", port, timeout=60.0), list[float](), 0
     for path in paths:
         start = time.perf_counter()

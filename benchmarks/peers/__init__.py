@@ -1,1 +1,1 @@
-"""The same wing in other engines: independently written equations for scipy, and Exudyn."""
+"""The same wing simulated by other software: scipy with independently written equations, and Exudyn."""

@@ -1,4 +1,4 @@
-"""Cost of a beat of the wing in each engine, at a given error against that engine's own converged run."""
+"""Processor time of one wing beat in each engine (scipy, Exudyn) at a given error against its own converged run."""
 
 from __future__ import annotations
 
@@ -28,20 +28,21 @@ def nominal(division: str, medium: Medium) -> PeerWing:
 
 
 def scipy_case(division: str, medium: Medium, tolerance_mm: float, seconds: float = 600.0) -> dict[str, Any]:
-    """scipy's LSODA, BDF or Radau, whichever is cheapest, on compiled equations with the sparsity of the Jacobian."""
+    """Cost of a beat with scipy: the cheapest of LSODA, BDF and Radau, on compiled equations with a sparse Jacobian."""
     return case("scipy", division, medium, tolerance_mm, seconds)
 
 
 def exudyn_case(division: str, medium: Medium, tolerance_mm: float, seconds: float = 600.0) -> dict[str, Any]:
-    """Exudyn with its own compiled spring law; in air, the compiled loads of strips are called from Python.
+    """Cost of a beat with Exudyn and its own compiled spring law.
 
-    In the chamber the last 1 % of the air is neglected in Exudyn, which avoids the calls from Python.
+    In air, the compiled air loads are called from Python. In the vacuum chamber, whose pressure is 1 % of the ambient
+    one, Exudyn neglects the air, which avoids these calls.
     """
     return case("exudyn", division, medium, tolerance_mm, seconds)
 
 
 def exudyn_same_law_case(division: str, medium: Medium, tolerance_mm: float, seconds: float = 600.0) -> dict[str, Any]:
-    """Exudyn with our spring law, every connector called from Python: slow, a check of agreement and not of speed."""
+    """Cost of a beat with Exudyn and wingfit's spring law, called from Python: slow, to check that results agree."""
     return case("exudyn_same_law", division, medium, tolerance_mm, seconds)
 
 

@@ -1,4 +1,6 @@
-"""The wing's equations of motion written a second time, in other coordinates, from the energies and Newton and Euler.
+"""The wing's equations of motion in other coordinates than the simulator's, as an independent check.
+
+They are derived from the springs' energies and the Newton-Euler equations.
 
 State of each body, 13 numbers: centre of mass p (m), unit quaternion q (scalar first, body -> world), velocity v (m/s)
 and angular velocity w (rad/s), all in the **world**; ``sim`` keeps body twists. Scalar code for one individual.
@@ -42,7 +44,7 @@ def _row(x: Array, i: int) -> V3:
 
 @allocating
 def _axis(R: Array, n: int, k: int) -> V3:
-    """Axis k of body n in the world."""
+    """Axis ``k`` of body ``n`` in world axes: column k of R[n]."""
     return R[n, 0, k], R[n, 1, k], R[n, 2, k]
 
 
@@ -58,13 +60,13 @@ def _dot(x: V3, y: V3) -> float:
 
 @allocating
 def _plus(x: V3, f: float, y: V3) -> V3:
-    """x + f y."""
+    """The vector x + f y."""
     return x[0] + f * y[0], x[1] + f * y[1], x[2] + f * y[2]
 
 
 @allocating
 def _turned(R: Array, n: int, x: V3) -> V3:
-    """R_n x."""
+    """R[n] x: the vector ``x`` of body ``n`` in world axes."""
     return (
         R[n, 0, 0] * x[0] + R[n, 0, 1] * x[1] + R[n, 0, 2] * x[2],
         R[n, 1, 0] * x[0] + R[n, 1, 1] * x[1] + R[n, 1, 2] * x[2],
@@ -74,13 +76,13 @@ def _turned(R: Array, n: int, x: V3) -> V3:
 
 @allocating
 def _back(R: Array, n: int, x: V3) -> V3:
-    """R_n^T x."""
+    """R[n]^T x: the world vector ``x`` in axes of body ``n``."""
     return _dot(_axis(R, n, 0), x), _dot(_axis(R, n, 1), x), _dot(_axis(R, n, 2), x)
 
 
 @allocating
 def _act(load: Array, n: int, force: V3, moment: V3) -> None:
-    """Add to ``load`` [N + 2, 6] (force, moment about the centre, world)."""
+    """Add a force and a moment about the centre (world axes) to row ``n`` of ``load`` [N + 2, 6]."""
     for i in range(3):
         load[n, i] += force[i]
         load[n, 3 + i] += moment[i]
@@ -88,7 +90,7 @@ def _act(load: Array, n: int, force: V3, moment: V3) -> None:
 
 @allocating
 def rotation(w: float, x: float, y: float, z: float, R: Array) -> None:
-    """Matrix of a quaternion of any length."""
+    """Set ``R`` [3, 3] to the rotation matrix of the quaternion (w, x, y, z), which need not be a unit quaternion."""
     f = 2.0 / (w * w + x * x + y * y + z * z)
     R[0, 0], R[0, 1], R[0, 2] = 1.0 - f * (y * y + z * z), f * (x * y - w * z), f * (x * z + w * y)
     R[1, 0], R[1, 1], R[1, 2] = f * (x * y + w * z), 1.0 - f * (x * x + z * z), f * (y * z - w * x)
@@ -97,7 +99,7 @@ def rotation(w: float, x: float, y: float, z: float, R: Array) -> None:
 
 @allocating
 def put_rods(wing: PeerWing, t: float, R: Array, p: Array, v: Array, w: Array) -> None:
-    """Frames of the two driving rods (rows N and N + 1): they turn about x through the hinge."""
+    """Set rows N and N + 1 of R, p, v and w: the frames of the driving rods, which turn about x at the hinge."""
     n = len(wing.mass)
     for k in range(2):
         angle, rate = rod_motion(wing, t, k)
@@ -110,7 +112,7 @@ def put_rods(wing: PeerWing, t: float, R: Array, p: Array, v: Array, w: Array) -
 
 @allocating
 def spring_loads(wing: PeerWing, R: Array, p: Array, v: Array, w: Array, load: Array) -> None:
-    """Add the loads of springs and dampers on bodies and rods."""
+    """Add the loads of springs and dampers on bodies and rods to ``load`` [N + 2, 6]."""
     for c in range(len(wing.first)):
         i, j = wing.first[c], wing.second[c]
         arm_a, arm_b = _turned(R, i, _row(wing.a, c)), _turned(R, j, _row(wing.b, c))
@@ -141,7 +143,7 @@ def spring_loads(wing: PeerWing, R: Array, p: Array, v: Array, w: Array, load: A
 
 @allocating
 def _lift_and_drag(wing: PeerWing, strip: int, chord: V3, normal: V3, flow: V3) -> tuple[V3, V3]:
-    """Force of the air on a strip (thesis Eqs. 8-11), in the world; ``flow`` is the air's velocity past the strip."""
+    """Lift and drag (N, world axes) of a strip (thesis Eqs. 8-11); ``flow``: the air's velocity past it, m/s."""
     along, across = _dot(flow, chord), _dot(flow, normal)
     speed = math.sqrt(along * along + across * across + _STILL * _STILL)
     x = min(max(along / (_TURN * speed), -1.0), 1.0)
@@ -159,7 +161,7 @@ def _lift_and_drag(wing: PeerWing, strip: int, chord: V3, normal: V3, flow: V3) 
 
 @allocating
 def air_loads(wing: PeerWing, R: Array, v: Array, w: Array, load: Array) -> None:
-    """Add the air's force and moment on every body."""
+    """Add the air's force and moment on every body to ``load`` [N + 2, 6]."""
     for strip in range(len(wing.area)):
         flow, x, z = _row(wing.wind.reshape(1, 3), 0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
         members = range(wing.strip[strip], wing.strip[strip + 1])
@@ -184,7 +186,7 @@ def air_loads(wing: PeerWing, R: Array, v: Array, w: Array, load: Array) -> None
 
 @allocating
 def _accelerate(wing: PeerWing, n: int, R: Array, w: V3, load: Array, dy: Array) -> None:
-    """Newton and Euler for one body: v' and w' in the world."""
+    """Set the accelerations v', w' (world axes) of body ``n`` in ``dy`` by the Newton-Euler equations."""
     spin = _back(R, n, w)
     L = _turned(R, n, _times(wing.inertia, n, spin))
     torque = _back(R, n, _plus(_row(load[:, 3:], n), -1.0, _cross(w, L)))
@@ -202,7 +204,7 @@ def _times(A: Array, n: int, x: V3) -> V3:
 
 @allocating
 def _solved(A: Array, n: int, x: V3) -> V3:
-    """A_n^-1 x for a 3 x 3 matrix, by Cramer's rule."""
+    """Solution y of A[n] y = x for the 3 x 3 matrix A[n], by Cramer's rule."""
     r0, r1, r2 = _axis(A, n, 0), _axis(A, n, 1), _axis(A, n, 2)
     c = _cross(r1, r2)
     f = 1.0 / _dot(r0, c)
@@ -211,7 +213,7 @@ def _solved(A: Array, n: int, x: V3) -> V3:
 
 @allocating
 def rates(wing: PeerWing, t: float, y: Array, dy: Array) -> None:
-    """dy/dt [13 N] of state ``y`` at time ``t``."""
+    """Set ``dy`` [13 N] to the time derivative of the state ``y`` [13 N] at time ``t`` (s)."""
     n_bodies = len(wing.mass)
     R, p = np.empty((n_bodies + 2, 3, 3)), np.empty((n_bodies + 2, 3))
     v, w, load = np.empty((n_bodies + 2, 3)), np.empty((n_bodies + 2, 3)), np.zeros((n_bodies + 2, 6))
@@ -237,7 +239,7 @@ def rates(wing: PeerWing, t: float, y: Array, dy: Array) -> None:
 
 @allocating
 def rates_of_rows(wing: PeerWing, t: float, rows: Array) -> Array:
-    """Rates [k, 13 N] of k states at once, for finite differences."""
+    """Time derivatives [k, 13 N] of the k states ``rows`` [k, 13 N], for finite differences."""
     out = np.empty_like(rows)
     for k in range(len(rows)):
         rates(wing, t, rows[k], out[k])
@@ -245,7 +247,7 @@ def rates_of_rows(wing: PeerWing, t: float, rows: Array) -> Array:
 
 
 def right_hand_side(wing: PeerWing, t: float, y: Array) -> Array:
-    """For ``scipy.integrate``: ``y`` [13 N] or, vectorised, [13 N, k]."""
+    """Time derivative in the form for ``scipy.integrate``: ``y`` [13 N] or, vectorised, [13 N, k]; same shape out."""
     if y.ndim == 1:
         return np.asarray(rates_of_rows(wing, t, y[None])[0])
     return np.asarray(rates_of_rows(wing, t, np.ascontiguousarray(y.T)).T)
@@ -259,7 +261,10 @@ def at_rest(wing: PeerWing) -> Array:
 
 
 def sparsity(wing: PeerWing) -> csc_matrix:
-    """Sparsity of the Jacobian: neighbours couple through connectors, the bodies of a strip through the air."""
+    """Sparsity pattern [13 N, 13 N] of the Jacobian.
+
+    Joined bodies couple through connectors, the bodies of a strip through the air.
+    """
     n = len(wing.mass)
     near = np.eye(n, dtype=bool)
     for i, j in zip(wing.first, wing.second, strict=True):
@@ -276,7 +281,7 @@ def sparsity(wing: PeerWing) -> csc_matrix:
 
 
 def marker_tracks(wing: PeerWing, states: Array) -> Array:
-    """World positions [T, M, 3] of the markers for states [T, 13 N]."""
+    """World positions [T, M, 3] (m) of the markers for ``states`` [T, 13 N]."""
     x = states.reshape(len(states), -1, SIZE)[:, wing.carrier]
     p, q, u = x[..., P:Q], x[..., Q + 1 : V], x[..., Q : Q + 1]
     length = np.sum(x[..., Q:V] ** 2, axis=-1, keepdims=True)

@@ -32,7 +32,7 @@ _ROD_MASS, _ROD_INERTIA = 0.1, 1e-4  # kg, kg m^2: without influence, because th
 
 
 def load_exudyn() -> Any:
-    """The package, in its fast build without range checks; ImportError names the extra to install."""
+    """Import Exudyn in its fast build without range checks; ImportError names the extra to install."""
     sys.exudynFast = True  # type: ignore[attr-defined]
     try:
         with contextlib.redirect_stdout(io.StringIO()):  # it prints a greeting
@@ -47,9 +47,9 @@ class Settings:
     """Settings of Exudyn's integrator.
 
     Attributes:
-        steps: per beat, a multiple of SAMPLES.
+        steps: integration steps per beat, a multiple of SAMPLES.
         law: of the springs: "angles" (Exudyn's default, on Tait-Bryan angles), "logarithm" (its intrinsic one, on the
-            logarithm of the relative pose at mid-frame) or "energy" (ours, in Python).
+            logarithm of the relative pose at mid-frame) or "energy" (that of wingfit, in Python).
         spectral_radius: of the generalised-alpha method at infinity.
         newton: relative tolerance of Newton's method.
     """
@@ -66,7 +66,7 @@ class Settings:
 
 @dataclass(frozen=True)
 class ExudynRun:
-    """Beats from rest, SAMPLES instants each.
+    """Result of a simulation from rest, with SAMPLES instants in each beat.
 
     Attributes:
         times: [T] s.
@@ -80,7 +80,7 @@ class ExudynRun:
 
 
 def simulate(wing: PeerWing, settings: Settings, *, beats: int = 2, until: float = np.inf) -> ExudynRun:
-    """Integrate from rest; OutOfTimeError once ``time.monotonic()`` passes ``until``."""
+    """Integrate ``beats`` beats from rest; OutOfTimeError once ``time.monotonic()`` passes ``until``."""
     exu = load_exudyn()
     items = exu.itemInterface
     period = 2 * np.pi / wing.omega
@@ -131,7 +131,7 @@ def _solver_settings(exu: Any, settings: Settings, beats: int, period: float) ->
 
 
 def _add_bodies(items: Any, system: Any, wing: PeerWing) -> tuple[list[Any], list[Any]]:
-    """Nodes and objects of the N bodies, under gravity, and of the two driven rods."""
+    """Add the N bodies, under gravity, and the two driven rods to ``system``; returns their nodes and objects."""
     nodes, bodies = [], []
     for mass, inertia, place in zip(wing.mass, wing.inertia, wing.rest, strict=True):
         J = [inertia[0, 0], inertia[1, 1], inertia[2, 2], inertia[1, 2], inertia[0, 2], inertia[0, 1]]
@@ -168,7 +168,7 @@ def _drive(wing: PeerWing, rod: int, derivative: int) -> Callable[[Any, float, i
 
 
 def _add_connectors(items: Any, system: Any, wing: PeerWing, bodies: list[Any], law: Law) -> None:
-    """Exudyn puts translation before rotation."""
+    """Add the springs and dampers to ``system``; in Exudyn's matrices translation comes before rotation."""
     order = [3, 4, 5, 0, 1, 2]
     for c, (i, j) in enumerate(zip(wing.first, wing.second, strict=True)):
         ends = [
@@ -190,7 +190,7 @@ def _add_connectors(items: Any, system: Any, wing: PeerWing, bodies: list[Any], 
 
 @allocating
 def tait_bryan(a: float, b: float, c: float, R: Array) -> None:
-    """R = R_x(a) R_y(b) R_z(c)."""
+    """Set ``R`` [3, 3] to R_x(a) R_y(b) R_z(c), a rotation by Tait-Bryan angles (rad)."""
     sa, ca, sb, cb, sc, cc = np.sin(a), np.cos(a), np.sin(b), np.cos(b), np.sin(c), np.cos(c)
     R[0, 0], R[0, 1], R[0, 2] = cb * cc, -cb * sc, sb
     R[1, 0], R[1, 1], R[1, 2] = ca * sc + sa * sb * cc, ca * cc - sa * sb * sc, -sa * cb
@@ -228,9 +228,10 @@ def _energy_law(K: Array, D: Array) -> Callable[..., Array]:
 
 @allocating
 def air_on_angles(wing: PeerWing, q: Array, q_t: Array) -> Array:
-    """Generalised force [6 N] of the air for displacements and Tait-Bryan angles ``q`` [6 N] of all bodies.
+    """Generalised force [6 N] of the air, for displacements and Tait-Bryan angles ``q`` [6 N] of all bodies.
 
-    R = R_x R_y R_z; w = e_x a' + (R_x e_y) b' + (R_x R_y e_z) c', so that a moment M does work M . e_x on a, and so on.
+    ``q_t`` [6 N]: time derivative of ``q``. With angles a, b, c and R = R_x R_y R_z the angular velocity is
+    w = e_x a' + (R_x e_y) b' + (R_x R_y e_z) c'; hence the generalised force of a moment M on a is M . e_x, and so on.
     """
     n_bodies = len(wing.mass)
     R, axes = np.empty((n_bodies, 3, 3)), np.zeros((n_bodies, 3, 3))
@@ -254,7 +255,7 @@ def air_on_angles(wing: PeerWing, q: Array, q_t: Array) -> Array:
 
 
 def _add_air(exu: Any, system: Any, wing: PeerWing, nodes: list[Any]) -> None:
-    """One object over all bodies whose force is that of the air, evaluated at every iteration.
+    """Add the air's force to ``system`` as one object that acts on all bodies, evaluated at every iteration.
 
     Its Jacobian is omitted: the air is soft compared with the springs, and Newton's method converges without it.
     """
@@ -276,7 +277,7 @@ def _add_air(exu: Any, system: Any, wing: PeerWing, nodes: list[Any]) -> None:
 
 
 def _marker_tracks(wing: PeerWing, q: Array) -> Array:
-    """[T, M, 3] from displacements and angles [N, T, 6]."""
+    """World positions [T, M, 3] (m) of the markers from displacements and angles ``q`` [N, T, 6] of the bodies."""
     x = q[wing.carrier]
     R = Rotation.from_euler("XYZ", x[..., 3:].reshape(-1, 3)).as_matrix().reshape(*x.shape[:2], 3, 3)
     there = wing.rest[wing.carrier][:, None] + x[..., :3] + np.einsum("mtij,mj->mti", R, wing.markers)
@@ -293,9 +294,10 @@ def cheapest(
     converged: int = 3840,
     seconds: float = 600.0,
 ) -> Cost:
-    """Cost of the beat after the ramp at the longest step whose markers stay within ``tolerance_mm``.
+    """Cost of the first beat after the start-up ramp, at the longest step that keeps markers within ``tolerance_mm``.
 
-    Measured against the converged run with the same law; of sufficient Newton tolerances the cheaper one is used.
+    The error is measured against the converged run with the same spring law; of the ``newtons`` tolerances that
+    suffice, the cheaper one is used.
     """
     until = time.monotonic() + seconds
     method, note = f"generalised alpha, {law}", f"not found within {seconds:g} s; allow more time"

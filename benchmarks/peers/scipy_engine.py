@@ -1,4 +1,4 @@
-"""scipy's stiff integrators on the independent equations, stepped one by one so that each beat is timed."""
+"""Simulation of the wing with scipy's stiff integrators and the equations of :mod:`.equations`; each beat is timed."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ class OutOfTimeError(RuntimeError):
 
 @dataclass(frozen=True)
 class Run:
-    """Some beats from rest.
+    """Result of a simulation of some beats from rest.
 
     Attributes:
-        times: [T] start, and end of every step, s.
-        states: [T, 13 N].
+        times: [T] start of the run, then end of every step, s.
+        states: [T, 13 N] as in :mod:`.equations`.
         cpu: [beats] process time of each beat, s.
         between: the integrator's interpolation, if it was kept.
     """
@@ -49,9 +49,10 @@ def simulate(
     keep: bool = False,
     clock: Callable[[], None] = lambda: None,
 ) -> Run:
-    """Integrate from rest with relative tolerance ``tolerance``, and absolute ones scaled by typical values.
+    """Integrate ``beats`` beats from rest with scipy's ``method``.
 
-    ``clock`` is called after every step and may raise :class:`OutOfTimeError`. ``keep`` keeps the interpolation.
+    ``tolerance``: relative; the absolute tolerances are this times typical values. ``clock`` is called after every step
+    and may raise :class:`OutOfTimeError`. ``keep``: whether to keep the interpolation.
     """
     period = 2 * np.pi / wing.omega
     solver = _solver(wing, method, tolerance, beats * period)
@@ -97,7 +98,7 @@ class Cost:
 
 
 def deadline(seconds: float) -> Callable[[], None]:
-    """A clock that raises :class:`OutOfTimeError` once ``seconds`` have passed."""
+    """Function that raises :class:`OutOfTimeError` if it is called more than ``seconds`` from now."""
     end = time.monotonic() + seconds
 
     def check() -> None:
@@ -108,9 +109,9 @@ def deadline(seconds: float) -> Callable[[], None]:
 
 
 def error_against(wing: PeerWing, run: Run, reference: Run) -> float:
-    """Largest distance (m) of a marker from the reference at the steps of the last beat.
+    """Largest distance (m) of a marker in ``run`` from ``reference`` at the steps of the last beat.
 
-    It is evaluated at the peer's own steps, without its interpolation error.
+    It is evaluated at the steps of ``run``; only the reference is interpolated.
     """
     if reference.between is None:
         raise ValueError("the reference was run without its interpolation; simulate it with keep=True")
@@ -128,10 +129,10 @@ def cheapest(
     converged: float = 1e-6,
     seconds: float = 600.0,
 ) -> Cost:
-    """Cheapest beat after the ramp whose markers stay within ``tolerance_mm`` of the converged run (Radau).
+    """Cost of the cheapest beat after the start-up ramp with markers within ``tolerance_mm`` of a converged Radau run.
 
-    For each method, the loosest sufficient tolerance whose next tighter one suffices as well, and the cheaper of the
-    two: the errors of BDF and LSODA are erratic, so a single tolerance may suffice by chance.
+    For each of ``methods`` it takes the loosest of ``tolerances`` that suffices together with the next tighter one, and
+    the cheaper of the two. The errors of BDF and LSODA are erratic: a single tolerance may suffice by chance.
     """
     clock = deadline(seconds)
     try:
@@ -160,7 +161,7 @@ def _sufficient(
     reference: Run,
     clock: Callable[[], None],
 ) -> list[Cost]:
-    """The two loosest neighbouring tolerances that suffice, if there are any."""
+    """Costs with the two loosest neighbouring tolerances that both suffice; empty if there are none."""
     found: list[Cost] = []
     for tolerance in tolerances:
         try:

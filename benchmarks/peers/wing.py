@@ -1,6 +1,6 @@
-"""Input of the other engines: masses, connectors, air coefficients and drive of one individual, as plain arrays.
+"""Input of the other engines (scipy, Exudyn): masses, connectors, air coefficients and drive of one wing, as arrays.
 
-Data only. Every force is evaluated by the engine's own code.
+It contains data only; each engine evaluates all forces by its own code.
 """
 
 from __future__ import annotations
@@ -25,20 +25,20 @@ _SAMPLES, _HARMONICS = 512, 40
 
 
 class PeerWing(NamedTuple):
-    """One individual under one condition, SI units. N bodies; numbers N and N + 1 are the front and the rear rod.
+    """A wing with given genes under one condition, SI units. N bodies; N and N + 1 are the front and the rear rod.
 
     Attributes:
         mass: [N] kg.
         inertia: [N, 3, 3] kg m^2 about the centre of mass, body axes.
         rest: [N, 3] centres of mass at rest, m; all bodies are aligned with the world there.
         first, second: [C] bodies that a connector connects.
-        a, b: [C, 3] its place on each, from the body's centre (for a rod: from the hinge), m.
+        a, b: [C, 3] the connector's position on each, from the body's centre (for a rod: from the hinge), m.
         stiffness, damping: [C, 6] about x, y, z (N m/rad), then along x, y, z (N/m), of the first body's axes.
         strip: [S + 1] first body of each strip.
         weight: [N] share of the strip's area; ``centroid`` [N, 2] of the planform, from the body's centre, m.
         area: [S] m^2.
         coefficients: [4] L_a, L_b, ID_a, ID_b (thesis Eqs. 10-11).
-        lift, drag: [N, 2] share of the strip's force (Eqs. 12-13), and where along the chord it acts, m.
+        lift, drag: [N, 2] share of the strip's force (thesis Eqs. 12-13), and x where it acts, from the centre, m.
         air: density, kg/m^3; ``wind`` [3] m/s; ``gravity`` m/s^2.
         hinge: [3] m, on the rods' axis along x.
         harmonics: [H, 2] cosine and sine amplitude of the flap angle about ``mean``, rad.
@@ -78,7 +78,7 @@ class PeerWing(NamedTuple):
 def peer_wing(
     structure: Structure, genes: tuple[Gene, ...], genome: Array, condition: Condition, ramp_beats: int = 1
 ) -> PeerWing:
-    """The arrays of ``genome`` [G] under ``condition``."""
+    """The arrays of the wing with gene values ``genome`` [G] under ``condition``."""
     group, w = lanes(structure, genes, genome[None]), structure.wiring
     incidence, hinge = condition.angle_of_attack, structure.wing.hinge
     mean, harmonics = _drive_series(structure)
@@ -114,7 +114,7 @@ def peer_wing(
 
 
 def _drive_series(structure: Structure) -> tuple[float, Array]:
-    """Mean and harmonics [H, 2] of the flap angle, for evaluation in compiled code."""
+    """Mean (rad) and cosine and sine harmonics [H, 2] (rad) of the driving rods' flap angle."""
     psi = 2 * np.pi * np.arange(_SAMPLES) / _SAMPLES
     spectrum = np.fft.rfft(flap_angle(structure.wing.drive, psi)[:, 0]) / _SAMPLES
     head = 2 * spectrum[1 : _HARMONICS + 1]

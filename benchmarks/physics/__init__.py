@@ -1,1 +1,1 @@
-"""Measurements of the simulated physics, and reference solutions."""
+"""Measurements of the accuracy and cost of the simulator, with reference solutions to compare with."""

@@ -65,7 +65,7 @@ class Beam:
 
 
 def _basis(s: Array, power: int) -> tuple[Array, Array, Array]:
-    """Legendre polynomials times s^power on [0, 1]: values, first and second derivatives, [terms, points]."""
+    """Ritz basis on [0, 1]: Legendre polynomials times s^power; values and two derivatives, [terms, points] each."""
     rows: tuple[list[Array], list[Array], list[Array]] = ([], [], [])
     f, df, ddf = s**power, power * s ** (power - 1), power * (power - 1) * s ** max(power - 2, 0)
     for k in range(_TERMS):
@@ -77,7 +77,10 @@ def _basis(s: Array, power: int) -> tuple[Array, Array, Array]:
 
 
 def _grid(beam: Beam, root: float) -> tuple[Array, Array, Array, float]:
-    """Gauss points as fraction of the free length and as y, weights (m), free length (m)."""
+    """Gauss points as fractions of the free length and as y (m), their weights (m), and the free length (m).
+
+    ``root``: y of the clamped end, m.
+    """
     x, w = np.polynomial.legendre.leggauss(_POINTS)
     free = beam.length - root
     s = 0.5 * (x + 1)
@@ -85,13 +88,16 @@ def _grid(beam: Beam, root: float) -> tuple[Array, Array, Array, float]:
 
 
 def _lowest(K: Array, M: Array, count: int) -> Array:
-    """Lowest frequencies (Hz), as the largest eigenvalues of (M, K): the smallest lose their digits to the largest."""
+    """Lowest ``count`` frequencies (Hz) of stiffness ``K`` and mass ``M`` [terms, terms].
+
+    They are computed as the largest eigenvalues of (M, K), because small eigenvalues of (K, M) lose digits.
+    """
     mu = eigh(M, K, eigvals_only=True)[::-1][:count]
     return np.asarray(1 / (2 * math.pi * np.sqrt(mu)))
 
 
 def euler_bernoulli(beam: Beam, family: Family, root: float = 0.0, count: int = 3) -> Array:
-    """First frequencies (Hz) of (EI w'')'' = rho A omega^2 w, clamped at y = ``root``, free at the tip."""
+    """First ``count`` frequencies (Hz) of (EI w'')'' = rho A omega^2 w, clamped at = ``root`` (m), free at the tip."""
     s, y, weight, free = _grid(beam, root)
     c, h = beam.at(y)
     value, _, second = _basis(s, 2)
@@ -101,7 +107,7 @@ def euler_bernoulli(beam: Beam, family: Family, root: float = 0.0, count: int = 
 
 
 def timoshenko(beam: Beam, family: Family, root: float = 0.0, count: int = 3) -> Array:
-    """The same with shear and rotary inertia (Timoshenko 1921): deflection w and section rotation theta."""
+    """Frequencies as :func:`euler_bernoulli`, but with shear and rotary inertia (Timoshenko 1921)."""
     s, y, weight, free = _grid(beam, root)
     c, h = beam.at(y)
     value, slope, _ = _basis(s, 1)
@@ -118,8 +124,9 @@ def timoshenko(beam: Beam, family: Family, root: float = 0.0, count: int = 3) ->
 def torsional(beam: Beam, root: float = 0.0, count: int = 3, *, warping: float = 0.0) -> Array:
     """First torsional frequencies (Hz) of (G J theta')' = -rho I_p omega^2 theta (Saint-Venant).
 
-    With ``warping`` the clamped end also stays flat, as that of a plate: (E Gamma theta'')'' more, where Gamma is
-    ``warping`` times the c^3 h^3 / 144 of a thin strip (Reissner and Stein, NACA TN 2369, 1951).
+    With ``warping`` the clamped end also stays flat, as that of a plate: the term (E Gamma theta'')'' is added, where
+    Gamma is ``warping`` times the c^3 h^3 / 144 of a thin strip of chord c and thickness h (Reissner and Stein, NACA TN
+    2369, 1951).
     """
     s, y, weight, free = _grid(beam, root)
     c, h = beam.at(y)
@@ -135,8 +142,9 @@ def torsional(beam: Beam, root: float = 0.0, count: int = 3, *, warping: float =
 def reference(beam: Beam, family: Family, root: float = 0.0, *, slender: bool = True, chordwise: int = 1) -> Array:
     """First three frequencies (Hz) of a family of modes, clamped at y = ``root``.
 
-    ``slender`` leaves out shear and rotary inertia. A chord in ``chordwise`` pieces that bend each by itself has
-    1 - 1 / chordwise^2 of the plate's resistance to warping: the sum of w x^2 over the pieces instead of c^3 / 12.
+    ``slender`` omits shear and rotary inertia. ``chordwise``: number of bodies that divide the chord in the model to be
+    compared. They have 1 - 1 / chordwise^2 of the plate's resistance to warping: with width w and position x of a body
+    on the chord c, the sum of w x^2 over the bodies instead of c^3 / 12.
     """
     if family == "torsion":
         return torsional(beam, root, warping=1 - 1 / chordwise**2)
@@ -145,7 +153,9 @@ def reference(beam: Beam, family: Family, root: float = 0.0, *, slender: bool = 
 
 
 def elastica(load: float) -> tuple[float, float, float]:
-    """Cantilever under a dead tip load across its rest axis: deflection / L, shortening / L and tip rotation (rad).
+    """Large deflection of a cantilever under a constant tip load across its rest axis.
+
+    Returns deflection / L, shortening / L and tip rotation (rad), L the length.
 
     ``load`` is P L^2 / E I. Solves theta'' = -load cos theta, theta(0) = 0, theta'(1) = 0 by shooting (Bisshopp and
     Drucker, Q. Appl. Math. 3, 1945, solve it by elliptic integrals).

@@ -1,6 +1,6 @@
-"""Convergence of one nominal wing.
+"""Convergence of the simulation of one nominal wing.
 
-Its converged periodic motion, the steps a beat needs, the beats until it is periodic.
+Computes its converged periodic motion, the integration steps that a beat needs, and the beats until it is periodic.
 """
 
 from __future__ import annotations
@@ -40,9 +40,10 @@ _AGREEMENT = 0.02  # largest change from half as many steps to the reference, re
 
 @dataclass(frozen=True)
 class Subject:
-    """The Robird's wing with nominal genes, a division and a condition; all lanes are equal.
+    """The Robird's wing with nominal genes, a discretisation (``division``) and a condition.
 
-    ``damping`` multiplies the nominal damping genes.
+    The simulator computes LANES individuals at once, in "lanes"; here all are equal. ``damping`` multiplies the nominal
+    damping genes.
     """
 
     division: str
@@ -51,33 +52,33 @@ class Subject:
 
     @cached_property
     def model(self) -> FlexibleWing:
-        """With default settings."""
+        """The wing's model with default settings."""
         return FlexibleWing(robird_wing(), self.division)
 
     @property
     def structure(self) -> Structure:
-        """Bodies and connectors."""
+        """Rigid bodies and connectors of the model."""
         return self.model.structure
 
     @cached_property
     def genome(self) -> Array:
-        """The genome, [1, G]."""
+        """Values of all G genes, [1, G]."""
         factors = {"D_E": self.damping, "D_G": self.damping}
         return np.array([[gene.nominal * factors.get(gene.name, 1.0) for gene in self.model.genes]])
 
     @cached_property
     def scene(self) -> WingScene:
-        """A full group of lanes."""
+        """The simulator's input for a full group of lanes, all with the same genome."""
         return WingScene.of(self.structure, self.condition, lanes(self.structure, self.model.genes, self.genome))
 
     def drive(self, numerics: Numerics, steps: int, beat: int) -> Array:
-        """Drive of a beat, see :func:`wingfit.sim.solver.scene.drive_table`."""
+        """Angles and rates of the driving rods over a beat, see :func:`wingfit.sim.solver.scene.drive_table`."""
         return drive_table(self.scene.rods, self.condition.flap_frequency, numerics, steps, beat)
 
 
 @dataclass(frozen=True)
 class Passed:
-    """One integrated beat: trace of the first lane, start state, and distance (m) from periodic."""
+    """One integrated beat of the first lane: its trace, its start state, and its distance (m) from periodicity."""
 
     trace: Trace
     start: State
@@ -85,9 +86,10 @@ class Passed:
 
 
 def beats(subject: Subject, steps: int, *, window: int, start: State | None = None) -> Iterator[Passed]:
-    """Beats of ``steps`` steps from rest or from ``start``, without end; ArithmeticError if a lane diverges.
+    """Yield one integrated beat of ``steps`` steps after another, from rest or from ``start``, endlessly.
 
-    As :func:`wingfit.sim.solver.settle.settle`, but every beat is yielded. ``window`` as in Numerics.
+    The search for a periodic motion is that of :func:`wingfit.sim.solver.settle.settle`, which returns only the last
+    beat. ``window`` as in Numerics. ArithmeticError if a lane diverges.
     """
     structure, numerics = subject.structure, Numerics(steps=steps, window=window)
     group, here = subject.scene.frozen(), subject.scene.setting(steps)
@@ -122,7 +124,7 @@ def _put(into: State, state: State) -> None:
 
 
 def periodic(subject: Subject, steps: int, start: State | None = None) -> Passed:
-    """The periodic beat with ``steps``, to within SETTLED."""
+    """The first beat of ``steps`` steps that is periodic to within SETTLED m; ArithmeticError after MOST_BEATS."""
     window = Numerics().window
     for passed in islice(beats(subject, steps, window=window, start=start), MOST_BEATS):
         if passed.distance <= SETTLED:
@@ -132,9 +134,10 @@ def periodic(subject: Subject, steps: int, start: State | None = None) -> Passed
 
 @dataclass(frozen=True)
 class Reference:
-    """The converged periodic motion.
+    """The converged periodic motion, with CONVERGED steps a beat.
 
-    ``tracks`` [CONVERGED, M, 3], ``change`` (m) compared with half as many steps, and a ``start`` state.
+    ``tracks`` [CONVERGED, M, 3] of the markers, m; ``change``: largest distance (m) from the tracks with half as many
+    steps; ``start``: state at the start of the beat.
     """
 
     tracks: Array
@@ -143,7 +146,10 @@ class Reference:
 
 
 def reference(subject: Subject, tolerance: float) -> Reference:
-    """The converged motion; ArithmeticError if half as many steps differ too much compared with ``tolerance`` (m)."""
+    """The converged motion of ``subject``.
+
+    ArithmeticError if the motion with half as many steps differs by more than a fraction of ``tolerance`` (m).
+    """
     half = periodic(subject, CONVERGED // 2)
     whole = periodic(subject, CONVERGED, half.start)
     change = largest_distance(half.trace.tracks, whole.trace.tracks)
@@ -161,7 +167,7 @@ def largest_distance(tracks: Array, converged: Array) -> float:
 
 
 def at_steps(tracks: Array, count: int) -> Array:
-    """Periodic tracks [m, M, 3] at ``count`` equal steps, by their full Fourier series."""
+    """Periodic ``tracks`` [m, M, 3] resampled at ``count`` equal steps of the beat, by their full Fourier series."""
     if len(tracks) % count == 0:
         return tracks[:: len(tracks) // count]
     series = np.fft.rfft(tracks, axis=0) / len(tracks)
@@ -188,7 +194,7 @@ def fewest_steps(subject: Subject, converged: Reference, tolerance: float, least
 
 
 def _error(subject: Subject, converged: Reference, steps: int) -> float:
-    """Largest error (m) of the periodic tracks with ``steps``; infinite if there are none."""
+    """Largest error (m) of the periodic tracks with ``steps`` steps a beat; infinite if no periodic motion is found."""
     try:
         return largest_distance(periodic(subject, steps, converged.start).trace.tracks, converged.tracks)
     except ArithmeticError:
@@ -196,9 +202,10 @@ def _error(subject: Subject, converged: Reference, steps: int) -> float:
 
 
 def beats_to_periodic(subject: Subject, steps: int, window: int, tolerance: float) -> int | None:
-    """Number of beats from rest, with the ramp, until all tracks stay within ``tolerance`` (m) of the periodic ones.
+    """Number of beats from rest until all tracks stay within ``tolerance`` (m) of the periodic ones.
 
-    Compared with the periodic tracks of as many steps; None if it takes more than MOST_BEATS.
+    The count includes the beats of the start-up ramp; the periodic tracks have as many steps a beat. None if it takes
+    more than MOST_BEATS.
     """
     final = periodic(subject, steps).trace.tracks
     errors = []
@@ -210,7 +217,7 @@ def beats_to_periodic(subject: Subject, steps: int, window: int, tolerance: floa
 
 
 def ms_per_beat(subject: Subject, steps: int, start: State, seconds: float = 0.6) -> float:
-    """Processor time of one beat per individual of a full group, without compilation: median of repeats."""
+    """Processor time (ms) of one beat, per individual of a full group of lanes, without compilation; a median."""
     structure, numerics = subject.structure, Numerics(steps=steps)
     group, here = subject.scene.frozen(), subject.scene.setting(steps)
     work = new_work(structure.wiring, here, group)
@@ -229,14 +236,18 @@ def ms_per_beat(subject: Subject, steps: int, start: State, seconds: float = 0.6
 
 @dataclass(frozen=True)
 class ByDefault:
-    """A simulation with default settings: ``ms`` for one individual of a full group until the periodic beat."""
+    """Result of a simulation with default settings.
+
+    ``beat``: of the first individual; ``ms``: processor time for one individual of a full group until its motion is
+    periodic.
+    """
 
     beat: Beat
     ms: float
 
 
 def by_default(subject: Subject) -> ByDefault:
-    """A full group through :func:`wingfit.sim.solver.simulate.periodic_beats`, and the first of its beats."""
+    """Time a full group of lanes in :func:`wingfit.sim.solver.simulate.periodic_beats`; minimum of three runs."""
     genomes = np.repeat(subject.genome, LANES, axis=0)
     arguments = (subject.model.subject((), subject.condition), genomes, subject.model.numerics)
     times, found = [], periodic_beats(*arguments)
@@ -250,9 +261,10 @@ def by_default(subject: Subject) -> ByDefault:
 
 
 def energy_error(subject: Subject, steps: int, count: int = 20) -> float:
-    """Energy error over ``count`` beats from rest, relative to the largest work through a port.
+    """Energy error over ``count`` beats from rest, relative to the largest of four works.
 
-    Change of stored energy (kinetic, elastic, gravitational) minus the work of dampers, two motors and air.
+    The error is the change of stored energy (kinetic, elastic, gravitational) minus the work of dampers, two motors and
+    air.
     """
     passed = [one.trace for one in islice(beats(subject, steps, window=0), count)]
     stored = np.concatenate([trace.energy for trace in passed]).sum(axis=1)

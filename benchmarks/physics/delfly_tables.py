@@ -1,4 +1,4 @@
-"""Results that follow from the printed tables alone (Armanini et al. 2016, Tables 3-5 and 8)."""
+"""Results that follow from the printed Tables 3-5 and 8 of Armanini et al. (2016) alone; Eq. 23 is theirs."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from wingfit.sim.virtual_rigs.balance import TRIALS, delfly, true_beat
 
 
 def tables_law() -> GlobalModel:
-    """Eq. 23 by unweighted least squares on Table 8."""
+    """Global model of Eq. 23 (coefficients affine in frequency and pitch) from unweighted least squares on Table 8."""
     local = [
         LocalEstimate(t.name, (t.name,), t.coefficients, dict.fromkeys(t.coefficients, 0.0), (), (), 0.0, True, ())
         for t in TRIALS
@@ -25,7 +25,10 @@ def tables_law() -> GlobalModel:
 
 
 def closest_law_percent(name: str) -> float:
-    """Smallest possible maximum of the relative error of an affine law on Table 8 (minimax), per cent."""
+    """Smallest maximum relative error (per cent) that an affine law can have for coefficient ``name`` of Table 8.
+
+    The law is affine in flap frequency and body pitch (minimax fit).
+    """
     values = np.array([trial.coefficients[name] for trial in TRIALS])
     design = (
         np.array([[1.0, t.condition.flap_frequency, t.condition.angle_of_attack] for t in TRIALS]) / values[:, None]
@@ -41,7 +44,10 @@ def closest_law_percent(name: str) -> float:
 
 
 def lift_by_root_pitch() -> dict[str, list[float]]:
-    """Mean lift (N) under each condition with the coefficients of Table 8, for both readings of the root's twist."""
+    """Mean lift (N) under each condition with the coefficients of Table 8, for root pitch angles "0" and "90_deg".
+
+    The paper can be read either way.
+    """
     found = {}
     for name, root in (("0", 0.0), ("90_deg", np.pi / 2)):
         vehicle = delfly()
@@ -52,7 +58,7 @@ def lift_by_root_pitch() -> dict[str, list[float]]:
 
 
 def fling_ends(model: BladeElementWing) -> list[float]:
-    """Earliest and latest t* at which fling circulation ends, over the conditions."""
+    """Earliest and latest time in the beat (fraction t*) at which fling circulation ends, over all conditions."""
     motion, n = model.vehicle.motion, 4000
     flap, rates = flap_series(motion.flap, {}, 1, n), [trial.condition.flap_frequency for trial in TRIALS]
     peels = [angles_of(flap, motion, {}, rate, n, claps=True, peel_width=0.0).peel[0] for rate in rates]

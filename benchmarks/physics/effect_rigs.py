@@ -1,4 +1,4 @@
-"""The rigs on which effects are measured: the Robird's wing and the DelFly with their campaigns, without noise."""
+"""The two rigs on which effects are measured, the Robird's wing and the DelFly, with noise-free recordings."""
 
 from __future__ import annotations
 
@@ -36,7 +36,8 @@ FORCE_BEATS, PER_BEAT = 3, 64
 class Rig:
     """A rig with its conditions.
 
-    ``unit`` converts m or N to the unit of the table (mm or mN); ``axes`` are those of the forces.
+    ``kind``: "wing" or "vehicle"; ``description``: the rig's data; ``unit``: factor from m or N to the table's mm or
+    mN; ``axes``: recorded force axes, none for a wing; ``quick``: whether to use only three conditions.
     """
 
     kind: Kind
@@ -46,14 +47,17 @@ class Rig:
     quick: bool
 
     def stands_for(self, effect: Effect) -> str:
-        """The term of the vehicle's model that is the effect itself; the reference model omits this term."""
+        """Name of the term of the vehicle's nominal model that is the same physics as ``effect``; "" if there is none.
+
+        The model without the effect omits this term.
+        """
         known = self.kind == "vehicle" and effect.name in BladeElementWing(delfly()).terms
         return effect.name if known else ""
 
     def model(self, effect: Effect | None, *, without: str = "") -> AnyModel:
-        """The model with ``effect``.
+        """The rig's model with ``effect``, or without any.
 
-        A vehicle without the term that the effect represents, and without the term ``without``.
+        A vehicle's model omits the term ``without``, and the term that is the same physics as the effect.
         """
         names = (effect.name,) if effect else ()
         if isinstance(self.description, Wing):
@@ -63,7 +67,7 @@ class Rig:
         return replace(bare, terms=tuple(term for term in bare.terms if term not in left_out), effects=names)
 
     def by_default(self, effect: Effect | None, without: str) -> AnyModel:
-        """The model with default settings and accuracy."""
+        """As :meth:`model`, but with the simulator's default number of steps and accuracy."""
         model = self.model(effect, without=without)
         return replace(model, numerics=Numerics()) if isinstance(model, FlexibleWing) else model
 
@@ -72,29 +76,32 @@ class Rig:
         return _recorded(self, without)
 
     def timed(self) -> tuple[Recording, ...]:
-        """Recordings for measuring the cost of a batch."""
+        """Every fourth (wing) or third (vehicle) recording, for measuring processor time."""
         return _recorded(self, "")[:: 4 if self.kind == "wing" else 3]
 
     def rms(self, difference: Array) -> float:
-        """RMS distance of a marker, or RMS force along an axis, over [D] values."""
+        """RMS displacement of a marker (m), or RMS force along an axis (N), of the values ``difference`` [D]."""
         per = difference.reshape(-1, 3 if self.kind == "wing" else 1)
         return float(np.sqrt((per**2).sum(axis=1).mean()))
 
     def changed(self, recordings: tuple[Recording, ...], difference: Array) -> tuple[Recording, ...]:
-        """The recordings with ``difference`` [D] added."""
+        """Copies of the recordings with ``difference`` [D], of all their values in turn, added."""
         ends = np.cumsum([recording.values.size for recording in recordings])
         parts = np.split(difference, ends[:-1])
         pairs = zip(recordings, parts, strict=True)
         return tuple(replace(one, values=one.values + part.reshape(one.values.shape)) for one, part in pairs)
 
     def parts(self, recordings: tuple[Recording, ...]) -> list[tuple[Recording, ...]]:
-        """Recordings that share a genome: all of a wing; for a vehicle each one alone, as in Armanini et al. (2016)."""
+        """Groups of recordings that are fitted with the same gene values.
+
+        All of a wing; for a vehicle each one alone, as in Armanini et al. (2016).
+        """
         return [recordings] if self.kind == "wing" else [(recording,) for recording in recordings]
 
 
 @cache
 def rig_of(kind: str, quick: bool) -> Rig:
-    """The rig of this kind."""
+    """The rig of this kind ("wing" or "vehicle"); ``quick``: with only three conditions."""
     if kind == "wing":
         return Rig("wing", robird_wing(), 1e3, (), quick)
     return Rig("vehicle", delfly(), 1e3, ("x", "z"), quick)
@@ -113,7 +120,7 @@ def _recorded(rig: Rig, without: str) -> tuple[Recording, ...]:
 
 @cache
 def recorded(rig: Rig, condition: Condition) -> Recording:
-    """Recording of the nominal wing under ``condition``."""
+    """Simulated recording of the nominal wing under ``condition``."""
     model = rig.model(None)
     return _filled(model, np.array([[gene.nominal for gene in model.genes]]), _strobed(rig, condition))
 
@@ -133,7 +140,10 @@ def _forces(number: int) -> Recording:
 
 
 def _filled(model: AnyModel, nominal: Array, blank: Recording) -> Recording:
-    """Recording of the nominal rig. The start of a track's beat is estimated from the track itself."""
+    """``blank`` with the values that ``model`` simulates for the gene values ``nominal`` [1, G].
+
+    The start of the beat is estimated from the tracks, as for a real recording; hence the two steps for a wing.
+    """
     if isinstance(model, BladeElementWing):
         return replace(blank, values=model.observe(nominal, blank).channels[0])
     beat = model.beat(nominal[0], blank)

@@ -1,4 +1,7 @@
-"""Operations of an integrator step, counted, and the peak performance of this core."""
+"""Counts the floating-point operations of one integrator step, and measures the peak performance of this core.
+
+The simulator's kernels compute LANES individuals at once, in "lanes".
+"""
 
 from __future__ import annotations
 
@@ -31,14 +34,14 @@ SUMS = (6, 12)  # accumulators that fill the registers of a core with AVX2 and o
 
 
 class Counter:
-    """Number of operations on lanes so far."""
+    """Number of floating-point operations so far, over all lanes."""
 
     def __init__(self) -> None:
         self.operations = 0
 
 
 class Counted:
-    """A group of lanes that counts the operations on it."""
+    """An array with one value per lane [LANES] that counts the arithmetic operations on it."""
 
     __array_ufunc__ = None  # numpy scalars use the arithmetic of this class
 
@@ -86,12 +89,12 @@ def _is_one(x: Counted | float) -> bool:
 
 
 def counting(function: Callable[..., Any], counter: Counter) -> Callable[..., Any]:
-    """A kernel, and all that it calls, as plain Python on counting lanes."""
+    """The compiled ``function``, and all that it calls, as plain Python that counts its operations in ``counter``."""
     return _Interpreter(counter).plain(function)
 
 
 class _Interpreter:
-    """Replaces compiled functions by their Python source, and lane accessors by those of :class:`Counted`."""
+    """Replaces compiled functions by their Python source, and array reads and writes by those of :class:`Counted`."""
 
     def __init__(self, counter: Counter) -> None:
         self.counter = counter
@@ -147,7 +150,7 @@ def _refused(*_: Any) -> None:
 
 
 class StepCount(NamedTuple):
-    """Operations of one step of a group of lanes, and the relative difference of its state from the compiled step's."""
+    """Operations of one step of a group of lanes; relative difference of its state from that of the compiled step."""
 
     operations: int
     difference: float
@@ -170,7 +173,10 @@ def count_step(division: str) -> StepCount:
 
 
 def run(integrate: Callable[..., Any], model: tuple[Any, ...], table: Array, state: State, trace: Trace) -> None:
-    """Apply ``integrate`` to the rows of ``table``; no lane may diverge."""
+    """Integrate with the kernel ``integrate`` over the rows (steps) of the drive ``table``, which changes ``state``.
+
+    RuntimeError if a lane diverges.
+    """
     alive = np.ones(LANES, bool)
     integrate(*model, table, new_work(*model), state, trace, alive)
     if not alive.all():
@@ -178,7 +184,7 @@ def run(integrate: Callable[..., Any], model: tuple[Any, ...], table: Array, sta
 
 
 def peak_gflops(repeats: int = 7, rounds: int = 2_000_000) -> float:
-    """Peak rate of fused multiply-adds on one core, in 1e9 operations a second, two for each."""
+    """Peak rate of one core in 1e9 operations a second; a fused multiply-add counts as two operations."""
     best = 0.0
     for sums, function in zip(SUMS, (_few, _many), strict=True):
         data = np.zeros((sums + 2, LANES))
@@ -193,7 +199,7 @@ def peak_gflops(repeats: int = 7, rounds: int = 2_000_000) -> float:
 
 @kernel
 def _few(data: Array, rounds: int) -> None:
-    """Six independent sums a = a x + y; x and y are the last rows of ``data`` [8, W]."""
+    """Repeat a = a x + y ``rounds`` times for six independent rows a of ``data`` [8, W]; x, y are its last rows."""
     x, y = load1(data, 6), load1(data, 7)
     a, b, c, d, e, f = load1(data, 0), load1(data, 1), load1(data, 2), load1(data, 3), load1(data, 4), load1(data, 5)
     for _ in range(rounds):
@@ -208,7 +214,7 @@ def _few(data: Array, rounds: int) -> None:
 
 @kernel
 def _many(data: Array, rounds: int) -> None:
-    """Twelve such sums; x and y are the last rows of ``data`` [14, W]."""
+    """Repeat a = a x + y ``rounds`` times for twelve independent rows a of ``data`` [14, W]; x, y are its last rows."""
     x, y = load1(data, 12), load1(data, 13)
     a, b, c, d, e, f = load1(data, 0), load1(data, 1), load1(data, 2), load1(data, 3), load1(data, 4), load1(data, 5)
     g, h, i, j, k, m = load1(data, 6), load1(data, 7), load1(data, 8), load1(data, 9), load1(data, 10), load1(data, 11)

@@ -1,4 +1,4 @@
-"""Where in the beat a model of forces misfits the recorded mean beat, with the fitted coefficients allowed for."""
+"""Locates the interval of the wing beat in which a fitted model of forces misses physics."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from wingfit.records.array_types import Array
 from wingfit.records.blas_threads import one_blas_thread
 
 SHARE = 0.9
-"""Share of the excess squared misfit for which :func:`located` makes its interval answer.
+"""Share of the excess squared misfit that the interval of :func:`located` must explain.
 
-The excess outside may then be a tenth: with more, the ringing of the low-pass, which smears every event over the
-beat, counts as misfit too; with less, the interval shrinks to the core of the event.
+With a larger share the interval would also include the ringing of the low-pass filter around an event; with a smaller
+one it would shrink to the core of the event.
 """
 SIGNIFICANCE = 0.01
 FEWEST_BEATS = 5  # for the scatter between beats to say what noise explains
@@ -28,19 +28,20 @@ FLIPS = 999
 def located(
     recording: Recording, residual: Array, sensitivities: Array | None = None, quantity: Quantity = "x"
 ) -> tuple[float, float] | None:
-    """Find where in the beat a model misses physics.
+    """Find where in the beat a model misses physics: start and end of the interval, as fractions t* of the beat.
 
-    ``residual`` [n] is the modelled minus the recorded mean beat, N, and ``sensitivities`` [n, F] its derivatives by
-    the coefficients that were fitted. The answer is the shortest interval of the beat (t*) without which the model,
-    fitted anew to the rest of the beat, has no more than 1 - SHARE of the excess left there: of the squared misfit less
-    what the scatter between beats leaves in a mean of so many. The new fit is needed because one to the whole beat
-    lets its coefficients make up for what is missing, and so carries the misfit into parts of the beat where the model
-    is right. Without ``sensitivities`` it is the shortest interval that holds SHARE of the excess.
+    ``residual`` [n] is the modelled minus the recorded mean beat, N, at n equal steps of the beat; ``sensitivities``
+    [n, F] are its derivatives by the coefficients that were fitted; ``quantity`` is the recorded force axis.
 
-    The interval may run over the end of the beat: then its end is above 1. None where the misfit is not significant:
-    beats are taken as exchangeable about their mean, their deviations get random signs, and the mean square of FLIPS
-    such means must reach that of the residual in at most SIGNIFICANCE of the cases (a wild bootstrap, Wu 1986). None
-    also with fewer than FEWEST_BEATS beats, too few to decide.
+    The excess is the squared misfit minus the part that random variation between beats explains. The result is the
+    shortest interval such that the model, fitted again to the rest of the beat only, keeps at most 1 - SHARE of the
+    excess there. This second fit is needed because a fit to the whole beat adapts the coefficients to the missing
+    physics, which creates misfit in parts of the beat where the model is right. Without ``sensitivities`` the result is
+    the shortest interval that contains SHARE of the excess.
+
+    An interval that continues over the end of the beat has an end above 1. None if the misfit is not significant by a
+    wild bootstrap (Wu 1986): in more than SIGNIFICANCE of FLIPS means of the beats' deviations with random signs, the
+    mean square reaches that of the residual. Also None with fewer than FEWEST_BEATS beats.
     """
     samples = whole_beats(recording, points=len(residual)).samples[quantity]
     if len(samples) < FEWEST_BEATS or not _significant(samples, residual):
@@ -52,9 +53,9 @@ def located(
 
 @one_blas_thread
 def missing_interval(problem: Problem, evaluator: Evaluator, recording: int = 0) -> tuple[float, float] | None:
-    """Find where in the beat the model of ``problem`` misses physics, at the problem's base genome.
+    """Interval of the beat (start and end, t*) in which the model of ``problem`` misses physics, as :func:`located`.
 
-    On the first fitted axis of its recording number ``recording``; see :func:`located`.
+    At the gene values ``problem.base``, for the first fitted force axis of recording number ``recording``.
     """
     genes, record = free_genes(problem), problem.recordings[recording]
     unit = unit_at(genes, np.array([problem.base[gene.name] for gene in genes]))
@@ -81,9 +82,10 @@ def _significant(samples: Array, residual: Array) -> bool:
 
 
 def _shortest(residual: Array, slopes: Array, noise: Array) -> tuple[float, float] | None:
-    """Shortest cyclic interval outside of which a new fit leaves at most 1 - SHARE of the excess; None without excess.
+    """Shortest cyclic interval (start, end; t*) outside of which a new fit keeps at most 1 - SHARE of the excess.
 
-    ``residual`` and ``noise`` (its variance) [n], ``slopes`` [n, F].
+    ``residual`` [n] and its variance ``noise`` [n]; ``slopes`` [n, F]: derivatives by the fitted coefficients. None if
+    the squared residual does not exceed the noise.
     """
     n, basis = len(residual), np.linalg.qr(slopes)[0]
     terms = np.concatenate([basis, residual[:, None]], axis=1)
@@ -104,7 +106,10 @@ def _shortest(residual: Array, slopes: Array, noise: Array) -> tuple[float, floa
 
 
 def _left(products: Array) -> Array:
-    """Squares [K] that a fit leaves, from sums of products [K, F + 1, F + 1] of basis and, last, residual."""
+    """Residual sums of squares [K] after K least-squares fits, from their normal equations.
+
+    ``products`` [K, F + 1, F + 1]: sums of products of the F basis functions and, last, the residual.
+    """
     inner, cross, square = products[:, :-1, :-1], products[:, :-1, -1], products[:, -1, -1]
     solved = np.einsum("kpq,kq->kp", np.linalg.pinv(inner, rcond=1e-9, hermitian=True), cross)
     return np.asarray(square - np.einsum("kp,kp->k", cross, solved))

@@ -1,4 +1,4 @@
-"""Uniform foam plates with known rods, and their linear statics through the compiled connectors."""
+"""Uniform foam plates with known rods as test cases, and their linear statics computed with the simulator's springs."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ Array = npt.NDArray[np.float64]
 
 
 def plate(chord: float, span: float, thickness: float, rods: tuple[Rod, Rod], markers: tuple[Marker, ...] = ()) -> Wing:
-    """A rectangle with a corner at the origin, massless without :class:`Materials`.
+    """A rectangular wing with a corner at the origin (lengths in m), of foam with 20 kg/m^3 and without skin.
 
-    Both rods are driven, but at rest.
+    Both rods are driven, by a drive at rest.
     """
     stations = tuple(Station(y, 0.0, chord, thickness) for y in (0.0, span))
     tip = Marker("tip", (chord / 2, span - 1e-9, 0.0), 0.0)
@@ -33,13 +33,16 @@ def plate(chord: float, span: float, thickness: float, rods: tuple[Rod, Rod], ma
 
 
 def loaded(structure: Structure, genome: Mapping[str, float]) -> Lanes:
-    """Lanes of one genome, given by name."""
+    """The simulator's parameter arrays for individuals with equal gene values, nominal if not in ``genome``."""
     genes = wing_genes({})
     return lanes(structure, genes, np.array([[genome.get(g.name, g.nominal) for g in genes]]))
 
 
 def stiffness_matrix(structure: Structure, genome: Mapping[str, float]) -> Array:
-    """[6 n, 6 n] stiffness of the bodies at rest, with fixed driving rods; rotations come first in each body."""
+    """Stiffness matrix [6 n, 6 n] of n bodies at rest, with fixed driving rods.
+
+    Each body has three rotations, then three displacements.
+    """
     w, n = structure.wiring, len(structure.bodies)
     group, state = loaded(structure, genome), at_rest(structure)
     Q, d = np.zeros((len(w.first), 9, LANES)), np.zeros((len(w.first), 3, LANES))
@@ -54,7 +57,10 @@ def stiffness_matrix(structure: Structure, genome: Mapping[str, float]) -> Array
 
 
 def spring_wrenches(structure: Structure, springs: Array, R: Array, p: Array) -> Array:
-    """[n + 2, 6, W] on bodies and rods at rotations R [n + 2, 9, W] and places p [n + 2, 3, W], without motion."""
+    """Static spring loads [n + 2, 6, W] (moment, force) on n bodies and 2 rods, for W poses.
+
+    Rotations ``R`` [n + 2, 9, W] and positions ``p`` [n + 2, 3, W].
+    """
     w = structure.wiring
     Q, d = np.zeros((len(w.first), 9, LANES)), np.zeros((len(w.first), 3, LANES))
     relative_pose(w.first, w.second, w.a, w.b, R, p, Q, d)
@@ -66,7 +72,10 @@ def spring_wrenches(structure: Structure, springs: Array, R: Array, p: Array) ->
 
 
 def displacement(K: Array, load: Array, held: tuple[int, ...] = ()) -> Array:
-    """Small displacement [n, 6] under wrenches ``load`` [n, 6], the bodies in ``held`` clamped."""
+    """Small rotations and displacements [n, 6] under the moments and forces ``load`` [n, 6].
+
+    ``K``: of :func:`stiffness_matrix`; the bodies in ``held`` are clamped.
+    """
     free = np.array([k for k in range(len(K)) if k // 6 not in held])
     u = np.zeros(len(K))
     u[free] = np.linalg.solve(K[np.ix_(free, free)], load.ravel()[free])

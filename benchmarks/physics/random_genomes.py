@@ -1,4 +1,4 @@
-"""Simulations of random genomes from the whole search box: whether they succeed, and how accurate they are."""
+"""Simulations of random gene values from the whole search range: whether they succeed, and how accurate they are."""
 
 from __future__ import annotations
 
@@ -30,7 +30,10 @@ REFERENCE = Numerics(steps=1024, periodic=1e-6, max_beats=120)
 
 
 class Task(NamedTuple):
-    """Genomes [B, G] of one division under one condition; ``checked``: also compared with converged motions."""
+    """Genomes [B, G] (sets of gene values) to simulate with one discretisation (``division``) under one condition.
+
+    ``checked``: whether the motions are also compared with converged ones.
+    """
 
     division: str
     condition: Condition
@@ -39,9 +42,11 @@ class Task(NamedTuple):
 
 
 class Ended(NamedTuple):
-    """Results of a task: reasons (None: success), beats of each genome, and processor time (s) of all.
+    """Results of a task.
 
-    ``errors``: largest error (m) of each; NaN if it was not checked, or if either simulation failed.
+    ``reasons``: of failure of each genome, None if it succeeded; ``beats``: simulated beats of each; ``seconds``:
+    processor time of all; ``errors``: largest error (m) of each, NaN if it was not checked or if either simulation
+    failed.
     """
 
     task: Task
@@ -52,13 +57,13 @@ class Ended(NamedTuple):
 
 
 def draw(genes: tuple[Gene, ...], count: int, seed: int) -> Array:
-    """Genomes [count, G], log-uniform over the whole box."""
+    """``count`` random genomes [count, G], log-uniform over the search ranges of all ``genes``."""
     units = np.random.default_rng(seed).uniform(size=(count, len(genes)))
     return np.stack([gene.from_unit(units[:, k]) for k, gene in enumerate(genes)], axis=1)
 
 
 def tasks(genomes: Array, campaign: tuple[Condition, ...] = CAMPAIGN) -> list[Task]:
-    """Genomes are distributed over the conditions in turn, and over the divisions in turn."""
+    """Split ``genomes`` [n, G] into tasks, cycling through the conditions of ``campaign`` and the discretisations."""
     found = []
     for c, condition in enumerate(campaign):
         rounds = genomes[c :: len(campaign)]
@@ -68,7 +73,7 @@ def tasks(genomes: Array, campaign: tuple[Condition, ...] = CAMPAIGN) -> list[Ta
 
 
 def simulate(task: Task) -> Ended:
-    """Simulate at the default accuracy."""
+    """Simulate the genomes of ``task`` at the default accuracy."""
     model = FlexibleWing(robird_wing(), task.division)
     blank = blank_recording(model.wing, task.condition)
     start = time.thread_time()
@@ -89,7 +94,11 @@ def run(
     limit: float = LIMIT,
     work: Callable[[Task], Ended] = simulate,
 ) -> list[Ended]:
-    """Finished tasks of ``todo``, in any order; processes that give no result for ``limit`` seconds are killed."""
+    """Run the tasks ``todo`` in ``workers`` processes; returns the results of those that finished, in any order.
+
+    If there is no result for ``limit`` seconds, the processes are killed. ``progress`` gets the numbers done and in
+    all.
+    """
     done: list[Ended] = []
     with multiprocessing.get_context("spawn").Pool(workers) as pool:
         results = pool.imap_unordered(work, todo)
@@ -131,7 +140,7 @@ def summary(todo: list[Task], done: list[Ended]) -> dict[str, Any]:
 
 
 def _case(one: Ended, k: int) -> dict[str, Any]:
-    """All that is needed to repeat the k-th genome of a task."""
+    """Description of the k-th genome of a task for the report, sufficient to simulate it again."""
     nominal = np.array([gene.nominal for gene in FlexibleWing(robird_wing()).genes])
     return {
         "division": one.task.division,
@@ -143,7 +152,7 @@ def _case(one: Ended, k: int) -> dict[str, Any]:
 
 
 def _shares(done: list[Ended]) -> dict[str, float]:
-    """Percentage that finished by division, medium, and airspeed or pressure."""
+    """Percentage of genomes that succeeded, by discretisation, medium, and airspeed or pressure."""
     finished: Counter[str] = Counter()
     ended: Counter[str] = Counter()
     for one in done:
@@ -154,7 +163,7 @@ def _shares(done: list[Ended]) -> dict[str, float]:
 
 
 def kind(reason: str) -> str:
-    """The kind of a reason, one of KINDS, or its first words."""
+    """Category of a failure ``reason``: one of KINDS, or its first words."""
     return next((known for known in KINDS if reason.startswith(known)), re.split(r"[:;]", reason)[0])
 
 

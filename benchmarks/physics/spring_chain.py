@@ -1,4 +1,4 @@
-"""Beams as wings of foam, and the chain of rigid bodies that approximates them, under a large load at the tip."""
+"""A beam approximated by a chain of rigid bodies (a foam wing of the simulator), under a large load at its tip."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Array = npt.NDArray[np.float64]
 
 
 def cut_beam(beam: Beam, division: str) -> Structure:
-    """The beam as a foam wing with a straight centre line; both driven rods have no stiffness and no mass."""
+    """The beam as rigid bodies: a foam wing with a straight centre line, and rods without stiffness or mass."""
     middle, (c0, c1), (h0, h1) = beam.chord[0] / 2, beam.chord, beam.thickness
     rods = tuple(Rod(n, middle, 0.0, middle, beam.length, 0.0, 0.0, 0.0) for n in ("front", "rear"))
     stations = tuple(Station(y, middle - c / 2, c, h) for y, c, h in ((0.0, c0, h0), (beam.length, c1, h1)))
@@ -31,15 +31,16 @@ def cut_beam(beam: Beam, division: str) -> Structure:
 
 
 def genome(beam: Beam) -> dict[str, float]:
-    """Moduli of the beam, no damping."""
+    """Gene values of a wing with the moduli of the beam and no damping."""
     return {"E_f": beam.young, "G_f": beam.shear, "D_E": 0.0, "D_G": 0.0}
 
 
 class _Chain:
     """Chain of rigid bodies on their springs under a constant force at the tip, in joint coordinates.
 
-    u [n, 6] of each joint: rotation vector, and displacement in the inner body's axes. (In the bodies' own coordinates
-    every rotation stretches the stiff chain, and Newton's method converges slowly.)
+    The joint coordinates u [n, 6] are the rotation vector (rad) of each joint and its displacement (m) in the inner
+    body's axes. (In the bodies' own coordinates every rotation stretches the stiff chain, and Newton's method converges
+    slowly.)
     """
 
     def __init__(self, beam: Beam, strips: int) -> None:
@@ -53,7 +54,7 @@ class _Chain:
         self.a, self.b = w.a[inner], w.b[inner]
 
     def poses(self, u: Array) -> tuple[Array, Array]:
-        """Rotations [W, n + 2, 3, 3] and places [W, n + 2, 3] at joint coordinates ``u`` [W, 6 n]."""
+        """Rotations [W, n + 2, 3, 3] and positions [W, n + 2, 3] m of bodies and rods; ``u`` [W, 6 n]."""
         joint = u.reshape(len(u), self.n, 6)
         R = np.tile(self.state.R[..., 0].reshape(-1, 3, 3), (len(u), 1, 1, 1))
         p = np.tile(self.state.p[..., 0], (len(u), 1, 1))
@@ -65,7 +66,10 @@ class _Chain:
         return R, p
 
     def unbalanced(self, u: Array, load: float) -> Array:
-        """Unbalanced wrenches [W, 6 n] (body axes) at ``u`` [W, 6 n], from the compiled forces, LANES at a time."""
+        """Sums of moments and forces [W, 6 n] on the bodies (body axes) at joint coordinates ``u`` [W, 6 n].
+
+        They vanish in equilibrium under the tip force ``load``.
+        """
         found = []
         R_all, p_all = self.poses(u[np.arange(-(-len(u) // LANES) * LANES) % len(u)])
         for k in range(0, len(u), LANES):
@@ -79,7 +83,7 @@ class _Chain:
         return rest
 
     def settle(self, load: float) -> tuple[Array, Array]:
-        """Equilibrium pose by Newton's method, with a Jacobian by central differences of the compiled forces."""
+        """Rotations and positions in equilibrium under the tip force ``load`` (N), by Newton's method."""
         size, h, u = 6 * self.n, 1e-5, np.zeros(6 * self.n)
         for _ in range(40):
             sides = self.unbalanced(u + h * np.concatenate([np.eye(size), -np.eye(size)]), load)
@@ -93,7 +97,10 @@ class _Chain:
 
 
 def spring_chain(beam: Beam, strips: int, load: float) -> tuple[float, float, float]:
-    """The results of `beam_theory.elastica` for the chain; ``load`` is P L^2 / E I of the uniform beam."""
+    """Deflection / L, shortening / L and tip rotation (rad) of the chain, as `beam_theory.elastica` for the beam.
+
+    ``load`` is P L^2 / E I of the uniform beam.
+    """
     chain = _Chain(beam, strips)
     inertia = beam.chord[0] * beam.thickness[0] ** 3 / 12
     R, p = chain.settle(load * beam.young * inertia / beam.length**2)

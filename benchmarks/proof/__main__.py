@@ -1,7 +1,8 @@
 """Both case studies in one command: ``python -m benchmarks.proof`` (or ``make proof``), under 15 minutes on 2 cores.
 
-Data are recorded from a plant that shares no code with the simulator, with hidden physics. The files are diagnosed, and
-each study ends with a report. Its claims are checked; the exit status is 1 if one does not hold.
+The data come from "the plant", a simulator that shares no code with wingfit's own and contains hidden physics. The
+files are diagnosed, and each study ends with a report. Claims about the result are checked; the exit status is 1 if one
+does not hold.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ TITLES = {
 
 
 def main(words: list[str] | None = None) -> int:
-    """Run the studies; 0 if every claim holds."""
+    """Run the studies with the command-line arguments ``words``; returns 0 if every claim holds, else 1."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.proof", description=__doc__)
     parser.add_argument("--json", action="store_true", help="print one JSON object as the last line")
     parser.add_argument("--only", choices=tuple(TITLES), help="run only this study")

@@ -1,6 +1,7 @@
-"""The DelFly study: wings that clap and peel, and a model after Berman and Wang (2007) without wing-wing interaction.
+"""The DelFly study: data of wings that clap and peel, diagnosed with a model that lacks wing-wing interaction.
 
-Conditions are those of Armanini et al. (2016), Table 4, with the coefficients estimated there for each test (Table 8).
+The model is after Berman and Wang (2007). Conditions are those of Armanini et al. (2016), Table 4, with the
+coefficients estimated there for each test (Table 8).
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ AS_IN_TABLE_7 = float(np.mean(LIFT_CORRELATION))
 
 @dataclass(frozen=True)
 class Lift:
-    """Correlation of modelled with recorded lift in one test, before and after the diagnosis."""
+    """Correlation of modelled with recorded lift in one test (``name``), before and after the diagnosis."""
 
     name: str
     held_out: bool
@@ -52,9 +53,9 @@ def campaign(
     held_out: tuple[str, ...] = HELD_OUT,
     without: tuple[str, ...] = (),
 ) -> Dataset:
-    """Record the plant with the coefficients of each test, ``without`` some terms.
+    """Dataset of simulated balance recordings, one per test in ``trials``, with that test's coefficients.
 
-    The same seed gives the same bits.
+    The plant omits the force terms ``without``. The same seed gives bit-identical data.
     """
     bench = VehicleBench(Build("vehicle", without=without))
     balance = bench.quality(np.random.default_rng([seed, 2]))
@@ -69,7 +70,10 @@ def campaign(
 def located(
     dataset: Dataset, evaluator: Evaluator, trials: tuple[Trial, ...] = TRIALS
 ) -> dict[str, tuple[float, float] | None]:
-    """Range of the beat (t*) where the nominal model misfits, when fitted to each test separately as in the source."""
+    """Interval of the beat (t*) in which the nominal model misses physics, by test; None if it is not significant.
+
+    The model is fitted to each test separately, as by Armanini et al. (2016).
+    """
     spec, model = CalibrationSpec(preset=BASELINE), vehicle_model(dataset, CalibrationSpec(preset=BASELINE))
     tests = {trial.name: trial for trial in trials}
     return {
@@ -80,7 +84,10 @@ def located(
 
 
 def lifts(dataset: Dataset, finding: Finding, evaluator: Evaluator) -> tuple[Lift, ...]:
-    """Lift agreement in each test: of the nominal model calibrated on all fitted tests, and of the diagnosed model."""
+    """Correlation of modelled with recorded lift in each test, for nominal and diagnosed model.
+
+    The nominal model is calibrated on all fitted tests.
+    """
     spec = CalibrationSpec(preset=BASELINE, mode="joint", axes=AXES)
     *_, last = calibrate(spec, dataset, evaluator)
     before = _lift(dataset, spec, last.genome)
@@ -92,7 +99,7 @@ def lifts(dataset: Dataset, finding: Finding, evaluator: Evaluator) -> tuple[Lif
 
 
 def _lift(dataset: Dataset, spec: CalibrationSpec, values: Mapping[str, float]) -> dict[str, float]:
-    """Correlation of lift by recording, of the model of ``spec`` with genes ``values``."""
+    """Correlation of modelled with recorded lift by recording, for the model of ``spec`` with genes ``values``."""
     model = vehicle_model(dataset, spec)
     genome, found = base_genome(model, values), {}
     for recording in dataset.recordings:
@@ -105,7 +112,7 @@ def _lift(dataset: Dataset, spec: CalibrationSpec, values: Mapping[str, float]) 
 
 
 def play(folder: Path, seed: int, workers: int) -> Story:
-    """Record, locate, diagnose; datasets and report are written to ``folder``."""
+    """Run the study: simulate recordings, diagnose them, locate the misfit; dataset and report go to ``folder``."""
     dataset = campaign(seed)
     finding, page = diagnosed(saved(dataset, folder), {"preset": BASELINE}, workers)
     evaluator = make_evaluator("in_process")
@@ -118,7 +125,10 @@ def play(folder: Path, seed: int, workers: int) -> Story:
 def story_of(
     finding: Finding, places: Mapping[str, tuple[float, float] | None], lift: tuple[Lift, ...], page: Path
 ) -> Story:
-    """Figures, text and claims of the study; ``places`` by test, t*."""
+    """Figures, text and claims of the study.
+
+    ``places``: interval of the misfit by test, from :func:`located`; ``page``: path of the report.
+    """
     best, floors = leader(finding), over_floor(finding)
     found = [place for place in places.values() if place is not None]
     widest = (min(p[0] for p in found), max(p[1] for p in found)) if found else None
@@ -172,7 +182,7 @@ def story_of(
 
 
 def _ends(interval: Interval) -> tuple[float, float]:
-    """Bounds of an interval; a missing bound may be a beat away."""
+    """Lower and upper bound of a phase interval (beats); a missing bound is set one beat from the value."""
     low, high = interval.low, interval.high
     return interval.value - 1.0 if low is None else low, interval.value + 1.0 if high is None else high
 

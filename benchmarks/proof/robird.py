@@ -1,4 +1,4 @@
-"""The Robird study: neither the place of the drive's axis nor the linkage is as described.
+"""The Robird study: data of a wing whose drive axis and linkage differ from their description.
 
 van der Grinten's search stalled at a mean distance of about 2 cm between simulated and recorded markers, and he named
 the place of the drive's axis as a likely cause. Here the plant's axis is displaced and its linkage has a longer frame;
@@ -66,16 +66,20 @@ AT_FLOOR = 1.15  # ratio to the floor below which a held-out misfit counts as at
 
 @dataclass(frozen=True)
 class Campaign:
-    """A dataset, the true nominal ``genome``, and the true values of the library's genes for the hidden effects."""
+    """A dataset with its true values.
+
+    ``genome``: nominal genes; ``truth``: genes of the diagnosis's own effects that mean the same as the hidden effects.
+    """
 
     dataset: Dataset
     genome: Mapping[str, float]
     truth: Mapping[str, float]
 
     def left_by_truth(self) -> float:
-        """RMS misfit (m) of the true values on the held-out recordings, with the library's form of the effects.
+        """RMS misfit (m) on the held-out recordings of the diagnosis's own effects with the true gene values.
 
-        Larger than the noise: the library's drive has three wrong harmonics, the plant's has all.
+        It exceeds the noise, because the diagnosis's effect changes three harmonics of the drive, the plant's changes
+        all.
         """
         spec = CalibrationSpec(division=DIVISION, effects=tuple({name.partition(".")[0] for name in self.truth}))
         model = wing_model(self.dataset, spec)
@@ -87,7 +91,7 @@ class Campaign:
 
 @dataclass(frozen=True)
 class Stall:
-    """The end of the thesis's search: it ``stalled``, or was stopped at the time limit.
+    """Result of van der Grinten's genetic search: it ``stalled``, or was stopped at the time limit.
 
     ``gain`` is the relative decrease of the best misfit over the last RECENT generations of its last stage.
     """
@@ -101,7 +105,7 @@ class Stall:
 
 
 def campaign(seed: int, hidden: Concealed = HIDDEN) -> Campaign:
-    """Film the plant with random parameters under all conditions; the same seed gives the same bits."""
+    """Simulate recordings of the plant with random parameters under all conditions, reproducibly from ``seed``."""
     bench = WingBench(Build("wing", DIVISION, DIVISION))
     genome = bench.genome(np.random.default_rng([seed, 1]))
     recordings, conditions = list[Recording](), (*FITTED, *HELD_OUT)
@@ -117,7 +121,10 @@ def campaign(seed: int, hidden: Concealed = HIDDEN) -> Campaign:
 def stall(
     dataset: Dataset, evaluator: Evaluator, seconds: float = SEARCH_S, spec: CalibrationSpec | None = None
 ) -> Stall:
-    """Search the nominal model as in the thesis (population 50, structure in vacuum first) until it stalls."""
+    """Calibrate the nominal model by the genetic search of van der Grinten's thesis until it stalls.
+
+    Population 50, structural genes in vacuum first; ``seconds``: time limit.
+    """
     spec, began = spec or CalibrationSpec(division=DIVISION), time.monotonic()
     last, stalled, stages, best = None, True, list[str](), list[float]()
     with progress(f"{dataset.name}: the thesis's search") as tell:
@@ -143,7 +150,7 @@ def gained(stages: Sequence[str], best: Sequence[float]) -> float:
 
 
 def play(folder: Path, seed: int, workers: int, seconds: float = SEARCH_S) -> Story:
-    """Record, search, diagnose; dataset and report are written to ``folder``."""
+    """Run the study: simulate recordings, search as in the thesis, diagnose; dataset and report go to ``folder``."""
     made = campaign(seed)
     path = saved(made.dataset, folder)
     evaluator = make_evaluator("processes", workers)
@@ -156,7 +163,7 @@ def play(folder: Path, seed: int, workers: int, seconds: float = SEARCH_S) -> St
 
 
 def story_of(made: Campaign, search: Stall, finding: Finding, page: Path) -> Story:
-    """Figures, text and claims of the study."""
+    """Figures, text and claims of the study; ``page``: path of the report."""
     best, kinds, floors = leader(finding), families(finding), over_floor(finding)
     rows = beside_truth({gene.name: gene for gene in finding.genes}, made.truth)
     after, truth = floors["heldout_over_floor"], made.left_by_truth()

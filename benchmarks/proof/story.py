@@ -1,4 +1,4 @@
-"""Common parts of both case studies: dataset on disk, diagnosis as a user runs it, report, and claims."""
+"""Common parts of both case studies: save the dataset, diagnose it as a user would, write the report, check claims."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Claim:
 
 @dataclass(frozen=True)
 class Story:
-    """A finished study: ``figures`` for JSON, ``lines`` of text, and the report."""
+    """Result of a study: ``figures`` for JSON, ``lines`` of text, ``claims``, and the path of the report."""
 
     figures: Numbers
     lines: tuple[str, ...]
@@ -39,7 +39,7 @@ class Story:
     report: Path
 
     def as_json(self) -> dict[str, Any]:
-        """Plain values for JSON."""
+        """The figures, claims and path of the report as a dictionary for JSON."""
         return {**self.figures, "claims": [asdict(claim) for claim in self.claims], "report": str(self.report)}
 
 
@@ -76,13 +76,16 @@ def nominal_misfit(finding: Finding) -> float:
 
 
 def families(finding: Finding) -> tuple[str, ...]:
-    """Family of each named effect."""
+    """Family (structure, actuation, ...) of each effect that the finding names; "" if unknown."""
     known = {one.effects[0]: one.family for one in finding.hypotheses if len(one.effects) == 1}
     return tuple(known.get(name, "") for name in finding.named)
 
 
 def beside_truth(genes: Mapping[str, GeneValue], truth: Mapping[str, float]) -> list[dict[str, Any]]:
-    """Each true value with its estimate and 90 % interval; None if the effect was not named."""
+    """One row per true value: gene, true value, estimate, bounds of the 90 % interval, and whether it covers the truth.
+
+    Entries are None if the effect was not named.
+    """
     rows = []
     for name, true in truth.items():
         found = genes[name].value if name in genes else None
@@ -101,7 +104,7 @@ def beside_truth(genes: Mapping[str, GeneValue], truth: Mapping[str, float]) -> 
 
 
 def over_floor(finding: Finding) -> dict[str, float | None]:
-    """Held-out misfit / floor, before and after the diagnosis."""
+    """Held-out misfit divided by the smallest misfit that can be expected, before and after the diagnosis."""
     proof = finding.proof
     return {
         "heldout_before_over_floor": None if proof is None else proof.before.value,

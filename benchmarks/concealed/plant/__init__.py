@@ -1,1 +1,1 @@
-"""Simulated rigs that share no code with the product, and the cameras and balances that record them."""
+"""The plant: simulated rigs that share no code with the product's simulator, with simulated cameras and a balance."""

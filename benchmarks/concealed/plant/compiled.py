@@ -1,4 +1,4 @@
-"""Compilation of the plant's loops with numba, cached on disk under a hash of all compiled files."""
+"""Numba compilation for the plant (the simulator that produces the test data), cached on disk by source hash."""
 
 from __future__ import annotations
 
@@ -35,7 +35,10 @@ _CACHE = _folder()
 
 
 def compiled(function: F) -> F:
-    """Compile ``function``; sums may be reordered. OSError if no cache folder is writable."""
+    """Decorator: ``function`` compiled by numba without the GIL; floating-point sums may be reordered.
+
+    OSError if no cache folder is writable.
+    """
     before = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(_CACHE)
     try:

@@ -1,4 +1,4 @@
-"""Description of what can be hidden in a vehicle or in the measurement."""
+"""Description of the effects that can be hidden in simulated test data: physics of a vehicle, or measurement faults."""
 
 from __future__ import annotations
 
@@ -10,23 +10,27 @@ import numpy as np
 
 Parameters = Mapping[str, float]
 Concealed = Mapping[str, Parameters]
-"""Hidden effects: parameters by name of the law. "strength" is the size; at zero there is no effect."""
+"""Hidden effects by name of their :class:`Law`, each with its parameters by name.
+
+"strength" is the size of the effect; at zero there is no effect.
+"""
 
 
 @dataclass(frozen=True)
 class Law:
-    """An effect or a fault that can be hidden.
+    """An effect that can be hidden in test data. "The library" is the set of effects that a diagnosis can detect.
 
     Attributes:
         name: of the library's effect with the same meaning, or a name of its own if the library has none.
-        side: physics, or a fault of the measurement.
-        typical: strength that is typical in practice.
+        side: "physics", or "measurement" for a fault of the measurement.
+        typical: strength that is typical in practice, in the unit of the effect.
         source: literature.
         listed: whether the library has the effect.
         both_signs: whether the strength may be negative.
-        shape: range from which each other parameter is drawn. "span" and "chord" (fractions) and "phase" (beats) say
-            where and when the effect acts.
-        values: computes the library's genes with the same meaning, by name, from the parameters.
+        shape: (low, high) of the uniform distribution of each parameter other than the strength. "span" and "chord"
+            (fractions) and "phase" (beats) say where and when the effect acts.
+        values: function from the parameters to the true values, by name, of those genes (parameters) of the library's
+            effect that have the same meaning.
     """
 
     name: str

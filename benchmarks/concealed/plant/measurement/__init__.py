@@ -1,1 +1,1 @@
-"""Cameras and balances: from a motion to a recording, with noise, gaps and faults."""
+"""Simulated cameras and balances: they turn a motion or forces into a recording with noise, gaps and faults."""

@@ -1,6 +1,6 @@
-"""From the forces of a vehicle to a recording by a balance.
+"""Simulated force balance: turns the periodic forces of a vehicle into a recording.
 
-Variation between beats, mount, amplifier, noise, faults.
+It adds variation between wing beats, vibration of the mount, drift, sensor noise, and the faults of :data:`FAULTS`.
 """
 
 from __future__ import annotations
@@ -32,16 +32,17 @@ _CUT = 0.4  # cut-off of the filter before the decimation, relative to the sampl
 
 @dataclass(frozen=True)
 class Weighing:
-    """Settings of the balance. They describe noise: none of it repeats with the beat.
+    """Settings of the balance: its noise, which does not repeat from one wing beat to the next, and its sampling.
 
     Attributes:
-        colour, memory: of the sensor's noise; memory is its lag-1 autocorrelation.
-        sensor: its standard deviation, N.
-        rattle: standard deviation of vibrations of the mount at its natural frequency, N.
-        mount: that frequency along x and z, Hz.
+        colour: spectral colour of the sensor's noise, as in :data:`.noise.Colour`.
+        memory: pole modulus of the sensor's noise (:func:`.noise.coloured`); lag-1 autocorrelation if first order.
+        sensor: standard deviation of the sensor's noise, N.
+        rattle: standard deviation of the mount's random vibration at its natural frequency, N.
+        mount: natural frequencies of the mount along x and z, Hz.
         wander: standard deviation of a slow drift, N.
-        scatter: relative variation of the force between beats.
-        jitter: variation of the start of a beat, beats.
+        scatter: standard deviation of the relative variation of the force between beats.
+        jitter: standard deviation of the variation of the start of a beat, in beats.
         rate: samples per second.
         beats: number of beats in a recording.
     """
@@ -59,7 +60,10 @@ class Weighing:
 
 
 class Weighed(NamedTuple):
-    """A recording, the same without noise [T, C], and the RMS of the noise (N, all frequencies)."""
+    """A recording by the balance.
+
+    ``clean`` [T samples, 2]: its values without noise, N; ``noise``: RMS of the noise over all frequencies, N.
+    """
 
     recording: Recording
     clean: Array
@@ -77,7 +81,7 @@ def draw_weighing(rng: np.random.Generator) -> Weighing:
 
 
 def silent(weighing: Weighing) -> Weighing:
-    """The same balance without noise."""
+    """The same balance without noise, drift and variation between beats."""
     return replace(weighing, sensor=0.0, rattle=0.0, wander=0.0, scatter=0.0, jitter=0.0)
 
 
@@ -91,9 +95,10 @@ def weigh(
     *,
     name: str = "balance",
 ) -> Weighed:
-    """Record the periodic ``forces`` [n, 2] along body x and z (N, from t* = 0) of a vehicle on a balance.
+    """Simulate a recording by the balance of one wing beat that repeats.
 
-    ``hidden``: parameters of the faults, by name as in :data:`FAULTS`. The draws of ``rng`` do not depend on them.
+    ``forces`` [n, 2] along body x and z, N, at n equal steps of a beat from its start. ``hidden``: faults of the
+    balance with their parameters, by name as in :data:`FAULTS`; the numbers drawn from ``rng`` do not depend on them.
     """
     hidden = hidden or {}
     check_known(hidden, FAULTS)
@@ -108,7 +113,7 @@ def weigh(
 def _measured(
     forces: Array, vehicle: Vehicle, air: Condition, weighing: Weighing, hidden: Concealed, rng: np.random.Generator
 ) -> Array:
-    """What the balance shows: forces [T, 2] in N along x and z, at the recording's rate."""
+    """Output of the balance: forces [T, 2] in N along x and z, at the sampling rate ``weighing.rate``."""
     fine, frequency = weighing.rate * _FINER, air.flap_frequency
     kept = math.ceil(weighing.beats * weighing.rate / frequency)
     lead = round(_LEAD * weighing.rate / frequency) * _FINER
@@ -126,12 +131,15 @@ def _measured(
 
 
 def _clock(t: Array, hidden: Concealed) -> Array:
-    """True sampling times."""
+    """True times (s) of samples whose recorded times are ``t``: the clock may have an offset or a wrong rate."""
     return np.asarray(t * (1.0 + strength(hidden, "strobe_rate")) + strength(hidden, "clock_offset"))
 
 
 def _by_beat(at: Array, memory: float, rng: np.random.Generator) -> Array:
-    """Unit noise with one value in the middle of each beat and a smooth curve between; ``at`` [T] in beats."""
+    """Noise of unit variance at times ``at`` [T] (beats): one random value per beat, joined by a cubic spline.
+
+    ``memory``: autocorrelation from one beat to the next.
+    """
     first = math.floor(at[0]) - 3
     count = math.ceil(at[-1]) - first + 4
     values = coloured("first_order", memory, (count,), rng)
@@ -139,7 +147,7 @@ def _by_beat(at: Array, memory: float, rng: np.random.Generator) -> Array:
 
 
 def _noise(weighing: Weighing, count: int, fine: float, rng: np.random.Generator) -> Array:
-    """Vibration of the mount and a slow drift, [``count``, 2] in N along x and z, at ``fine`` samples per second."""
+    """Noise [``count``, 2] in N along x and z: mount vibration plus slow drift, at ``fine`` samples per second."""
     out = np.empty((count, 2))
     for k, natural in enumerate(weighing.mount):
         b, a = _mount(natural, 0.02, fine)
@@ -151,10 +159,10 @@ def _noise(weighing: Weighing, count: int, fine: float, rng: np.random.Generator
 
 
 def _mount(natural: float, damping: float, rate: float) -> tuple[Array, Array]:
-    """Filter from the force on a mass to the force that its spring and damper transmit.
+    """Numerator and denominator of the digital filter from the force on a mass to the force its mount transmits.
 
-    x'' + 2 zeta w x' + w^2 x = F, and w^2 x + 2 zeta w x' is measured (Den Hartog 1956, transmissibility). The force is
-    held between samples.
+    With F the force per unit mass, w = 2 pi ``natural`` (Hz) and zeta = ``damping``, x'' + 2 zeta w x' + w^2 x = F; the
+    output is w^2 x + 2 zeta w x' (Den Hartog 1956, transmissibility). F is constant between samples at ``rate`` (Hz).
     """
     w = 2.0 * math.pi * natural
     numerator, denominator = [2.0 * damping * w, w * w], [1.0, 2.0 * damping * w, w * w]
@@ -163,7 +171,10 @@ def _mount(natural: float, damping: float, rate: float) -> tuple[Array, Array]:
 
 
 def _through(forces: Array, rate: float, hidden: Concealed) -> Array:
-    """Axes, mount and amplifier, in the time domain."""
+    """Forces [T, 2] after the faults of axes, mount and amplifier: cross-talk, resonance, delay, dry friction.
+
+    ``rate``: samples of ``forces`` [T, 2] per second.
+    """
     if strength(hidden, "balance_tilt"):
         a = strength(hidden, "balance_tilt")
         forces = forces @ np.array([[1.0, a], [-a, 1.0]])  # cross-talk that the calibration matrix omits
@@ -183,7 +194,10 @@ def _through(forces: Array, rate: float, hidden: Concealed) -> Array:
 
 
 def _stuck(forces: Array, p: Parameters) -> Array:
-    """A pivot with stiction: the output follows the force at a distance (the play operator, Krejci 1996)."""
+    """Output [T, 2] of a pivot with stiction: it moves only once a force differs from it by ``strength`` (N).
+
+    Play operator of Krejci (1996), on each axis.
+    """
     reach, out = p["strength"], np.empty_like(forces)
     shown = forces[0]
     for t, force in enumerate(forces):
@@ -193,7 +207,7 @@ def _stuck(forces: Array, p: Parameters) -> Array:
 
 
 def _shown(forces: Array, t: Array, vehicle: Vehicle, hidden: Concealed) -> Array:
-    """Gain, saturation, zero error and drift of the output."""
+    """Forces [T, 2] (N) at times ``t`` [T] (s) after the faults of the output: gain, saturation, zero error, drift."""
     gain = 1.0 + strength(hidden, "scale_error") * np.array([1.0, _UNEQUAL])
     forces = forces * gain
     if strength(hidden, "clipping"):

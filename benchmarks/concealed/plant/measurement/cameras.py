@@ -1,4 +1,4 @@
-"""Two cameras: pinhole projection, its possible faults, and the intersection of the rays."""
+"""Two simulated pinhole cameras: projection, possible faults, and 3-D points from the intersection of the rays."""
 
 from __future__ import annotations
 
@@ -40,12 +40,15 @@ class Cameras:
     span: float
 
     def image(self, points: Array, k: int) -> Array:
-        """Image [..., 2] in camera ``k`` of ``points`` [..., 3], in focal lengths from the middle of the image."""
+        """Image coordinates [..., 2] in camera ``k`` of ``points`` [..., 3] m; in focal lengths from the middle."""
         seen = (points - self.centres[k]) @ self.axes[k].T
         return np.asarray(seen[..., :2] / seen[..., 2:] - self.middle[k])
 
     def points(self, images: tuple[Array, Array]) -> Array:
-        """Points [..., 3] midway between the two rays at their closest approach."""
+        """Triangulate: points [..., 3] (m) midway between the two rays at their closest approach.
+
+        ``images``: coordinates [..., 2] in each camera, as from :meth:`image`.
+        """
         whole = [image + middle for image, middle in zip(images, self.middle, strict=True)]
         rays = [np.concatenate([image, np.ones((*image.shape[:-1], 1))], axis=-1) for image in whole]
         one, two = (
@@ -60,7 +63,7 @@ class Cameras:
 
     @property
     def distance(self) -> float:
-        """Height above the wing, m."""
+        """Mean height of the cameras above the plane of the wing at rest, m."""
         return float(self.centres[:, 2].mean())
 
 
@@ -77,7 +80,11 @@ def draw_cameras(wing: Wing, rng: np.random.Generator) -> Cameras:
 
 
 def seen(tracks: Tracks, beats: Array, frequency: float, cameras: Cameras, wing: Wing, hidden: Concealed) -> Array:
-    """Positions [T, M, 3] that the pair measures of ``tracks`` at ``beats`` [T], with the faults ``hidden``."""
+    """Positions [T, M, 3] (m, wing frame) that the two cameras measure, with the faults ``hidden``.
+
+    ``tracks``: function from phases in beats to true marker positions; ``beats`` [T]: phase of each frame;
+    ``frequency``: flapping frequency, Hz.
+    """
     images = [_image(tracks, beats, frequency, cameras, k, wing, hidden) for k in (0, 1)]
     return _assumed(cameras, wing, hidden).points((images[0], images[1]))
 
@@ -85,7 +92,7 @@ def seen(tracks: Tracks, beats: Array, frequency: float, cameras: Cameras, wing:
 def _image(
     tracks: Tracks, beats: Array, frequency: float, cameras: Cameras, k: int, wing: Wing, hidden: Concealed
 ) -> Array:
-    """Image [T, M, 2] of all markers in camera ``k``, as it is interpreted."""
+    """Image coordinates [T, M, 2] of all markers in camera ``k`` (focal lengths), with the faults of time and lens."""
     at = np.repeat(beats[:, None], len(wing.markers), axis=1)
     if k == 1:
         at = at + strength(hidden, "camera_desync") * frequency
@@ -105,13 +112,19 @@ def _image(
 
 
 def divided(image: Array, amount: float) -> Array:
-    """Division model (Fitzgibbon 2001): r_u = r_d / (1 + amount r_d^2), solved for the distorted radius r_d."""
+    """Image coordinates [..., 2] after lens distortion by the division model (Fitzgibbon 2001).
+
+    r_u = r_d / (1 + amount r_d^2) for undistorted and distorted radius r_u and r_d, solved for r_d.
+    """
     r2 = (image**2).sum(axis=-1, keepdims=True)
     return np.asarray(image * 2.0 / (1.0 + np.sqrt(1.0 - 4.0 * amount * r2)))
 
 
 def _assumed(cameras: Cameras, wing: Wing, hidden: Concealed) -> Cameras:
-    """The cameras where they are assumed to be; the origin of the frame is placed at the hinge again."""
+    """The cameras at the poses that the triangulation assumes: wrong by a hidden rotation, shift or scale error.
+
+    Rotation and scaling are about the hinge of the wing.
+    """
     hinge = np.array([0.0, wing.hinge.y, wing.hinge.z])
     centres, axes = cameras.centres - hinge, cameras.axes
     if strength(hidden, "camera_rotation"):
@@ -128,18 +141,18 @@ def _assumed(cameras: Cameras, wing: Wing, hidden: Concealed) -> Cameras:
 
 
 def _direction(p: Parameters) -> Array:
-    """Unit vector of "azimuth" and "height" (rad) in ``p``."""
+    """Unit vector [3] from its angles "azimuth" and "height" (elevation) in ``p``, rad."""
     flat = np.cos(p["height"])
     return np.array([flat * np.cos(p["azimuth"]), flat * np.sin(p["azimuth"]), np.sin(p["height"])])
 
 
 def direction_values(name: str, p: Parameters) -> dict[str, float]:
-    """Genes x, y and z of the library's effect that is a vector."""
+    """True values of the genes ``name``.x, .y and .z of a library effect that is a vector: strength times direction."""
     return {f"{name}.{axis}": float(p["strength"] * u) for axis, u in zip("xyz", _direction(p), strict=True)}
 
 
 def _beyond_pane(points: Array, cameras: Cameras, wing: Wing, p: Parameters) -> Array:
-    """Displacement of points outboard of a joint in the window, seen through a tilted second pane.
+    """Image displacement [..., 2] of points outboard of a joint in the window, seen through a tilted second pane.
 
     A plate of thickness d shifts a ray by d sin(i) (1 - cos(i) / sqrt(n^2 - sin^2 i)) (Born and Wolf 1999, sect. 1.5),
     nearly the same for all rays through it; ``strength`` is this shift at the wing, m.
@@ -151,7 +164,10 @@ def _beyond_pane(points: Array, cameras: Cameras, wing: Wing, p: Parameters) -> 
 
 
 def _pulled(beats: Array, cameras: Cameras, wing: Wing, p: Parameters) -> Array:
-    """The reflection of a lamp crosses part of the skin at one phase and attracts the centroids of markers there."""
+    """Image displacement [T, M, 2] by glare: at one phase, a lamp's reflection on part of the skin shifts the markers.
+
+    ``beats`` [T, M]: phase at which each marker is imaged.
+    """
     span, chord = places(wing).T
     apart = (beats - p["phase"] + 0.5) % 1.0 - 0.5
     near = ((span - p["span"]) / _GLARE[0]) ** 2 + ((chord - p["chord"]) / _GLARE[1]) ** 2
@@ -160,7 +176,7 @@ def _pulled(beats: Array, cameras: Cameras, wing: Wing, p: Parameters) -> Array:
 
 
 def places(wing: Wing) -> Array:
-    """Place [M, 2] of every marker at rest, as fractions of the span and of the local chord."""
+    """Position [M, 2] of every marker at rest, as fractions of the span and of the local chord."""
     rest = np.array([marker.position for marker in wing.markers])
     y, edge, chord = (np.array([getattr(s, name) for s in wing.stations]) for name in ("y", "leading_edge", "chord"))
     along = (rest[:, 0] - np.interp(rest[:, 1], y, edge)) / np.interp(rest[:, 1], y, chord)

@@ -1,4 +1,7 @@
-"""From the motion of a wing to a recording of its markers: strobe or fast cameras, a tracker, noise, gaps, faults."""
+"""Simulated filming: turns the motion of a wing into a recording of its markers.
+
+Strobe or fast cameras, a tracker, noise, gaps, and the faults of :data:`FAULTS`.
+"""
 
 from __future__ import annotations
 
@@ -36,8 +39,8 @@ class Filming:
         noise: of the tracks.
         mode: "strobe": each frame is of another beat, at a slightly earlier phase than the last; "fast": consecutive
             frames of each beat.
-        beats: apparent beats of a strobe, real ones of a fast camera.
-        per_beat: frames in a beat; not quite an integer for a fast camera.
+        beats: number of beats shown: apparent beats of a strobe, real ones of a fast camera.
+        per_beat: frames in a beat; a random fraction of a frame is added for a fast camera.
         lost: number of markers that are never visible.
         gap_rate: probability per frame that a marker is lost for a while.
         gap_frames: mean length of such a gap.
@@ -53,7 +56,10 @@ class Filming:
 
 
 class Filmed(NamedTuple):
-    """A recording, the same without noise [T, C] (m, with the same gaps), and the RMS of the noise, m."""
+    """A recording of the markers.
+
+    ``clean`` [T frames, C channels]: its values without noise but with the same gaps, m; ``noise``: RMS noise, m.
+    """
 
     recording: Recording
     clean: Array
@@ -61,7 +67,7 @@ class Filmed(NamedTuple):
 
 
 def draw_filming(rng: np.random.Generator, mode: Mode | None = None) -> Filming:
-    """Random settings; in three of four cases a strobe."""
+    """Random settings; without a given ``mode``, a strobe in three of four cases."""
     drawn: Mode = "strobe" if rng.uniform() < 0.75 else "fast"
     beats, per_beat, lost = (int(n) for n in rng.integers([2, 24, 5], [5, 37, 13]))
     rate, frames = (float(g) for g in rng.uniform([0.002, 3.0], [0.012, 8.0]))
@@ -79,17 +85,17 @@ def film(
     name: str = "film",
     cameras: Cameras | None = None,
 ) -> Filmed:
-    """Film a periodic motion.
+    """Simulate a recording of a periodic motion by two cameras.
 
     Args:
         tracks: all markers of ``wing`` over one beat, [n, M, 3] in m at n equal steps from drive phase 0.
-        wing: that is filmed.
+        wing: the wing that is filmed.
         condition: of the recording.
         filming: settings.
         rng: source of all random numbers; the draws depend neither on what is hidden nor on the noise.
         hidden: parameters of the faults, by name as in :data:`FAULTS`.
         name: of the recording.
-        cameras: drawn if not given; a campaign is filmed by one pair.
+        cameras: the pair of cameras, drawn at random if not given; pass one pair to share it between recordings.
     """
     hidden = hidden or {}
     check_known(hidden, FAULTS)
@@ -115,7 +121,10 @@ def film(
 
 
 def _between(tracks: Array) -> Tracks:
-    """Positions [T, M, 3] of each marker at its own phases [T, M], by cubic splines through ``tracks`` [n, M, 3]."""
+    """Function from phases [T, M] (beats) to positions [T, M, 3] of each marker at its own phases.
+
+    It interpolates ``tracks`` [n, M, 3] by periodic cubic splines.
+    """
     steps, columns = len(tracks), np.arange(tracks.shape[1])
     motion = CubicSpline(np.arange(steps + 1) / steps, np.concatenate([tracks, tracks[:1]]), 0, "periodic")
 
@@ -130,7 +139,7 @@ def _between(tracks: Array) -> Tracks:
 
 
 def _times(filming: Filming, frequency: float, rng: np.random.Generator) -> Array:
-    """Times of the frames, s. The frames of a fast camera fall between those of the beat before."""
+    """Times of the frames, s. In each beat, a fast camera's frames are at other phases than in the beat before."""
     odd = rng.uniform(0.2, 0.8)
     if filming.mode == "strobe":
         rate, frames = frequency * (filming.per_beat + 1) / filming.per_beat, (filming.per_beat + 1) * filming.beats
@@ -140,14 +149,14 @@ def _times(filming: Filming, frequency: float, rng: np.random.Generator) -> Arra
 
 
 def _beats(times: Array, frequency: float, hidden: Concealed) -> Array:
-    """True phase at ``times`` in beats, with a clock that is fast by ``strength`` and drifts slightly."""
+    """True phase (beats) at the recorded ``times`` [T]; the hidden fault "strobe_rate" makes the clock fast."""
     late = times - times.mean()
     fast = strength(hidden, "strobe_rate") * (1.0 + _WANDER * late / (np.ptp(times) + 1e-12))
     return np.asarray(frequency * (times + fast * late))
 
 
 def _kept(wing: Wing, lost: int, rng: np.random.Generator, hidden: Concealed) -> list[int]:
-    """Visible markers; they include those that a fault concerns and some reference markers."""
+    """Indices of visible markers: all but ``lost`` random ones; those of a fault and some references always stay."""
     order = [int(k) for k in rng.permutation(len(wing.markers))]
     references = [k for k in order if wing.markers[k].name in wing.reference_markers][:_KEPT_REFERENCES]
     concerned = [k for name in ("marker_slip", "marker_swap") if name in hidden for k in _pair(wing, hidden[name])]
@@ -156,7 +165,7 @@ def _kept(wing: Wing, lost: int, rng: np.random.Generator, hidden: Concealed) ->
 
 
 def _pair(wing: Wing, p: Parameters) -> tuple[int, int]:
-    """The marker nearest to a place, and its nearest neighbour."""
+    """Indices of the marker nearest to the position "span", "chord" in ``p``, and of its nearest neighbour."""
     rest = np.array([marker.position for marker in wing.markers])
     part = places(wing)
     one = int(np.hypot(part[:, 0] - p["span"], (part[:, 1] - p["chord"]) * 0.4).argmin())
@@ -164,7 +173,10 @@ def _pair(wing: Wing, p: Parameters) -> tuple[int, int]:
 
 
 def _slipped(tracks: Array, wing: Wing, hidden: Concealed) -> Array:
-    """One marker displaced along the skin, whose rotation follows from the neighbouring markers (Kabsch 1976)."""
+    """Tracks [T, M, 3] with one marker displaced by ``strength`` (m) along the skin, as a marker that has slipped.
+
+    The skin's rotation in each frame is fitted to the neighbouring markers (Kabsch 1976).
+    """
     if not strength(hidden, "marker_slip"):
         return tracks
     p = hidden["marker_slip"]
@@ -179,7 +191,7 @@ def _slipped(tracks: Array, wing: Wing, hidden: Concealed) -> Array:
 
 
 def _swaps(frames: int, part: float, rng: np.random.Generator) -> Bools:
-    """Frames [T] in which two names are exchanged: bursts that make up the fraction ``part`` of all."""
+    """Mask [T] of the frames in which two markers swap names: random bursts, the fraction ``part`` of all frames."""
     wanted = round(min(part, 1.0) * frames)
     changed = np.zeros(frames, bool)
     dice = rng.spawn(1)[0]
@@ -190,7 +202,7 @@ def _swaps(frames: int, part: float, rng: np.random.Generator) -> Bools:
 
 
 def _exchanged(tracks: Array, wing: Wing, frames: Bools, hidden: Concealed) -> Array:
-    """Exchange the names of two neighbouring markers in ``frames`` [T]."""
+    """Tracks [T, M, 3] with two neighbouring markers exchanged in the frames of the mask ``frames`` [T]."""
     if not frames.any():
         return tracks
     one, other = _pair(wing, hidden["marker_swap"])
@@ -200,7 +212,7 @@ def _exchanged(tracks: Array, wing: Wing, frames: Bools, hidden: Concealed) -> A
 
 
 def _crept(tracks: Array, times: Array, hidden: Concealed) -> Array:
-    """The mount of the cameras bends as the lamps warm it, each time they are switched on (Fraser 1997)."""
+    """Tracks [T, M, 3] shifted more and more during a recording, as the lamps warm the cameras' mount (Fraser 1997)."""
     if not strength(hidden, "thermal_creep"):
         return tracks
     p = hidden["thermal_creep"]
@@ -210,11 +222,12 @@ def _crept(tracks: Array, times: Array, hidden: Concealed) -> Array:
 
 
 def tracked(tracks: Array, hole: Bools, hidden: Concealed) -> Array:
-    """A Kalman filter over the frames: position, velocity and acceleration, with white noise as jerk.
+    """Tracks [T, M, 3] (m) as a tracker's Kalman filter reports them: it lags behind fast motion.
 
-    Its covariance is the continuous one of Bar-Shalom, Li and Kirubarajan (2001, sect. 6.2.3); the standard deviation
-    of the jerk is 1 / ``strength`` in units of the measurement's standard deviation and of frames. In a gap it
-    extrapolates.
+    Its states are position, velocity and acceleration, with white noise as jerk and the covariance of Bar-Shalom, Li
+    and Kirubarajan (2001, sect. 6.2.3). The standard deviation of the jerk is 1 / ``strength`` of the hidden
+    "tracker_lag", in units of the measurement's standard deviation and of frames. The filter extrapolates where the
+    mask ``hole`` [T, M] is True.
     """
     if not strength(hidden, "tracker_lag"):
         return tracks.copy()  # with unlimited jerk the filter follows every frame
@@ -235,7 +248,10 @@ def tracked(tracks: Array, hole: Bools, hidden: Concealed) -> Array:
 
 
 def _started(tracks: Array) -> Array:
-    """Position, velocity and acceleration [3, M, 3] one frame before the first, from the first few frames."""
+    """Initial state [3, M, 3] of the filter: position, velocity, acceleration one frame before the first (per frame).
+
+    From a parabola through the first five frames.
+    """
     first = np.polyfit(np.arange(1, 6), tracks[:5].reshape(5, -1), 2)[::-1] * np.array([[1.0], [1.0], [2.0]])
     return np.asarray(first.reshape(3, *tracks.shape[1:]))
 

@@ -1,4 +1,4 @@
-"""Noise of trackers and balances, of several colours. The reader of a recording does not know the colour."""
+"""Random noise of trackers and balances with several spectra, which a diagnosis of the recording is not given."""
 
 from __future__ import annotations
 
@@ -28,8 +28,7 @@ class Noise:
     Attributes:
         colour: "first_order" autoregressive; "wavy" ARMA(2, 1), with a pair of complex poles; "pink", power inversely
             proportional to frequency; "heavy", first order with innovations from Student's t; "shake", first order,
-                partly
-            common to all markers because the cameras move.
+            partly common to all markers because the cameras move.
         level: RMS over all coordinates, m.
         memory: modulus of the pole or poles, 0 to 0.9; not used by pink noise.
         common: fraction of the variance that all markers share, in "shake".
@@ -42,14 +41,14 @@ class Noise:
 
 
 def draw_noise(rng: np.random.Generator) -> Noise:
-    """Random colour, 0.2 to 0.8 mm."""
+    """Random settings: any colour, RMS 0.2 to 0.8 mm."""
     colour = COLOURS[int(rng.integers(len(COLOURS)))]
     level, memory, common = rng.uniform([2e-4, 0.0, 0.3], [8e-4, 0.8, 0.7])
     return Noise(colour, float(level), float(memory), float(common))
 
 
 def track_noise(noise: Noise, frames: int, markers: int, rng: np.random.Generator) -> Array:
-    """Noise of tracks [frames, markers, 3] in m, largest in depth, and larger for some markers than for others."""
+    """Noise [frames, markers, 3] of marker positions, m; largest along z (depth), and different for each marker."""
     each = coloured(noise.colour, noise.memory, (frames, markers, 3), rng)
     if noise.colour == "shake":
         shared = coloured("first_order", noise.memory, (frames, 1, 3), rng)
@@ -59,9 +58,9 @@ def track_noise(noise: Noise, frames: int, markers: int, rng: np.random.Generato
 
 
 def coloured(colour: Colour, memory: float, shape: tuple[int, ...], rng: np.random.Generator) -> Array:
-    """Noise along the first axis of ``shape``, with expected variance one.
+    """Random array of ``shape``, correlated along its first axis (time), with expected variance one.
 
-    For "shake", this is only the part that differs between markers.
+    ``memory``: modulus of the poles. For "shake", this is only the part that differs between markers.
     """
     if colour == "pink":
         return _pink(shape, rng)
@@ -80,7 +79,10 @@ def coloured(colour: Colour, memory: float, shape: tuple[int, ...], rng: np.rand
 
 
 def _pink(shape: tuple[int, ...], rng: np.random.Generator) -> Array:
-    """Noise with power 1 / f, constant below one period in four times the recording."""
+    """Noise with power 1 / f along the first axis of ``shape``, and expected variance one.
+
+    The power is constant below the frequency of one period in four times the length of the result.
+    """
     longer = 4 * shape[0]
     k = np.arange(longer // 2 + 1)
     gain = 1.0 / np.sqrt(np.maximum(k, 1))
@@ -92,7 +94,10 @@ def _pink(shape: tuple[int, ...], rng: np.random.Generator) -> Array:
 
 
 def bursts(shape: tuple[int, int], rate: float, length: float, rng: np.random.Generator) -> Bools:
-    """True in bursts along the first axis; they begin with probability ``rate`` and last ``length`` on average."""
+    """Mask [frames, markers], True within random bursts along the first axis.
+
+    A burst begins at each frame with probability ``rate`` and lasts ``length`` frames on average.
+    """
     starts = rng.uniform(size=shape) < rate
     lasting = rng.geometric(1.0 / length, shape)
     left = np.zeros(shape[1], int)

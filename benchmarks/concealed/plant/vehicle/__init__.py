@@ -1,1 +1,1 @@
-"""The flapping vehicle, by blade elements, and what can be hidden in it."""
+"""Blade-element simulation of a flapping vehicle, with the effects that can be hidden in it."""

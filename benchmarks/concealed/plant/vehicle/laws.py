@@ -1,4 +1,7 @@
-"""Effects that can be hidden in the flapping vehicle, with laws of another form than the library's."""
+"""Effects that can be hidden in the simulated flapping vehicle.
+
+The diagnosis has its own library of effects; an effect that both have follows an equation of another form here.
+"""
 
 from __future__ import annotations
 
@@ -24,19 +27,22 @@ _LAG_STEPS = 120  # steps per beat of the integral over past circulation
 
 @dataclass(frozen=True)
 class Flow:
-    """Motion of the blade elements of one side through the air over a beat, [n] instants by [E] elements.
+    """Motion of the blade elements of the wings on one side over a beat: n instants, E elements along the span.
+
+    Complex vectors: the real part is along body x or the chord, the imaginary part along the normal of either.
 
     Attributes:
         t: beats from the start of the beat.
-        r, chord: of the elements, m.
-        frequency: Hz.
-        rho: kg/m^3.
-        span: m.
-        zeta, rate, acceleration: flap angle and its derivatives [n].
+        r, chord: radius and chord of the elements [E], m.
+        frequency: flapping frequency, Hz.
+        rho: density of the air, kg/m^3.
+        span: length of a wing, m.
+        zeta, rate, acceleration: flap angle and its time derivatives [n].
         level: cosine of the wing's angle to the horizontal [n].
-        theta, turn, turn_rate: pitch and its derivatives [n, E].
-        own, own_rate: prescribed velocity in axes of the stroke, and its rate [n, E].
-        peel, peeled: fraction of each instant in which the wings peel, and of the chord that has separated [n].
+        theta, turn, turn_rate: pitch angle and its time derivatives [n, E].
+        own, own_rate: velocity due to flapping and airspeed in axes of the stroke, complex, and its rate [n, E].
+        peel, peeled: fraction of each instant in which the two wings peel apart, and of the chord that has separated
+            [n] (clap and peel).
         met: velocity through the air in axes of the chord, with all inflow and gusts [n, E].
     """
 
@@ -60,7 +66,7 @@ class Flow:
     met: Complex = field(default_factory=lambda: _NONE)
 
     def turned(self, q: Complex) -> Complex:
-        """Transform ``q`` [n, E] from axes of the stroke to those of the chord, or back."""
+        """Transform complex vectors ``q`` [n, E] from axes of the stroke to those of the chord, or back."""
         return np.asarray(1j * np.exp(-1j * self.theta) * np.conj(q))
 
     @property
@@ -69,9 +75,9 @@ class Flow:
         return np.abs(self.met) + 1e-12
 
     def travelled(self, speed: Array) -> Array:
-        """Distance in half chords from the start of the beat [n + 1, E] at ``speed`` [n, E].
+        """Distance travelled since the start of the beat [n + 1, E], in half chords, at ``speed`` [n, E] (m/s).
 
-        The last row is a whole beat.
+        The last row is the distance of the whole beat.
         """
         step = 1.0 / (self.frequency * len(self.t))
         closed = np.concatenate([speed, speed[:1]])
@@ -80,7 +86,10 @@ class Flow:
 
 
 def levered(flap: Array, strength: float) -> Array:
-    """Flap angle [n] of a lever longer by ``strength``: the tangent of the angle from its mean grows in proportion."""
+    """Flap angle [n] with a driving lever longer by the fraction ``strength``.
+
+    The tangent of the angle's deviation from its mean grows by that fraction.
+    """
     if not strength:
         return flap
     mean = flap.mean()
@@ -88,15 +97,16 @@ def levered(flap: Array, strength: float) -> Array:
 
 
 def blocked(condition: Condition, strength: float) -> Condition:
-    """The condition with a dynamic pressure higher by twice ``strength``, as by blockage (Maskell 1963)."""
+    """The condition with an airspeed whose square is larger by 2 ``strength``, as by tunnel blockage (Maskell 1963)."""
     return replace(condition, airspeed=condition.airspeed * math.sqrt(1.0 + 2.0 * strength))
 
 
 def disc_inflow(thrust: Array, swept: float, air: Condition, rho: float, p: Parameters) -> Array:
-    """Inflow [n] (m/s) at the tips of a disc of area ``swept``, whose inflow is proportional to the radius.
+    """Induced inflow [n] (m/s) at the wing tips due to ``thrust`` [n] (N) of an actuator disc of area ``swept`` (m^2).
 
-    The mean is that of momentum theory with this profile, v^2 = T / (rho A) in hover (Glauert 1935; Leishman 2006,
-    sect. 3.3); variations follow the thrust [n] with the time constant lag R_A / |U + v| (Oye 1990).
+    The inflow is proportional to the radius. Its mean v is that of momentum theory, v^2 = T / (rho A) in hover (Glauert
+    1935; Leishman 2006, sect. 3.3), for the thrust times ``strength``; variations follow the thrust with the time
+    constant ``lag`` R_A / |U + v| (Oye 1990), R_A the radius of a circle of area ``swept`` and U the airspeed.
     """
     ahead = air.airspeed * math.cos(air.angle_of_attack)
     aside = air.airspeed * math.sin(air.angle_of_attack)
@@ -111,9 +121,11 @@ def disc_inflow(thrust: Array, swept: float, air: Condition, rho: float, p: Para
 
 
 def fling(flow: Flow, p: Parameters) -> Array:
-    """Circulation due to air drawn into the gap of opening wings (Ellington 1984 part IV; Maxworthy 1979).
+    """Circulation [n, E] (m^2/s) due to air drawn into the gap of opening wings.
 
-    1/2 C c^2 (-theta') / (1 + gap / (width c)), gap = 2 r sin(zeta), while the wings rotate apart.
+    Ellington (1984, part IV); Maxworthy (1979):
+    1/2 C c^2 (-theta') / (1 + gap / (width c)) while the wings rotate apart, with C = ``strength``, c the chord,
+    theta' the pitch rate and gap = 2 r sin(zeta - min zeta).
     """
     gap = 2.0 * flow.r * np.sin(flow.zeta - flow.zeta.min())[:, None]
     near = 1.0 / (1.0 + gap / (p["width"] * flow.chord))
@@ -121,14 +133,15 @@ def fling(flow: Flow, p: Parameters) -> Array:
 
 
 def tip(flow: Flow, strength: float) -> Array:
-    """Factor [E] on the circulation of a super-elliptic wing, sqrt(1 - (r / R)^(2 / strength))."""
+    """Tip-loss factor [E] on the circulation of a super-elliptic wing of span R: sqrt(1 - (r / R)^(2 / strength))."""
     return np.asarray(np.sqrt(1.0 - (flow.r / flow.span) ** (2.0 / strength)))
 
 
 def _wagner(flow: Flow, gamma: Array, _: Array, p: Parameters) -> Array:
-    """Duhamel's integral with Garrick's phi(s) = 1 - 2 / (4 + s) (1938), over all past beats.
+    """Circulation [n, E] that lags the quasi-steady ``gamma`` [n, E]: Duhamel's integral over all past beats.
 
-    phi'(s) = 2 / (4 + s)^2; summed over beats of S half chords it is 2 / S^2 zeta(2, (4 + s) / S), Hurwitz's zeta.
+    Indicial function of Garrick (1938): phi(s) = 1 - 2 / (4 + s), s the distance in half chords. phi'(s) =
+    2 / (4 + s)^2, summed over past beats of S half chords each, is 2 / S^2 zeta(2, (4 + s) / S), Hurwitz's zeta.
     """
     n = len(flow.t)
     every = n // _LAG_STEPS if n % _LAG_STEPS == 0 else 1
@@ -146,7 +159,11 @@ def _wagner(flow: Flow, gamma: Array, _: Array, p: Parameters) -> Array:
 
 
 def _stall(flow: Flow, gamma: Array, rotation: Array, p: Parameters) -> Array:
-    """Kirchhoff's lift with a doubly lagged separation point (Leishman and Beddoes 1989), in half chords travelled."""
+    """Circulation [n, E] with dynamic stall: Kirchhoff's lift with a doubly lagged separation point.
+
+    Leishman and Beddoes (1989); the lags are in half chords travelled. ``rotation`` [n, E], the rotational part of
+    ``gamma`` [n, E], does not stall.
+    """
     steps = np.diff(flow.travelled(flow.speed), axis=0)
     alpha = np.abs(np.arctan2(flow.met.imag, np.abs(flow.met.real)))
     late = _followed(alpha, steps / p["pressure_lag"])
@@ -158,7 +175,7 @@ def _stall(flow: Flow, gamma: Array, rotation: Array, p: Parameters) -> Array:
 
 
 def _followed(target: Array, steps: Array) -> Array:
-    """Periodic x [n, E] of x' = target - x, with ``steps`` [n, E] of the independent variable."""
+    """Periodic solution x [n, E] of x' = target - x, with steps ``steps`` [n, E] of the independent variable."""
     keep = np.exp(-steps)
     start = np.zeros(target.shape[1])
     for _ in range(2):  # the first round gives the correction of the start value
@@ -172,19 +189,20 @@ def _followed(target: Array, steps: Array) -> Array:
 
 
 def _camber(flow: Flow, gamma: Array, _: Array, p: Parameters) -> Array:
-    """Lift of a flexible wing that is cambered by its own inertia.
+    """Circulation [n, E]: ``gamma`` plus that of a flexible wing cambered by its own inertia.
 
-    The camber is strength r zeta'' / (R A) chords, with A = 1000 rad/s^2.
+    The camber is strength r zeta'' / (R A) chords, with zeta the flap angle, R the span and A = 1000 rad/s^2.
     """
     camber = p["strength"] * flow.acceleration[:, None] * flow.r / (1000.0 * flow.span)
     return np.asarray(gamma + 0.5 * flow.chord * flow.speed * 4.0 * np.pi * camber)
 
 
 def _pocket(flow: Flow, p: Parameters) -> Complex:
-    """Wake capture: air set in motion by a stroke, near the place where the wing reverses (Birch and Dickinson 2003).
+    """Change [n, E] (m/s, complex) of the velocity relative to the air by wake capture (Birch and Dickinson 2003).
 
-    There the air moves at ``strength`` times the excess of the stroke's mean speed over the wing's own, reduced by
-    exp(-x / (reach c)) where the wing is x away: it overtakes the wing that slows down, and meets it after reversal.
+    The air that a stroke has set in motion reaches the wing near its reversal. In the model it moves at ``strength``
+    times the excess of the stroke's mean speed over the wing's own while the wing slows down, and times the mean speed
+    after the reversal, multiplied by exp(-x / (reach c)) at a distance x travelled from the reversal, c the chord.
     """
     air, way_to = np.zeros(flow.own.shape), flow.travelled(np.abs(flow.own))
     whole, here = way_to[-1], way_to[:-1]
@@ -200,16 +218,17 @@ def _pocket(flow: Flow, p: Parameters) -> Complex:
 
 
 def _jet(flow: Flow, p: Parameters) -> Complex:
-    """A jet of air along body x, ``strength`` m/s, where the outer wing passes at one phase."""
+    """Change [n, E] (m/s) of the velocity along body x by a local jet of ``strength`` m/s, at one phase and span."""
     apart = (flow.t - p["phase"] + 0.5) % 1.0 - 0.5
     place = np.exp(-0.5 * ((flow.r / flow.span - p["span"]) / 0.15) ** 2)
     return np.asarray(p["strength"] * np.exp(-0.5 * (apart / 0.05) ** 2)[:, None] * place + 0j)
 
 
 def _tail(forces: Array, vehicle: Vehicle, air: Condition, p: Parameters) -> Array:
-    """A tail in the wings' wake, pushed back by their earlier thrust, smoothed on its way.
+    """Force [n, 2] (N, body x and z) on a tail in the wake of the wings.
 
-    ``strength`` is the fraction of the jet's momentum that it takes: -strength X(t - delay) while X pushes forwards.
+    Along x it is -strength X(t - delay), with X the positive part of the wings' force along x (``forces`` [n, 2])
+    smoothed in time, and ``strength`` the fraction of the jet's momentum that the tail takes.
     """
     n = len(forces)
     wash = np.maximum(forces[:, 0], 0.0)
@@ -222,9 +241,9 @@ def _tail(forces: Array, vehicle: Vehicle, air: Condition, p: Parameters) -> Arr
 
 
 def _knock(forces: Array, vehicle: Vehicle, air: Condition, p: Parameters) -> Array:
-    """A linkage that hits its stop at one phase: an impulse, and the opposite one when it separates.
+    """Force [n, 2] (N, body x and z) of a linkage that hits its stop at one phase, and an opposite one as it separates.
 
-    In units of the vehicle's weight at 12 Hz; proportional to the square of the frequency.
+    ``strength``: peak force in units of the vehicle's weight at 12 Hz; it grows with the square of the frequency.
     """
     t = np.arange(len(forces)) / len(forces)
     width = 0.02

@@ -1,4 +1,7 @@
-"""A flapping vehicle by blade elements after Armanini et al. (2016), written independently of the simulator."""
+"""Blade-element simulation of a flapping vehicle: an independent implementation that produces the test data.
+
+After Armanini et al. (2016); all equation numbers are theirs. It shares no code with ``wingfit.sim``, which is tested.
+"""
 
 from __future__ import annotations
 
@@ -38,7 +41,10 @@ _ROUNDS, _COARSE, _SETTLED = 40, 120, 1e-5  # of the inflow: iterations, instant
 
 @dataclass(frozen=True)
 class Motion:
-    """Flap angle and pitch at the pitch station [3, n] with two derivatives, at n equal steps of a beat from t* = 0."""
+    """``flap`` angle, and ``pitch`` angle at the pitch station, at n equal steps of a beat from its start.
+
+    Both [3, n]: angle and its first two time derivatives (rad, s).
+    """
 
     flap: Array
     pitch: Array
@@ -53,14 +59,14 @@ def simulate(
     terms: tuple[str, ...] = PROPOSED,
     instants: int = 480,
 ) -> Array:
-    """Forces [instants, 2] of all wings along body x and z (N) over one beat from t* = 0.
+    """Forces [instants, 2] of all wings along body x and z (N) at equal steps of one beat from its start.
 
     Args:
-        vehicle: that flaps.
+        vehicle: geometry, mass and prescribed wing motion.
         coefficients: C_l, C_r, C_F, C_D0 and C_Dpi2; those of disabled terms are not needed.
         condition: frequency, air, airspeed and body pitch.
         hidden: parameters of the hidden effects, by name as in :data:`.laws.LAWS`.
-        terms: of the nominal model.
+        terms: force terms of the nominal model to include, from PROPOSED.
         instants: number of instants in the beat.
     """
     hidden = hidden or {}
@@ -80,7 +86,7 @@ def density(air: Condition) -> float:
 
 
 def motion_of(vehicle: Vehicle, frequency: float, instants: int, hidden: Concealed) -> Motion:
-    """Flap angle and pitch with two time derivatives (rad, s)."""
+    """Flap angle and pitch with two time derivatives, at ``instants`` equal steps of a beat of ``frequency`` (Hz)."""
     flap = levered(_flap_samples(vehicle.motion.flap), strength(hidden, "stroke_amplitude"))
     rates = [_derived(flap, frequency, order) for order in range(4)]
     law = vehicle.motion.pitch
@@ -98,7 +104,7 @@ def motion_of(vehicle: Vehicle, frequency: float, instants: int, hidden: Conceal
 
 
 def _flap_samples(law: Flap) -> Array:
-    """Flap angle at _FINE equal steps of a beat: Eqs. 20-21 as printed, then smoothed by their Gaussian."""
+    """Flap angle [_FINE] (rad) at equal steps of a beat: a Fourier series, or Eqs. 20-21 smoothed by a Gaussian."""
     if isinstance(law, FourierFlap):
         return _series(law.mean, law.cosine, law.sine)
     spectrum = np.fft.rfft(_split_cycle(law))
@@ -126,7 +132,10 @@ def _series(mean: float, cosine: tuple[float, ...], sine: tuple[float, ...]) -> 
 
 
 def _derived(samples: Array, frequency: float, order: int) -> Array:
-    """Time derivative of periodic ``samples``, without frequencies far above all harmonics of the motion."""
+    """Time derivative of the given ``order`` of one period of ``samples`` [n] that repeat at ``frequency`` (Hz).
+
+    Spectral; frequencies far above all harmonics of the motion are removed.
+    """
     spectrum = np.fft.rfft(samples)
     k = np.arange(len(spectrum))
     spectrum *= (2j * np.pi * k * frequency) ** order * (k <= 2 * _HARMONICS)
@@ -134,7 +143,7 @@ def _derived(samples: Array, frequency: float, order: int) -> Array:
 
 
 def _elements(vehicle: Vehicle) -> tuple[Array, Array, Array]:
-    """Radii r (m), chords (m) and weights (m) of the elements."""
+    """Radii (m), chords (m) and quadrature weights (m) of the blade elements, [E] each."""
     nodes, weights = np.polynomial.legendre.leggauss(_NODES)
     places, widths = [], []
     for inner, outer in zip(vehicle.stations[:-1], vehicle.stations[1:], strict=True):
@@ -155,7 +164,10 @@ def _forces(
     instants: int,
     inflow: Array | None,
 ) -> tuple[Array, Array]:
-    """Forces [n, 2] of all wings, and the part along body x [n] due to circulation and drag, N."""
+    """Forces [n, 2] of all wings along body x and z, and the part along x [n] due to circulation and drag, N.
+
+    ``inflow`` [n]: induced velocity at the wing tips, m/s, or None.
+    """
     motion = motion_of(vehicle, air.flap_frequency, instants, hidden)
     r, chord, width = _elements(vehicle)
     total, carried = np.zeros((instants, 2)), np.zeros(instants)
@@ -174,7 +186,10 @@ def _forces(
 
 
 def _flow(vehicle: Vehicle, air: Condition, motion: Motion, r: Array, chord: Array, sign: float) -> Flow:
-    """Motion of the elements of one side; ``sign`` is -1 for the upper wings, mirrored at the body's plane."""
+    """Motion of the blade elements of the lower (``sign`` 1) or upper wings (-1, mirrored at the body's plane).
+
+    ``r``, ``chord`` [E], m.
+    """
     share = r / (vehicle.motion.pitch_station * vehicle.span)
     root, frequency = vehicle.motion.root_pitch, air.flap_frequency
     zeta, rate, acceleration = motion.flap
@@ -206,7 +221,10 @@ def _flow(vehicle: Vehicle, air: Condition, motion: Motion, r: Array, chord: Arr
 
 
 def _peel(turn: Array, t: Array, vehicle: Vehicle) -> tuple[Array, Array]:
-    """Fraction of each instant in which the wings peel (Eq. 7), and of the chord that has separated, [n] each."""
+    """Fraction of each instant in which the wings peel apart (Eq. 7), and of the chord that has separated, [n] each.
+
+    ``turn``: pitch rate [n], rad/s; ``t``: instants [n], beats.
+    """
     if not vehicle.claps:
         return np.zeros(len(t)), np.ones(len(t))
     started = np.logical_or.accumulate(turn < 0)
@@ -228,9 +246,9 @@ def _element_forces(
     terms: tuple[str, ...],
     inflow: Array | None,
 ) -> tuple[Complex, Complex]:
-    """Forces per metre on the elements [n, E], along body x + i along the normal of the wing's plane.
+    """Forces per metre of span on the elements, two arrays [n, E]: due to circulation and drag, and due to inertia.
 
-    The first part is due to circulation and drag, the second due to inertia.
+    Complex: the real part is along body x, the imaginary part along the normal of the wing's plane.
     """
     rho, chord = flow.rho, flow.chord
     air = flow.own if inflow is None else flow.own + inflow[:, None] * flow.r / flow.span
@@ -249,9 +267,9 @@ def _element_forces(
 def _circulation(
     flow: Flow, vehicle: Vehicle, coefficients: Mapping[str, float], hidden: Concealed, terms: tuple[str, ...]
 ) -> Array:
-    """Circulation of the elements [n, E] (Eqs. 2-4, 7), with the hidden effects, m^2/s.
+    """Circulation of the elements [n, E] (m^2/s) by Eqs. 2-4 and 7, changed by the hidden effects.
 
-    Lag and stall act on the circulation of a single wing, not on that of two wings that separate.
+    Circulation lag and stall act on the circulation of a single wing, not on that of two wings that peel apart.
     """
     half = 0.5 * flow.chord**2 * flow.turn
     rotation = coefficients["C_r"] * (0.75 - vehicle.pitch_axis) * half if "rotation" in terms else 0.0 * half
@@ -269,10 +287,10 @@ def _circulation(
 
 
 def _inertia(flow: Flow, stream: Complex, vehicle: Vehicle, terms: tuple[str, ...]) -> Complex:
-    """Inertial terms and added mass per metre in axes of the chord (Eqs. 9-14).
+    """Inertial and added-mass forces per metre of span [n, E], complex, in axes of the chord (Eqs. 9-14).
 
-    The wing's own mass moves with the wing, the air's relative to the ``stream`` [n, E], whose rate of change is
-    neglected.
+    The wing's own mass moves with the wing, the added mass with the velocity relative to the air, ``stream`` [n, E].
+    The rate of change of the induced inflow is neglected.
     """
     rho, chord, own = flow.rho, flow.chord, flow.turned(flow.own)
     peeled = flow.peeled[:, None] if "effective_chord" in terms else 1.0
@@ -296,7 +314,10 @@ def _inflow(
     terms: tuple[str, ...],
     instants: int,
 ) -> Array:
-    """Inflow [n] (m/s) along body x at the tips, through the disc that the wings sweep, by iteration."""
+    """Induced velocity [instants] (m/s) along body x at the wing tips, by iteration with the thrust that it reduces.
+
+    It is computed for the disc that the wings sweep. ValueError if the iteration does not converge.
+    """
     p = hidden["induced_inflow"]
     swept = min(0.5 * vehicle.wings * float(np.ptp(_flap_samples(vehicle.motion.flap))), np.pi) * vehicle.span**2
     v = np.zeros(_COARSE)

@@ -1,1 +1,1 @@
-"""The flexible wing: cut into rigid bodies, joined, integrated to a periodic motion."""
+"""Independent simulation of a flexible wing: rigid bodies joined by springs, integrated to a periodic motion."""

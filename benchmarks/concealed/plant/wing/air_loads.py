@@ -1,10 +1,10 @@
-"""What the air does to strips (thesis Eqs. 8-13), and what may be hidden in it.
+"""Air loads on the strips of a wing (van der Grinten's thesis, Eqs. 8-13), with the effects hidden in them.
 
-Late downwash: Wagner's deficit with the constants of W. P. Jones (1945), 0.165 exp(-0.041 s) + 0.335 exp(-0.32 s), of
-the velocity along the normal that lift feels. Stall: attached part f of the chord by the exponentials of Leishman and
-Beddoes (1989), following the late angle of attack late. Vortex: lift and drag as Dickinson, Lehmann and Sane (1999)
-measured them, beyond an angle. Air that is carried along: that of a thin elliptic section (Munk 1924), in heave and in
-pitch of the strip as a whole.
+Circulation lag: the normal velocity that causes lift lags by Wagner's function, with the constants of W. P. Jones
+(1945): 0.165 exp(-0.041 s) + 0.335 exp(-0.32 s), s in half chords. Dynamic stall: the attached fraction f of the chord
+by the exponentials of Leishman and Beddoes (1989), with a first-order lag after an angle of attack that lags too.
+Leading-edge vortex: lift and drag coefficients measured by Dickinson, Lehmann and Sane (1999), beyond an angle of
+attack. Added mass: that of a thin elliptic section (Munk 1924), for heave and pitch of the strip as a whole.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ _ONSET = math.radians(12.0)  # width of the transition to vortex flow
 
 @compiled
 def frame_of(rig: Rig, m: Motion, s: int) -> tuple[V3, V3, V3]:
-    """Chord, normal and velocity of a strip: means over its bodies, weighted by area."""
+    """Unit vectors of chord and normal, and velocity (m/s), of strip ``s``: means over its bodies, weighted by area."""
     x, z, u = ZERO, ZERO, ZERO
     for n in range(rig.strip[s], rig.strip[s + 1]):
         g = rig.weight[n]
@@ -55,7 +55,7 @@ def frame_of(rig: Rig, m: Motion, s: int) -> tuple[V3, V3, V3]:
 
 @compiled
 def _blown(rig: Rig, m: Motion, s: int, flow: V3) -> V3:
-    """The stream at a strip, with the jets that the strip passes through."""
+    """Air velocity at strip ``s`` (m/s): ``flow`` plus the velocity of the jets that the strip passes through."""
     for k in range(len(rig.jets)):
         if int(rig.jets[k, 0]) == s:
             z = 0.0
@@ -68,7 +68,7 @@ def _blown(rig: Rig, m: Motion, s: int, flow: V3) -> V3:
 
 @compiled
 def _attached(alpha: float, angle: float) -> float:
-    """Fraction of the chord with attached flow, in steady flow."""
+    """Fraction of the chord with attached flow, in steady flow at an angle of attack ``alpha``; stall at ``angle``."""
     a = abs(alpha)
     if a <= angle:
         return 1.0 - 0.3 * math.exp((a - angle) / _BEFORE)
@@ -77,14 +77,14 @@ def _attached(alpha: float, angle: float) -> float:
 
 @compiled
 def _relax(old: float, rate: float, goal: float, z: Array, k: int) -> float:
-    """z_k = old + rate (goal - z_k)."""
+    """Set z[k] by an implicit Euler step towards ``goal``, z_k = old + rate (goal - z_k), and return it."""
     z[k] = (old + rate * goal) / (1.0 + rate)
     return float(z[k])
 
 
 @compiled
 def _vortex(rig: Rig, alpha: float, cl: float, cd: float) -> tuple[float, float]:
-    """Lift and drag coefficient with a leading-edge vortex; ``cl`` is odd apart from its constant."""
+    """Lift and drag coefficient: ``cl``, ``cd`` blended with those of a leading-edge vortex at large ``alpha``."""
     laws, a = rig.air_laws, abs(alpha)
     x = min(max((a - laws[VORTEX_ANGLE]) / _ONSET, 0.0), 1.0)
     part, side = x * x * x * (10.0 + x * (6.0 * x - 15.0)), 1.0 if alpha >= 0.0 else -1.0
@@ -97,7 +97,11 @@ def _vortex(rig: Rig, alpha: float, cl: float, cd: float) -> tuple[float, float]
 
 @compiled
 def air_loads(rig: Rig, m: Motion, old: Array, hg: float, z: Array, first: int, load: Array) -> None:
-    """Add the air loads on every body. Their states are ``z`` from ``first`` on, as in ``remembered_loads``."""
+    """Add the air loads on every body to ``load`` [N + 2, 6] (force N, moment N m).
+
+    The internal states of lag and stall are ``z`` from index ``first`` on. They are advanced from ``old`` by an
+    implicit Euler step of ``hg`` (s), as in ``remembered_loads``.
+    """
     for s in range(len(rig.area)):
         chord, normal, u = frame_of(rig, m, s)
         flow = plus(_blown(rig, m, s, row(rig.wind.reshape(1, 3), 0)), -1.0, u)
@@ -139,7 +143,7 @@ def air_loads(rig: Rig, m: Motion, old: Array, hg: float, z: Array, first: int, 
 
 @compiled
 def carried(rig: Rig, s: int) -> tuple[float, float]:
-    """Added mass of a strip: kg in heave, kg m^2 in pitch about mid-chord."""
+    """Added mass of strip ``s`` in heave, kg, and its added moment of inertia in pitch about mid-chord, kg m^2."""
     half = 0.5 * rig.chord[s]
     mass = rig.air_laws[CARRIED] * rig.air * math.pi * half * half * rig.area[s] / rig.chord[s]
     return mass, 0.125 * half * half * mass
@@ -147,7 +151,11 @@ def carried(rig: Rig, s: int) -> tuple[float, float]:
 
 @compiled
 def _carry(rig: Rig, m: Motion, s: int, normal: V3, span: V3, u: V3, load: Array) -> None:
-    """-m d(n.u)/dt along n, u relative to the air, and -J d(pitch rate)/dt, shared by area."""
+    """Add the added-mass loads of strip ``s`` to its bodies, in proportion to their areas.
+
+    Force -m d(n.u)/dt along the normal n and moment -J d(pitch rate)/dt, with u the velocity relative to the air, and m
+    and J from :func:`carried`.
+    """
     rate, turning, wheeling = 0.0, ZERO, ZERO
     for n in range(rig.strip[s], rig.strip[s + 1]):
         g = rig.weight[n]

@@ -1,4 +1,7 @@
-"""From a wing, a genome and a condition to the arrays that are simulated; hidden effects change them on the way."""
+"""Build the arrays of a simulation from a wing, its genes and a condition.
+
+Hidden effects change an intermediate :class:`Draft`.
+"""
 
 from __future__ import annotations
 
@@ -25,10 +28,15 @@ _GAS = 287.05  # J/(kg K), dry air
 class Draft:
     """A wing under a condition, before its simulation. Hidden effects change it in place.
 
-    ``lumps`` are added before the wing is divided. The rest exists afterwards (:meth:`cut_up`): ``joints`` with
-    ``factor`` [C] on stiffness and damping, ``hardening`` [C], ``play`` [C], ``memory`` (joint, axis, kind, stiffness,
-    parameter), ``air_laws``, ``jets`` and ``points`` as in :class:`.rig.Rig`, ``rods`` [K, 2] (Fourier series of the
-    angles), ``hinge`` and ``axle``.
+    Attributes:
+        wing, genome, condition: what is simulated; ``division``: its bodies, as in :func:`.geometry.counts_of`.
+        lumps: additional point masses; to be added before :meth:`cut_up`, which divides the wing and sets the rest.
+        cut, joints: the divided wing and its C joints.
+        factor: [C] on stiffness and damping of each joint.
+        hardening, play: [C], as in :class:`.rig.Rig`, like ``air_laws``, ``jets``, ``hinge`` and ``axle``.
+        memory: joints with an internal state: (joint, axis, kind, stiffness, parameter), as in ``Rig.memory``.
+        points: (body, row of ``Rig.points``).
+        rods: [K, 2] Fourier series of the angles of the front and rear driving rod.
     """
 
     wing: Wing
@@ -42,7 +50,7 @@ class Draft:
     air_laws: Array = field(default_factory=lambda: np.zeros(AIR_LAWS))
 
     def cut_up(self) -> None:
-        """Divide the wing into bodies, with the lumps."""
+        """Divide the wing, with its ``lumps``, into bodies and joints, and set the attributes that depend on them."""
         self.cut = Cut(self.wing, self.division, self.lumps)
         self.joints: list[Joint] = joints(self.cut, self.genome)
         count = len(self.joints)
@@ -57,16 +65,19 @@ class Draft:
         return float(self.cut.edges[-1] - self.cut.edges[0])
 
     def series(self, drive: Drive) -> Complex:
-        """[K, 2] Fourier series of the front rod and of the rear rod, which lags by the condition's phase lag."""
+        """[K, 2] Fourier series of the angles (rad) of the front rod, and of the rear rod, which lags by phase_lag."""
         one = series_of(drive)
         return np.stack([one, one * np.exp(-1j * self.condition.phase_lag * np.arange(len(one)))], axis=1)
 
     def curvature(self, joint: Joint) -> float:
-        """Curvature of a joint: angle over the whole span (rad) per rad at the joint."""
+        """Ratio of span to the length that a joint represents: converts its angle to an angle over the whole span."""
         return self.span / joint.length
 
     def at(self, span: float, chord: float) -> tuple[int, Array, Array]:
-        """Body at a place (fractions of span and chord); the place from its centre and in the wing frame, [3] m."""
+        """Body at a position (fractions of span and chord), and the position from its centre and in the wing frame.
+
+        Both positions [3], m, at rest.
+        """
         x, y = self.cut.place(span, chord)
         body = int(self.cut.under(x, y)[0])
         place = np.array([x, y, 0.0])
@@ -74,7 +85,7 @@ class Draft:
 
 
 def rig_of(draft: Draft) -> Rig:
-    """Convert a draft to arrays."""
+    """The arrays of a draft, ready for the compiled simulation."""
     cut, condition = draft.cut, draft.condition
     mass, centre, inertia = cut.bodies
     found, n = draft.joints, len(mass)
@@ -127,7 +138,7 @@ def rig_of(draft: Draft) -> Rig:
 
 
 def rod_table(draft: Draft, steps: int) -> Array:
-    """[steps + 1, STAGES, 2, 2]: angle (rad) and rate (rad/s) of both rods at all stages of a beat."""
+    """[steps + 1, STAGES, 2 rods, 2]: angle (rad) and rate (rad/s) of both rods at all integrator stages of a beat."""
     psi = 2 * np.pi * (np.arange(steps + 1)[:, None] + C) / steps
     k = np.arange(len(draft.rods))
     turn = np.exp(1j * psi[..., None] * k)

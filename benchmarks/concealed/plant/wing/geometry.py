@@ -1,6 +1,6 @@
-"""A wing divided into rigid bodies: masses, inertias, areas, and the body of each marker.
+"""Division of a wing into rigid bodies: masses, inertias, areas, and the body of each marker.
 
-From ``records.Wing`` alone.
+Computed from the description in ``records.Wing``, without code of the simulator that is tested.
 """
 
 from __future__ import annotations
@@ -54,8 +54,11 @@ class Lump:
 class Cut:
     """A wing divided into bodies, with additional point masses ``lumps``.
 
-    Body n belongs to strip ``strip[n]`` and covers the fractions ``s0[n]`` to ``s1[n]`` of the chord. The strips'
-    borders are ``edges`` [S + 1], m.
+    Attributes:
+        counts: [S] bodies along the chord of each strip; ``start`` [S + 1]: first body of each strip.
+        strip: [N] strip of each body.
+        s0, s1: [N] fractions of the chord between which a body lies.
+        edges: [S + 1] span positions y of the strips' borders, m.
     """
 
     def __init__(self, wing: Wing, division: str, lumps: Sequence[Lump] = ()) -> None:
@@ -69,22 +72,22 @@ class Cut:
         self.s1 = np.concatenate([(np.arange(n) + 1) / n for n in self.counts])
 
     def section(self, y: float) -> tuple[float, float, float]:
-        """Leading edge, chord and thickness at span position y, m."""
+        """x of the leading edge, chord and thickness at span position ``y``, all in m."""
         edge, chord, thickness = (float(np.interp(y, self._y, column)) for column in self._sections.T)
         return edge, chord, thickness
 
     def x_at(self, part: float, y: float) -> float:
-        """x (m) at a fraction of the chord."""
+        """x (m) at the fraction ``part`` of the chord at span position ``y`` (m)."""
         edge, chord, _ = self.section(y)
         return edge + part * chord
 
     def place(self, span: float, chord: float) -> tuple[float, float]:
-        """(x, y) in m at fractions of span and chord."""
+        """Position (x, y) in the wing frame (m) at given fractions of span and chord."""
         y = float(self.edges[0] + span * (self.edges[-1] - self.edges[0]))
         return self.x_at(chord, y), y
 
     def under(self, x: npt.ArrayLike, y: npt.ArrayLike) -> Index:
-        """Bodies at the points (x, y); a point on a border belongs to the outer or rear body."""
+        """Numbers [P] of the bodies at the points (``x``, ``y``) (m); on a border, the outer or rear body."""
         xs, ys = np.atleast_1d(np.asarray(x, float)), np.atleast_1d(np.asarray(y, float))
         strip = np.clip(np.searchsorted(self.edges, ys, side="right") - 1, 0, len(self.counts) - 1)
         edge, chord = np.interp(ys, self._y, self._sections[:, 0]), np.interp(ys, self._y, self._sections[:, 1])
@@ -93,7 +96,7 @@ class Cut:
         return np.asarray(self.start[strip] + along, np.int64)
 
     def _stretches(self, strip: int) -> tuple[Array, Array]:
-        """Gauss points and weights (m) over the width of a strip, one stretch between stations after the other."""
+        """Gauss points y and weights (m) over the width of a strip, for each interval between stations in turn."""
         inner, outer = self.edges[strip], self.edges[strip + 1]
         cuts = np.unique(np.concatenate([[inner, outer], self._y[(self._y > inner) & (self._y < outer)]]))
         nodes, weights = np.polynomial.legendre.leggauss(_GAUSS)
@@ -111,7 +114,7 @@ class Cut:
         return np.array([w @ np.stack([x, y], axis=1) / w.sum() for w, x, y, _ in map(self._plan, range(len(self.s0)))])
 
     def _plan(self, n: int) -> tuple[Array, Array, Array, Array]:
-        """Area weights, x, y and thickness at the Gauss points of a body."""
+        """Area weights (m^2), x, y and thickness (m) at the Gauss points of body ``n``, flat arrays."""
         y, weight = self._stretches(int(self.strip[n]))
         edge, chord, thickness = (np.interp(y, self._y, column) for column in self._sections.T)
         nodes, weights = np.polynomial.legendre.leggauss(_GAUSS)
@@ -127,7 +130,7 @@ class Cut:
 
     @cached_property
     def _points(self) -> tuple[Index, Array, Array]:
-        """Point masses (rods with their straw, markers, lumps): body [P], mass [P], place [P, 3]."""
+        """Point masses of rods (with glue), markers and lumps: body [P], mass [P] kg, position [P, 3] m."""
         masses, places = [], []
         t = (np.arange(_SAMPLES) + 0.5) / _SAMPLES
         for rod in self.wing.rods:

@@ -54,9 +54,10 @@ _START = 1e-7  # s: length of a stage that gives the initial accelerations
 
 
 class State(NamedTuple):
-    """State at one instant.
+    """State of all N bodies at one instant, in the world frame.
 
-    Rotations [N, 3, 3], centres, velocities, angular velocities [N, 3], internal states [Z].
+    Rotations ``R`` [N, 3, 3], centres of mass ``p``, velocities ``v``, angular velocities ``w`` [N, 3], internal states
+    of effects with memory ``z`` [Z].
     """
 
     R: Array
@@ -83,7 +84,7 @@ class _Work(NamedTuple):
 
 @compiled
 def _drive(rig: Rig, rods: Array, m: Motion) -> None:
-    """Set the frames of both rods from their angles and rates [2, 2]."""
+    """Set frames N and N + 1 of ``m``, the driving rods, from their angles and rates ``rods`` [2, 2] (rad, rad/s)."""
     n, x = len(rig.mass), (rig.axle[0], rig.axle[1], rig.axle[2])
     for rod in range(2):
         c, s = math.cos(rods[rod, 0]), math.sin(rods[rod, 0])
@@ -102,7 +103,10 @@ def _drive(rig: Rig, rods: Array, m: Motion) -> None:
 
 @compiled
 def loads(rig: Rig, m: Motion, old: Array, hg: float, z: Array, load: Array) -> None:
-    """All loads (force, moment about the centre) on bodies and rods [N + 2, 6], in the world frame; sets ``z``."""
+    """Set ``load`` [N + 2, 6]: force (N) and moment about the centre (N m) on bodies and rods, in the world frame.
+
+    Also sets the internal states ``z``, by an implicit step of ``hg`` (s) from ``old``.
+    """
     load[:] = 0.0
     joint_loads(rig, m, load)
     remembered_loads(rig, m, old, hg, z, load)
@@ -116,7 +120,7 @@ def loads(rig: Rig, m: Motion, old: Array, hg: float, z: Array, load: Array) -> 
 
 @compiled
 def _place(rig: Rig, hg: float, work: _Work) -> None:
-    """Poses and accelerations of a stage from its velocities."""
+    """Set poses and accelerations of a stage of length ``hg`` (s) from its velocities in ``work.m``."""
     m = work.m
     for n in range(len(rig.mass)):
         w, base = row(m.w, n), row(work.g0, n)
@@ -134,7 +138,7 @@ def _place(rig: Rig, hg: float, work: _Work) -> None:
 
 @compiled
 def _residual(rig: Rig, hg: float, work: _Work) -> None:
-    """Residual of Newton's and Euler's equations: hg times (load - rate of momentum)."""
+    """Set ``work.step`` to the residual of Newton's and Euler's equations: hg times (load - rate of momentum)."""
     for n in range(len(rig.mass)):
         m, w = work.m, row(work.m.w, n)
         L, dL = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
@@ -151,7 +155,10 @@ def _residual(rig: Rig, hg: float, work: _Work) -> None:
 
 @compiled
 def _stage(rig: Rig, hg: float, tolerance: float, work: _Work, z: Array) -> int:
-    """Solve a stage for its velocities, starting from ``work.m``; number of iterations, or -1 without convergence."""
+    """Solve a stage for its velocities, starting from those in ``work.m``.
+
+    Returns the number of Newton iterations, or -1 without convergence to ``tolerance`` (m).
+    """
     m = work.m
     for iteration in range(_ITERATIONS):
         _place(rig, hg, work)
@@ -175,7 +182,7 @@ def _stage(rig: Rig, hg: float, tolerance: float, work: _Work, z: Array) -> int:
 
 @compiled
 def _base(rig: Rig, h: float, stage: int, start: State, work: _Work) -> None:
-    """Explicit part of stage ``stage``, from the rates of the stages before."""
+    """Set the explicit part of a Runge-Kutta stage in ``work`` (p0, g0, v0, w0, z0) from earlier stages' rates."""
     n = len(rig.mass)
     work.p0[:], work.g0[:], work.v0[:], work.w0[:], work.z0[:] = start.p, 0.0, start.v, start.w, start.z
     for j in range(stage):
@@ -192,7 +199,7 @@ def _base(rig: Rig, h: float, stage: int, start: State, work: _Work) -> None:
 
 @compiled
 def _rates(rig: Rig, hg: float, stage: int, work: _Work, z: Array) -> None:
-    """Rates of a solved stage."""
+    """Set ``work.k[stage]`` to the time derivatives of a solved stage."""
     n, k, m = len(rig.mass), work.k[stage], work.m
     for b in range(n):
         for i in range(3):
@@ -221,7 +228,7 @@ def _new_work(rig: Rig, states: int) -> _Work:
 
 @compiled
 def _begin(rig: Rig, rods: Array, start: State, tolerance: float, work: _Work) -> bool:
-    """Rates at the start of a beat, from a very short implicit stage."""
+    """Set the rates at the start of a beat, from a very short implicit stage; returns whether it converged."""
     n, z, m = len(rig.mass), start.z.copy(), work.m
     m.R[:n], m.p[:n], m.v[:n], m.w[:n] = start.R, start.p, start.v, start.w
     work.R0[:], work.g[:] = start.R, 0.0
@@ -236,7 +243,7 @@ def _begin(rig: Rig, rods: Array, start: State, tolerance: float, work: _Work) -
 
 @compiled
 def _guess(work: _Work, hg: float, stage: int) -> None:
-    """Initial velocities of a stage: extrapolated with the accelerations of another stage, or constant (-1)."""
+    """Set initial velocities of a stage: extrapolated with the accelerations of stage ``stage``, or constant if -1."""
     work.g[:] = work.g0
     for b in range(len(work.v0)):
         for i in range(3):
@@ -246,7 +253,7 @@ def _guess(work: _Work, hg: float, stage: int) -> None:
 
 @compiled
 def _renew(rig: Rig, hg: float, work: _Work) -> None:
-    """Compute the matrix again, at the present velocities."""
+    """Compute and factor the Newton matrix again, at the present velocities."""
     _place(rig, hg, work)
     assemble(rig, work.m, hg, work.band)
     factor(work.band)
@@ -254,11 +261,11 @@ def _renew(rig: Rig, hg: float, work: _Work) -> None:
 
 @compiled
 def beat(rig: Rig, rods: Array, start: State, tolerance: float, R: Array, p: Array, z: Array) -> State:
-    """Integrate a beat of len(``rods``) equal steps; NaN at the end if that fails.
+    """Integrate a beat in n equal steps and return the state at its end, whose ``p`` is NaN if the integration fails.
 
-    ``rods`` [n + 1, STAGES, 2, 2]: angle and rate of both rods at all stages, rad and rad/s. ``tolerance`` (m) of a
-    stage. Written: rotations ``R`` [n, N, 3, 3], centres ``p`` [n, N, 3] and internal states ``z`` [n, Z] at the start
-    of each step.
+    ``rods`` [n + 1, STAGES, 2 rods, 2]: angle and rate of the driving rods at all stages, rad and rad/s. ``tolerance``:
+    of the Newton iteration, m. Rotations ``R`` [n, N, 3, 3], centres ``p`` [n, N, 3] and internal states ``z`` [n, Z]
+    are overwritten with those at the start of each step.
     """
     n, steps = len(rig.mass), len(rods) - 1
     h = rig.period / steps

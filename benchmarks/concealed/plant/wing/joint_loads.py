@@ -1,7 +1,9 @@
 """Loads of joints: springs and dampers (thesis Eqs. 4-7), and the effects that can be hidden in them.
 
-With axes a_k, b_k of both frames and the gap s between their origins, all in the world, the spring's energy is
-sum_k g_k (1 - a_k . b_k) + (s . A s + s . B s) / 4, g = tr(K_o) / 2 - K_o, A = sum_k k_k a_k a_k^T and B alike.
+A joint connects frame a of its first body to frame b of its second. With their axes a_k, b_k and the vector s between
+their origins, in world axes, the spring's energy is sum_k g_k (1 - a_k . b_k) + (s . A s + s . B s) / 4, where
+g_k = tr(K_o) / 2 - K_o,k, K_o the rotational and k_k the translational stiffnesses, A = sum_k k_k a_k a_k^T, and B the
+same with b_k.
 """
 
 from __future__ import annotations
@@ -22,7 +24,7 @@ _SOFT = 0.08  # width of the soft stops, as a fraction of the play
 
 @compiled
 def joint_loads(rig: Rig, m: Motion, load: Array) -> None:
-    """Add the loads of springs and dampers to ``load`` [N + 2, 6]."""
+    """Add the forces (N) and moments (N m) of all springs and dampers to ``load`` [N + 2, 6], in the world frame."""
     for c in range(len(rig.first)):
         i, j = rig.first[c], rig.second[c]
         arm_a, arm_b = turned(m.R, i, row(rig.a, c)), turned(m.R, j, row(rig.b, c))
@@ -51,7 +53,7 @@ def joint_loads(rig: Rig, m: Motion, load: Array) -> None:
 
 @compiled
 def angle_between(m: Motion, i: int, j: int, k: int) -> float:
-    """Angle (rad) of frame j relative to frame i, about axis k (0 or 1)."""
+    """Angle (rad) of frame ``j`` relative to frame ``i`` in the motion ``m``, about axis ``k`` (0 x, 1 y)."""
     u, v = (1, 2) if k == 0 else (2, 0)
     sine = dot(axis(m.R, i, v), axis(m.R, j, u)) - dot(axis(m.R, i, u), axis(m.R, j, v))
     return math.atan2(sine, dot(axis(m.R, i, u), axis(m.R, j, u)) + dot(axis(m.R, i, v), axis(m.R, j, v)))
@@ -59,7 +61,10 @@ def angle_between(m: Motion, i: int, j: int, k: int) -> float:
 
 @compiled
 def _bend(rig: Rig, m: Motion, c: int, load: Array) -> None:
-    """Add the bending moment in excess of k phi: hardening k sinh(x) / x with x = h phi, or play at the root."""
+    """Add the nonlinear part of the bending moment of joint ``c``, beyond k phi: hardening, or play at the root.
+
+    Hardening: k phi sinh(x) / x, where x is hardening times curvature times the angle phi.
+    """
     i, j, k = rig.first[c], rig.second[c], rig.bends[c]
     phi = angle_between(m, i, j, k)
     more = 0.0
@@ -75,7 +80,7 @@ def _bend(rig: Rig, m: Motion, c: int, load: Array) -> None:
 
 @compiled
 def dead_zone(phi: float, half: float) -> float:
-    """The part of an angle outside -half to half, with soft edges: log(1 + exp) instead of max(., 0)."""
+    """The part of the angle ``phi`` outside -half to half (rad), with soft edges: log(1 + exp) instead of max(., 0)."""
     soft = _SOFT * half
     up, down = (phi - half) / soft, (-phi - half) / soft
     above = up if up > 30.0 else math.log1p(math.exp(up))
@@ -85,9 +90,11 @@ def dead_zone(phi: float, half: float) -> float:
 
 @compiled
 def remembered_loads(rig: Rig, m: Motion, old: Array, hg: float, z: Array, load: Array) -> None:
-    """Add the moments -k z of joints with an internal state; z = old + hg z' at the end of a stage, in closed form.
+    """Add the moments -k z (N m) of joints with an internal state z (rad) to ``load``, and set ``z`` [E].
 
-    Maxwell (1867): z' = r - z / T. Dahl (1968): z' = r - |r| z / y. Slider (Prandtl 1928): z' = r within -y to y.
+    An implicit step of ``hg`` (s), z = old + hg z', solved in closed form. With r the relative rotation rate about the
+    joint's axis, T the relaxation time and y the yield angle: Maxwell (1867): z' = r - z / T. Dahl (1968):
+    z' = r - |r| z / y. Slider (Prandtl 1928): z' = r within -y to y.
     """
     for e in range(len(rig.memory)):
         c, k = rig.memory_of[e], rig.memory_axis[e]

@@ -1,4 +1,7 @@
-"""Springs and dampers between the bodies of a divided wing (thesis Eqs. 15-17), and the bodies' shares of air loads."""
+"""Springs and dampers between the bodies of a wing, and each body's share of the air loads.
+
+Van der Grinten's thesis, Eqs. 12-13 and 15-17.
+"""
 
 from __future__ import annotations
 
@@ -60,9 +63,10 @@ class _Maker:
         self, pair: tuple[int, int], point: tuple[float, float], section: Array, along_span: bool,
         length: float, over: tuple[float, float], rods: list[Rod],
     ) -> Joint:  # fmt: skip
-        """A joint.
+        """The joint of the bodies ``pair`` at ``point`` (x, y), m.
 
-        ``section`` [6]: second moments and areas of the foam, ``over``: the stretch of wing that it represents.
+        ``section`` [6]: foam's second moments (m^4) about x, y, z and areas (m^2) along x, y, z; ``length``: between
+        the bodies, m; ``over``: span positions (m) between which it represents the wing; ``rods`` that stiffen it.
         """
         foam = section[:, None] * (self.spanwise if along_span else self.chordwise)
         plain = foam[:, 0] / length
@@ -73,7 +77,7 @@ class _Maker:
         )  # fmt: skip
 
     def _with_rods(self, foam: Array, rods: list[Rod], y0: float, y1: float) -> Array:
-        """Mean rigidity [6] between y0 and y1: rods in parallel with the foam, stretches in series."""
+        """Mean rigidity [6] (N m^2, N) between y0 and y1 (m): rods parallel to ``foam`` [6], intervals in series."""
         cuts = np.unique(np.clip([y0, y1] + [end for rod in rods for end in (rod.y_root, rod.y_tip)], y0, y1))
         flexibility = np.zeros(6)
         for a, b in pairwise(cuts):
@@ -88,7 +92,7 @@ class _Maker:
         return np.asarray((y1 - y0) / flexibility)
 
     def twisting(self, y: float) -> float:
-        """Torsion constant per width of the chord, m^3."""
+        """Torsion constant of the wing's section at span position ``y`` (m) divided by the chord, m^3."""
         _, chord, thickness = self.cut.section(y)
         return torsion_constant(chord, thickness) / chord
 
@@ -99,7 +103,7 @@ class _Maker:
         return found
 
     def _border(self, strip: int) -> list[Joint]:
-        """Joints between a strip and the next."""
+        """Joints between the bodies of a strip and those of the next strip outboard."""
         cut = self.cut
         a, b = cut.start[strip], cut.start[strip + 1]
         inner, outer = cut.counts[strip], cut.counts[strip + 1]
@@ -125,9 +129,9 @@ class _Maker:
         return found
 
     def _rods(self, strip: int, y0: float, y1: float) -> dict[tuple[int, int], list[Rod]]:
-        """Rods by the two bodies that they join across a border.
+        """Rods between y0 and y1 (m), by the (inner, outer) bodies that they join across the border of two strips.
 
-        A rod that ends there stays in its part of the chord.
+        A rod that begins or ends in between joins the bodies at its own chord position there.
         """
         found: dict[tuple[int, int], list[Rod]] = {}
         for rod in self.cut.wing.rods:
@@ -139,7 +143,7 @@ class _Maker:
         return found
 
     def _piece(self, strip: int, rod: Rod, y: float) -> int:
-        """Body of a strip that contains the rod at y."""
+        """Number of the body of ``strip`` that contains the rod at span position ``y`` (m)."""
         edge, chord, _ = self.cut.section(y)
         count = self.cut.counts[strip]
         part = min(max((_x_of(rod, y) - edge) / chord, 0.0), 1.0)
@@ -159,9 +163,9 @@ class _Maker:
         return found
 
     def at_root(self) -> list[Joint]:
-        """Joints of the driven rods to the root, through the foam of the bodies they enter.
+        """Joints between the driving rods and the innermost bodies; stiffness of rod and foam in parallel.
 
-        Inboard of it a rod is bare.
+        ValueError if a driven rod does not reach the root.
         """
         cut, wing = self.cut, self.cut.wing
         y, y1 = float(cut.edges[0]), float(cut.centroid[0, 1])
@@ -190,17 +194,19 @@ def _x_of(rod: Rod, y: float) -> float:
 
 
 def joints(cut: Cut, genome: Mapping[str, float]) -> list[Joint]:
-    """All joints of a wing with ``genome`` (E_f, E_r, G_f, G_r, D_E, D_G; Pa and Pa s)."""
+    """All joints of a divided wing.
+
+    ``genome``: moduli of foam and rods E_f, E_r, G_f, G_r (Pa) and damping of the foam D_E, D_G (Pa s).
+    """
     maker = _Maker(cut, genome)
     return [*maker.along_span(), *maker.along_chord(), *maker.at_root()]
 
 
 def shares(cut: Cut, genome: Mapping[str, float], prefix: str) -> Array:
-    """[N, 2].
+    """[N, 2]: each body's share of its strip's force, and x (m) of the point of attack from the body's centre.
 
-    Share of its strip's force on each body (thesis Eqs. 12-13), and x of its point of attack from the centre.
-
-    The four weights ``prefix``_1 to _4 belong to the quarters of the chord; each is spread evenly.
+    Van der Grinten's thesis, Eqs. 12-13: the four genes ``prefix``_1 to ``prefix``_4 are the weights of the quarters of
+    the chord, each spread evenly. ``prefix``: "L" for lift, "ID" for drag.
     """
     weights = np.array([genome[f"{prefix}_{k}"] for k in range(1, 5)])
     weights = weights / weights.sum()

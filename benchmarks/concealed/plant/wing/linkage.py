@@ -33,7 +33,10 @@ def rocker(link: FourBarDrive, psi: Array) -> Array:
 
 
 def series_of(drive: Drive) -> Complex:
-    """[HARMONICS + 1]: angle = Re sum_k series_k exp(i k psi)."""
+    """Complex Fourier series [HARMONICS + 1] of the rod's angle (rad) over the drive phase psi.
+
+    angle = Re sum_k series_k exp(i k psi).
+    """
     found = np.zeros(HARMONICS + 1, np.complex128)
     if isinstance(drive, FourBarDrive):
         angle = rocker(drive, 2 * np.pi * np.arange(_TURN) / _TURN)
@@ -47,7 +50,7 @@ def series_of(drive: Drive) -> Complex:
 
 
 def angles(series: Complex, psi: Array) -> Array:
-    """[..., 2]: angle (rad) and its derivative by psi."""
+    """[..., 2]: angle (rad) and its derivative by the drive phase, at phases ``psi`` [...] (rad)."""
     k = np.arange(len(series))
     turn = np.exp(1j * psi[..., None] * k)
     return np.stack([(turn @ series).real, (turn @ (1j * k * series)).real], axis=-1)

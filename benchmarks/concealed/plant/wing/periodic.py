@@ -1,4 +1,4 @@
-"""Finds the periodic motion by Anderson acceleration of the map from the start of a beat to its end."""
+"""Finds a periodic motion by Anderson acceleration of the map from the state at a beat's start to that at its end."""
 
 from __future__ import annotations
 
@@ -25,9 +25,10 @@ _WORSE = 5.0  # ratio to the smallest change so far above which an extrapolation
 
 @dataclass(frozen=True)
 class Accuracy:
-    """``rough`` steps a beat during the search, ``steps`` in the final beat; periodic to ``periodic`` m.
+    """Settings of the search: ``rough`` integration steps a beat at first, ``steps`` in the end.
 
-    With these values the error of the steps is below 0.02 mm for the thesis's wings at up to 4 Hz.
+    A motion counts as periodic if it repeats to within ``periodic`` m; ``beats`` limits each of the two searches. With
+    the default values the time discretisation error is below 0.02 mm for van der Grinten's wings at up to 4 Hz.
     """
 
     rough: int = 48
@@ -37,9 +38,11 @@ class Accuracy:
 
 
 def settle(rig: Rig, rods: Callable[[int], Array], start: State, accuracy: Accuracy) -> tuple[Array, Array, float, int]:
-    """A periodic beat: rotations [n, N, 3, 3], centres [n, N, 3], distance from periodicity (m), number of beats.
+    """Find a periodic motion, starting from the state ``start``.
 
-    ``rods``: table of :func:`.build.rod_table` for a number of steps. ArithmeticError if there is no periodic motion.
+    Returns rotations [n, N, 3, 3] and centres [n, N, 3] of the bodies over one beat, the distance from periodicity (m),
+    and the number of beats that were integrated. ``rods``: :func:`.build.rod_table` as a function of the number of
+    steps. ArithmeticError if no periodic motion is found.
     """
     state, spent = _let_in(rig, rods(accuracy.rough), start), 1
     for steps, near in ((accuracy.rough, _ROUGH), (accuracy.steps, accuracy.periodic)):
@@ -50,7 +53,10 @@ def settle(rig: Rig, rods: Callable[[int], Array], start: State, accuracy: Accur
 
 
 def _let_in(rig: Rig, table: Array, start: State) -> State:
-    """The state after a beat over which the drive's amplitude grows from zero."""
+    """State after one beat that begins at ``start``, over which the drive's amplitude grows from zero.
+
+    ``table``: of :func:`.build.rod_table`.
+    """
     n = len(table) - 1
     x = np.minimum((np.arange(n + 1)[:, None] + C) / n, 1.0)[..., None]
     share, growth = x**3 * (10 + x * (6 * x - 15)), 30 * (x * (1 - x)) ** 2 / rig.period
@@ -65,7 +71,10 @@ def _let_in(rig: Rig, table: Array, start: State) -> State:
 
 
 class _Search:
-    """The search with one number of steps; ``R``, ``p`` and ``error`` belong to the last beat."""
+    """Search for a periodic motion with a fixed number of steps a beat, to within ``near`` m.
+
+    ``R``, ``p``: rotations and centres over the last beat; ``error``: its distance from periodicity, m.
+    """
 
     def __init__(self, rig: Rig, table: Array, near: float) -> None:
         self.rig, self.table, self.near = rig, table, near
@@ -74,7 +83,10 @@ class _Search:
         self.error = np.inf
 
     def run(self, state: State, most: int) -> tuple[State, int]:
-        """Search from ``state``; the periodic state and the number of beats. ArithmeticError without convergence."""
+        """Search from ``state``, for at most ``most`` beats; returns the periodic state and the number of beats.
+
+        ArithmeticError without convergence.
+        """
         omega = 2 * np.pi / self.rig.period
         memories = np.empty((len(self.table) - 1, len(state.z)))
         xs: list[Array] = []
@@ -104,7 +116,7 @@ class _Search:
 
 
 def _leap(xs: list[Array], fs: list[Array]) -> Array:
-    """The next state by Anderson's extrapolation (1965)."""
+    """The next state, extrapolated (Anderson 1965) from earlier states ``xs`` and their changes over a beat ``fs``."""
     if len(xs) == 1:
         return xs[0] + fs[0]
     dx, df = np.diff(np.array(xs), axis=0).T, np.diff(np.array(fs), axis=0).T
@@ -113,14 +125,14 @@ def _leap(xs: list[Array], fs: list[Array]) -> Array:
 
 
 def _largest(f: Array, bodies: int) -> float:
-    """Largest change of a body's place or attitude, m."""
+    """Largest change of a body's position or attitude in the packed change ``f`` (see :func:`_packed`), m."""
     return float(np.abs(f[: 6 * bodies]).max())
 
 
 def _packed(state: State, omega: float) -> Array:
-    """All states in metres.
+    """The state as one vector in metres, so that all entries are comparable.
 
-    Attitudes and rates times a chord, internal states by the rotation that their moment causes.
+    Rotations are multiplied by about a chord, rates also by 1 / ``omega``, internal states by 0.02.
     """
     turn = _LENGTH * Rotation.from_matrix(state.R).as_rotvec()
     parts = (state.p, turn, state.v / omega, _LENGTH / omega * state.w, 0.02 * state.z)

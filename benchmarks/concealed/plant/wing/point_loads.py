@@ -1,4 +1,7 @@
-"""Loads at one point of the wing: a band, a stop, a brake, an appendage. The library has none of them."""
+"""Hidden loads at one point of the wing: elastic band, stop, brake, appendage (mass on a spring).
+
+The diagnosis has no effect of these kinds in its library.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +21,10 @@ _SLACK = 5e-4  # m: range over which a band becomes tight
 
 @compiled
 def _held(q: Array, place: V3, velocity: V3) -> V3:
-    """Force on the wing at ``place``, for a row ``q`` of Rig.points without an internal state."""
+    """Force (N) on the wing at ``place`` (m), for a row ``q`` of Rig.points; zero for an appendage.
+
+    ``velocity``: of that point, m/s.
+    """
     if q[0] == BAND:  # from a fixed point, elastic beyond its length: x, y, z, N/m, m
         away = plus((q[4], q[5], q[6]), -1.0, place)
         length = math.sqrt(dot(away, away))
@@ -37,10 +43,11 @@ def _held(q: Array, place: V3, velocity: V3) -> V3:
 
 @compiled
 def point_loads(rig: Rig, m: Motion, old: Array, hg: float, z: Array, first: int, load: Array) -> None:
-    """Add the loads of all points.
+    """Add the loads of all rows of Rig.points to ``load`` [N + 2, 6].
 
-    An appendage of mass q4 (kg) moves along the body's normal n on a spring of angular frequency q5 (rad/s) with
-    damping ratio q6. Its states are the spring's displacement s and its velocity u along n: s' = u - n.v,
+    An appendage of mass q4 (kg) moves along the body's normal n on a spring of angular frequency w = q5 (rad/s) with
+    damping ratio d = q6. v and omega are the velocity and angular velocity of the wing there. Its states,
+    ``z[first + 2 k]`` and the next for row k, are the spring's displacement s and its velocity u along n: s' = u - n.v,
     u' = -(w^2 s + 2 d w s') + (omega x n).v - g n_z; they are solved in closed form, as in ``remembered_loads``.
     """
     for k in range(len(rig.points)):

@@ -30,23 +30,29 @@ class Rig(NamedTuple):
     Attributes:
         mass: [N] kg; ``inertia`` [N, 3, 3] kg m^2 about the centre of mass, in the body's frame.
         rest: [N, 3] centres of mass at rest, m.
-        first, second: [C] bodies that a joint connects; ``a``, ``b`` [C, 3] its place from the body (for a rod: from
-            the hinge), m.
-        stiffness, damping: [C, 6] about x, y, z, then along x, y, z, of the first body's axes.
-        bends: [C] axis about which it bends; ``curvature`` [C]: rad over the span per rad.
-        hardening: [C] growth of the bending moment; ``play`` [C] rad to either side about x; 0 without them.
-        memory_of: [E] joint, ``memory_axis`` [E] axis, ``memory`` [E, 3] kind, stiffness (N m/rad), and relaxation time
-            (s) or yield angle (rad).
-        strip: [S + 1] first body of each strip; ``weight`` [N] part of the strip's area; ``centroid`` [N, 2] from the
-            body's centre, m.
-        area, chord: [S] m^2 and m.
-        coefficients: [4] L_a, L_b, ID_a, ID_b (thesis Eqs. 10-11); ``lift``, ``drag`` [N, 2]: shares and places.
-        air: density, kg/m^3; ``wind`` [3] m/s; ``gravity`` m/s^2.
-        air_laws: [AIR_LAWS]; ``remembers``: whether they have internal states.
-        jets: [J, JETS]; ``points`` [P, POINTS] with ``point_body`` [P].
+        first, second: [C] bodies that a joint connects; ``a``, ``b`` [C, 3] the joint's position from the centre of
+            either (for a rod: from the hinge), m.
+        stiffness, damping: [C, 6] about x, y, z (N m/rad, N m s/rad), then along x, y, z (N/m, N s/m), of the first
+            body's axes.
+        bends: [C] axis (0 x, 1 y) about which a joint bends; ``curvature`` [C]: angle over the whole span per angle of
+            the joint.
+        hardening: [C] h in the bending moment k phi sinh(x) / x, x = h curvature phi; ``play`` [C] free angle to either
+            side, rad; both 0 without the effect.
+        memory_of: [E] joint of each spring with an internal state; ``memory_axis`` [E] its axis; ``memory`` [E, 3]
+            kind, stiffness (N m/rad), and relaxation time (s) or yield angle (rad).
+        strip: [S + 1] first body of each strip; ``weight`` [N] body's part of the strip's area; ``centroid`` [N, 2] of
+            the body's area, from its centre of mass, m.
+        area, chord: [S] of the strips, m^2 and m.
+        coefficients: [4] genes L_a, L_b, ID_a, ID_b of lift and drag (van der Grinten's thesis, Eqs. 10-11); ``lift``,
+            ``drag`` [N, 2]: as returned by :func:`.joints.shares`.
+        air: density, kg/m^3; ``wind`` [3] velocity, m/s; ``gravity`` m/s^2.
+        air_laws: [AIR_LAWS] parameters of the hidden effects in the air loads, by the indices above; ``remembers``: 1
+            if these have internal states, else 0.
+        jets: [J, JETS] hidden jets of air; ``points`` [P, POINTS] hidden loads at a point of the body ``point_body``
+            [P]; columns as above.
         hinge: [3] m on the axis of the rods; ``axle`` [3] its direction.
         period: of a beat, s.
-        reach: largest difference of the numbers of two joined bodies.
+        reach: largest difference of the numbers of two coupled bodies; sets the bandwidth of the Newton matrix.
     """
 
     mass: Array
@@ -88,7 +94,11 @@ class Rig(NamedTuple):
 
 
 class Motion(NamedTuple):
-    """Frames [N + 2, ...] in the world: rotation, centre, velocity, angular velocity, and both accelerations."""
+    """Motion of the frames of N bodies and 2 rods at one instant, in the world frame.
+
+    Rotation ``R`` [N + 2, 3, 3]; centre ``p``, velocity ``v``, angular velocity ``w``, and the accelerations ``dv`` and
+    ``dw``, [N + 2, 3] each.
+    """
 
     R: Array
     p: Array
@@ -99,5 +109,5 @@ class Motion(NamedTuple):
 
 
 def states_of(rig: Rig) -> int:
-    """Number of internal states."""
+    """Number Z of internal states of all hidden effects that have memory."""
     return len(rig.memory) + AIR_STATES * len(rig.area) * rig.remembers + 2 * len(rig.points)

@@ -1,4 +1,4 @@
-"""Simulates one periodic beat of a wing with hidden effects: the motion that ideal cameras would see."""
+"""Simulates one beat of the periodic motion of a wing with hidden effects; returns the true marker positions."""
 
 from __future__ import annotations
 
@@ -27,9 +27,11 @@ class Beat:
     """One beat of the periodic motion.
 
     Attributes:
-        tracks: [n, M, 3] of all markers in the wing's order, at n equal steps of the drive phase from 0, m.
-        hidden: effects that are hidden in it; ``turns``: drive phases (rad) of those that act near the top of the
-            stroke.
+        wing: the wing that was simulated.
+        tracks: [n, M, 3] true positions of all markers in the wing's order, at n equal steps of the drive phase from 0,
+            m.
+        hidden: effects that are hidden in it.
+        turns: drive phase (rad) at which an effect acts, by its name, for those whose phase follows from the motion.
         error: estimated distance from the periodic motion, m.
         beats: number of beats that were integrated.
         crossing: drive phase (rad) at which the reference markers rise through the height of the hinge: the start of
@@ -45,14 +47,14 @@ class Beat:
 
     @property
     def truths(self) -> tuple[Truth, ...]:
-        """The answers; their phase in beats is :meth:`phase` of ``turn``."""
+        """The hidden effects as a diagnosis should report them; :meth:`phase` converts their ``turn`` to beats."""
         return self.hidden.truths(self.wing, self.turns)
 
     @cached_property
     def crossing(self) -> float:
-        """Drive phase (rad) at the start of a dataset's beat.
+        """Drive phase (rad) at which the reference markers rise through the hinge's height: start of a dataset's beat.
 
-        ValueError if the markers never cross the hinge's height.
+        ValueError if they never do.
         """
         names = [marker.name for marker in self.wing.markers]
         columns = [names.index(name) for name in self.wing.reference_markers]
@@ -77,9 +79,10 @@ def simulate(
     hidden: Hidden | None = None,
     accuracy: Accuracy | None = None,
 ) -> Beat:
-    """Simulate ``wing`` with a genome (thesis Eqs. 18-19, SI units).
+    """Simulate one periodic beat of ``wing``.
 
-    ``division`` as in :func:`.geometry.counts_of`. ArithmeticError if there is no periodic motion.
+    ``genome``: model parameters by name (van der Grinten's thesis, Eqs. 18-19), SI units. ``division`` as in
+    :func:`.geometry.counts_of`. ArithmeticError if there is no periodic motion.
     """
     draft = Draft(wing, division, genome, condition)
     concealed = hidden or Hidden()
@@ -110,7 +113,7 @@ def _middle(draft: Draft, effect: Effect, R: Array, p: Array) -> float:
 
 
 def at_rest(rig: Rig) -> State:
-    """The undeformed wing at rest."""
+    """Initial state: the undeformed wing at rest, with all internal states zero."""
     n = len(rig.mass)
     return State(
         np.tile(np.eye(3), (n, 1, 1)), rig.rest.copy(), np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(states_of(rig))

@@ -1,4 +1,7 @@
-"""The matrix of Newton's iteration, M + h C + h^2 K: symmetric, lower half as a band matrix (:mod:`.banded`)."""
+"""Assembles the matrix of the integrator's Newton iteration, M + h C + h^2 K, of mass, damping and stiffness.
+
+It is symmetric; its lower half is stored as a band matrix (:mod:`.banded`).
+"""
 
 from __future__ import annotations
 
@@ -31,7 +34,7 @@ _SLOPE = 1e-5  # rad: step of a finite difference
 
 @compiled
 def assemble(rig: Rig, m: Motion, hg: float, band: Array) -> None:
-    """Fill ``band`` [6 N, 6 (reach + 1)] for a stage of length ``hg`` (s) at a given motion."""
+    """Fill the band matrix ``band`` [6 N, 6 (reach + 1)] for a stage of length ``hg`` (s) at the motion ``m``."""
     band[:] = 0.0
     last = band.shape[1] - 1
     for n in range(len(rig.mass)):
@@ -76,7 +79,7 @@ def _joint(rig: Rig, m: Motion, c: int, hg: float, band: Array) -> None:
 
 @compiled
 def _stiffness(rig: Rig, m: Motion, c: int, k: int) -> float:
-    """Tangent stiffness about axis k, with hardening and play."""
+    """Tangent stiffness (N m/rad) of joint ``c`` about axis ``k``, with hardening and play."""
     stiff = rig.stiffness[c, k]
     if k != rig.bends[c] or (rig.hardening[c] == 0.0 and rig.play[c] == 0.0):
         return float(stiff)
@@ -91,7 +94,7 @@ def _stiffness(rig: Rig, m: Motion, c: int, k: int) -> float:
 
 @compiled
 def _couple(rig: Rig, c: int, a: V3, size: float, band: Array) -> None:
-    """Add the moment of a joint about the axis ``a``."""
+    """Add a rotational spring or damper of size ``size`` about the axis ``a`` between the bodies of joint ``c``."""
     i, j = rig.first[c], rig.second[c]
     x, y = np.zeros(6), np.zeros(6)
     _fill(x, ZERO, a)
@@ -110,7 +113,7 @@ def _fill(x: Array, force: V3, moment: V3) -> None:
 
 @compiled
 def _square(n: int, x: Array, size: float, band: Array) -> None:
-    """Add size x x^T to a body's block."""
+    """Add size x x^T to the diagonal block of body ``n`` in ``band``; ``x`` [6]."""
     last = band.shape[1] - 1
     for i in range(6):
         for j in range(i + 1):
@@ -119,7 +122,7 @@ def _square(n: int, x: Array, size: float, band: Array) -> None:
 
 @compiled
 def _product(n: int, x: Array, k: int, y: Array, size: float, band: Array) -> None:
-    """Add size x y^T to the block of two different bodies."""
+    """Add size x y^T to the block of the different bodies ``n`` and ``k`` in ``band``; ``x``, ``y`` [6]."""
     if n < k:
         n, k, x, y = k, n, y, x
     last = band.shape[1] - 1
@@ -130,7 +133,7 @@ def _product(n: int, x: Array, k: int, y: Array, size: float, band: Array) -> No
 
 @compiled
 def _air(rig: Rig, m: Motion, hg: float, band: Array) -> None:
-    """Damping along the normal by the affine laws, and added mass, of a strip as a whole."""
+    """Add the aerodynamic damping along the normal, and the added mass, of each strip as a whole."""
     x, y = np.zeros(6), np.zeros(6)
     for s in range(len(rig.area)):
         chord, normal, u = frame_of(rig, m, s)
@@ -158,7 +161,7 @@ def _air(rig: Rig, m: Motion, hg: float, band: Array) -> None:
 
 @compiled
 def _point(rig: Rig, m: Motion, k: int, hg: float, band: Array) -> None:
-    """Stiffness and damping of a point load, taken as equal in all directions."""
+    """Add stiffness and damping of the point load ``k`` (row of Rig.points), taken as equal in all directions."""
     q, n = rig.points[k], rig.point_body[k]
     arm = turned(m.R, n, (q[1], q[2], q[3]))
     v = plus(row(m.v, n), 1.0, cross(row(m.w, n), arm))

@@ -1,1 +1,1 @@
-"""What can be hidden in the wing, its drive and the air."""
+"""The effects that can be hidden in the simulated wing: in its structure, its drive and the air loads."""

@@ -1,4 +1,7 @@
-"""Aerodynamic effects that the library has too, in another form; their laws are in ``wing/air_loads.py``."""
+"""Hidden aerodynamic effects that the diagnosis can name, simulated by other equations than its own.
+
+The equations are in ``wing/air_loads.py``. "The library" is the set of effects that the diagnosis can name.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""All effects that the plant can hide in a wing, in the order in which they are applied."""
+"""All effects that can be hidden in a simulated wing, in the order in which they are applied.
+
+LISTED: those that the diagnosis has in its own library of effects; UNKNOWN: the others.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,8 @@
-"""Errors of the drive that the library has too, in another form."""
+"""Hidden errors of the drive that the diagnosis can name, simulated by other equations than its own.
+
+"The library" is the set of effects that the diagnosis can name. Fourier series of the rods' angles are complex [K], as
+in ``wing/linkage.py``.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +27,7 @@ def _linkage(wing: Wing) -> FourBarDrive:
 
 
 def _further(wing: Wing, strength: float) -> Complex:
-    """Change of the series for a crank longer by a fraction, with the same mean."""
+    """Change [K] of the rod's Fourier series for a crank longer by the fraction ``strength``; same mean."""
     link = _linkage(wing)
     change = series_of(replace(link, crank=link.crank * (1 + strength))) - series_of(link)
     change[0] = 0.0
@@ -31,7 +35,10 @@ def _further(wing: Wing, strength: float) -> Complex:
 
 
 def _otherwise(wing: Wing, strength: float) -> Complex:
-    """Change of the series for a frame longer by a fraction, with the same mean and first harmonic."""
+    """Change [K] of the rod's Fourier series for a ground link longer by the fraction ``strength``.
+
+    Mean and first harmonic stay the same.
+    """
     link = _linkage(wing)
     nominal, changed = series_of(link), series_of(replace(link, ground=link.ground * (1 + strength)))
     shift, size = np.angle(nominal[1] / changed[1]), abs(nominal[1] / changed[1])
@@ -41,7 +48,7 @@ def _otherwise(wing: Wing, strength: float) -> Complex:
 
 
 def _add(draft: Draft, change: Complex) -> None:
-    """Add to both rods; the change of the rear rod lags like the rod itself."""
+    """Add ``change`` [K] to the Fourier series of both rods, for the rear rod with the rod's phase lag."""
     late = np.exp(-1j * draft.condition.phase_lag * np.arange(len(change)))
     draft.rods += np.stack([change, change * late], axis=1)
 
@@ -74,9 +81,9 @@ def _late_genes(_: Wing, strength: float, __: Values) -> dict[str, float]:
 
 
 def _tilted(draft: Draft, strength: float, at: Values) -> None:
-    """The rear bearing, a root chord behind the front one, is displaced by ``strength``.
+    """Tilt the flapping axis: displace its rear bearing, a root chord behind the front one, by ``strength`` (m).
 
-    The direction is from y to z.
+    ``at["direction"]``: angle of the displacement from y towards z, rad.
     """
     chord = draft.cut.section(float(draft.cut.edges[0]))[1]
     axle = np.array([chord, strength * math.cos(at["direction"]), strength * math.sin(at["direction"])])

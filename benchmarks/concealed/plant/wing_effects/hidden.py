@@ -1,4 +1,4 @@
-"""Effects hidden in a simulated wing: any number, each with a strength that can be zero."""
+"""The set of effects hidden in one simulated wing: any number, each with a strength that can be zero."""
 
 from __future__ import annotations
 
@@ -15,7 +15,10 @@ from wingfit.records import Wing
 
 @dataclass(frozen=True)
 class Effect:
-    """An effect with its ``strength`` (in the unit of its kind) and those parameters ``at`` that are not typical."""
+    """A hidden effect: its ``strength`` (in the unit of its :class:`Kind`) and its other parameters.
+
+    ``at``: parameters by name whose value is not the typical one.
+    """
 
     name: str
     strength: float
@@ -23,14 +26,14 @@ class Effect:
 
     @property
     def kind(self) -> Kind:
-        """Its kind; ValueError for an unknown name."""
+        """The effect's entry in the catalogue; ValueError for an unknown name."""
         if self.name not in KINDS:
             raise ValueError(f"the plant cannot hide {self.name!r}; it can hide {', '.join(KINDS)}")
         return KINDS[self.name]
 
     @property
     def values(self) -> dict[str, float]:
-        """All parameters by name; ValueError for an unknown parameter."""
+        """All parameters by name, typical values included; ValueError for an unknown parameter."""
         shape = self.kind.shape
         for name in self.at:
             if name not in shape:
@@ -40,14 +43,15 @@ class Effect:
 
 @dataclass(frozen=True)
 class Truth:
-    """The answer for one effect.
+    """What a correct diagnosis should report about one hidden effect.
 
     Attributes:
-        name, family, listed, strength: of the effect.
+        name, family, listed, strength: of the effect; see :class:`Kind`.
         parameters: all of its parameters.
         span, chord: place on the wing, as fractions; None for an effect without a place.
         turn: drive phase (rad) near which it acts; None if it always acts.
-        genes: true values of the library's genes with the same meaning.
+        genes: true values, by name, of those genes (parameters) of the diagnosis's own effect that have the same
+            meaning.
     """
 
     name: str
@@ -63,17 +67,17 @@ class Truth:
 
 @dataclass(frozen=True)
 class Hidden:
-    """Effects hidden in a wing; none by default."""
+    """All effects hidden in one wing; none by default."""
 
     effects: tuple[Effect, ...] = ()
 
     @classmethod
     def one(cls, name: str, strength: float, **at: float) -> Hidden:
-        """A single effect."""
+        """A single effect ``name`` with its strength and those parameters ``at`` that are not typical."""
         return cls((Effect(name, strength, at),))
 
     def put_into(self, draft: Draft) -> None:
-        """Divide the wing and apply the effects, in the order of the catalogue."""
+        """Divide the wing of ``draft`` into bodies and apply the effects to it, in the order of the catalogue."""
         order = list(KINDS)
         present = [e for e in sorted(self.effects, key=lambda e: order.index(e.kind.name)) if e.strength != 0.0]
         for effect in present:
@@ -85,7 +89,11 @@ class Hidden:
                 effect.kind.put(draft, effect.strength, effect.values)
 
     def truths(self, wing: Wing, turns: Mapping[str, float]) -> tuple[Truth, ...]:
-        """The answers; ``turns``: drive phases of the effects whose phase depends on the motion."""
+        """What a diagnosis should report about each effect.
+
+        ``turns``: drive phase (rad) at which an effect acts, by its name, for those whose phase follows from the
+        motion.
+        """
         return tuple(_truth(effect, wing, turns.get(effect.name)) for effect in self.effects)
 
 

@@ -1,4 +1,4 @@
-"""A kind of effect that can be hidden in a wing: its law, size, shape and source."""
+"""Description of one kind of effect that can be hidden in a wing: how it is applied, its parameters and its source."""
 
 from __future__ import annotations
 
@@ -19,20 +19,21 @@ Values = Mapping[str, float]
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of effect.
+    """A kind of effect. "The library" is the set of effects that the diagnosis can name.
 
     Attributes:
-        name: as in the library if ``listed``, else the plant's own.
+        name: as in the library if ``listed``, else a name used only here.
         family: structure, inertia, actuation or aerodynamics.
         listed: whether the library has it.
         unit: of its strength; ``typical``: a strength that is easily detected with a noise of 0.5 mm.
         largest: strength above which it is not physical, or above which a periodic motion may not exist.
         shape: other parameters by name, as (typical value, lower bound, upper bound).
         source: literature, and how the law differs from the library's.
-        put: applies it to a draft, after the wing was divided unless ``before`` is set.
-        genes: true values of the library's genes with the same meaning.
-        acting: magnitude [n] at heights [n] (m) and vertical speeds [n] (m/s) of its place; only for effects whose
-            phase depends on the motion.
+        put: function that applies the effect, with its strength and other parameters, to a draft.
+        genes: function that returns the true values of those genes of the library's effect with the same meaning.
+        before: whether ``put`` is called before the wing is divided into bodies, not after.
+        acting: function that returns the magnitude [n] of the effect from the heights [n] (m) and vertical speeds [n]
+            (m/s) of its position; only for effects whose phase in the beat depends on the motion.
     """
 
     name: str

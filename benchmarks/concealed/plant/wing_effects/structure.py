@@ -1,4 +1,7 @@
-"""Effects of structure and inertia that the library has too, in another form."""
+"""Hidden effects of structure and inertia that the diagnosis can name, simulated by other equations than its own.
+
+"The library" is the set of effects that the diagnosis can name.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +24,7 @@ _STEEPEST = 12.0  # largest argument of sinh at one radian over the span
 
 
 def _lump(draft: Draft, strength: float, at: Values) -> None:
-    """A point mass, added before the wing is divided, so that masses, centres and inertias include it."""
+    """Add a point mass of ``strength`` kg before the wing is divided; masses, centres and inertias then include it."""
     x, y = Cut(draft.wing, draft.division).place(at["span"], at["chord"])
     draft.lumps.append(Lump(strength, (x, y, 0.0)))
 
@@ -35,7 +38,7 @@ def _lump_genes(_: Wing, strength: float, at: Values) -> dict[str, float]:
 
 
 def _damage(draft: Draft, strength: float, at: Values) -> None:
-    """The stiffness is reduced by the fraction ``strength``, evenly, over a stretch with sharp ends."""
+    """Reduce the stiffness by the fraction ``strength``, uniformly over an interval of the span with sharp ends."""
     root = float(draft.cut.edges[0])
     lower, upper = (root + draft.span * (at["span"] + side * 0.5 * at["width"]) for side in (-1, 1))
     for c, joint in enumerate(draft.joints):
@@ -51,9 +54,9 @@ def _damage_genes(_: Wing, __: float, at: Values) -> dict[str, float]:
 
 
 def _hardening(draft: Draft, strength: float, _: Values) -> None:
-    """Moment k phi sinh(x) / x, x = h times curvature.
+    """Make bending springs harden: moment k phi sinh(x) / x at the angle phi, x = h times curvature.
 
-    ``h`` is such that the factor is 1 + strength at a radian over the span.
+    Curvature is the angle over the whole span; h is such that sinh(x) / x is 1 + ``strength`` at one radian.
     """
     steep = float(brentq(lambda h: math.sinh(h) / h - 1 - strength, 1e-6, _STEEPEST))
     for c, joint in enumerate(draft.joints):
@@ -62,7 +65,7 @@ def _hardening(draft: Draft, strength: float, _: Values) -> None:
 
 
 def _relaxing(draft: Draft, strength: float, at: Values) -> None:
-    """Two Maxwell branches parallel to each spring of bending and torsion."""
+    """Add two Maxwell branches in parallel to each spring of bending and torsion."""
     for c, joint in enumerate(draft.joints):
         for k in (0, 1):
             if joint.first >= 0 or k == 1:
@@ -72,7 +75,7 @@ def _relaxing(draft: Draft, strength: float, at: Values) -> None:
 
 
 def _yielding(draft: Draft, strength: float, at: Values) -> None:
-    """Three Dahl elements in parallel that yield one after the other, as the sliders of Iwan (1966)."""
+    """Add to each bending and torsion spring three parallel Dahl elements with different yield angles (Iwan 1966)."""
     for c, joint in enumerate(draft.joints):
         for k in (0, 1):
             if joint.first >= 0 or k == 1:
@@ -82,7 +85,10 @@ def _yielding(draft: Draft, strength: float, at: Values) -> None:
 
 
 def _slipping(draft: Draft, strength: float, at: Values) -> None:
-    """A spring with a dry slider parallel to each joint with rods; it carries at most ``strength``."""
+    """Add a spring in series with a dry-friction slider in parallel to each joint with rods.
+
+    The slider slips when the spring's angle, expressed over the whole span, reaches ``strength`` (rad).
+    """
     for c, joint in enumerate(draft.joints):
         if joint.first >= 0 and joint.of_rods > 0:
             limit = strength / draft.curvature(joint)

@@ -1,4 +1,4 @@
-"""Effects that the library does not have."""
+"""Hidden effects that the diagnosis has not got in its library: it can detect but not name them."""
 
 from __future__ import annotations
 
@@ -27,7 +27,10 @@ def _point(draft: Draft, kind: int, at: Values, *law: float) -> None:
 
 
 def _height(draft: Draft, at: Values) -> float:
-    """Height (m) of a place on a straight wing at the fraction ``at['stroke']`` of the range of the flap angle."""
+    """Height (m) of the span position ``at['span']`` on an undeformed wing.
+
+    At the fraction ``at['stroke']`` of the range of the front rod's angle.
+    """
     angle = angles(draft.rods[:, 0], 2 * np.pi * np.arange(256) / 256)[:, 0]
     there = angle.min() + at["stroke"] * (angle.max() - angle.min())
     _, y = draft.cut.place(at["span"], 0.5)
@@ -66,7 +69,7 @@ def _blowing(draft: Draft, at: Values, height: Array, _: Array) -> Array:
 
 
 def _tooth(draft: Draft, strength: float, at: Values) -> None:
-    """A tooth of the motor's gear, before the crank: both rods are advanced briefly, once a turn."""
+    """Add a faulty tooth of the motor's gear: once a turn it advances both rods briefly, by up to ``strength`` rad."""
     n = 1024
     psi = 2 * np.pi * np.arange(n) / n
     bump = strength * np.exp(_TOOTH * (np.cos(psi - at["turn"]) - 1))
@@ -77,7 +80,7 @@ def _tooth(draft: Draft, strength: float, at: Values) -> None:
 
 
 def _cells(draft: Draft, strength: float, _: Values) -> None:
-    """Closed-cell foam, stiffened in proportion to the pressure of the air outside."""
+    """Stiffen the wing in proportion to the ambient pressure (closed-cell foam), by ``strength`` at sea level."""
     draft.factor *= 1 + strength * draft.condition.pressure / _SEA_LEVEL
 
 
