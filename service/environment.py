@@ -27,7 +27,7 @@ def given(environment: Mapping[str, str]) -> dict[str, str]:
 
 
 def unknown(read: Mapping[str, str], settings: Iterable[str]) -> list[str]:
-    """Names of set variables (``read``) that are neither ``settings`` nor used elsewhere, with the nearest known name."""
+    """The set variables (``read``) that are neither ``settings`` nor used elsewhere, each with a similar known name."""
     known = {*settings, *OF_OTHERS}
     return [
         f"{name} ({nearest(name, sorted(known))})"

@@ -135,7 +135,7 @@ def _estimate(found: LocalEstimate, spec: CalibrationSpec, dataset: Dataset) -> 
 
 
 def _fitted(noise: Matrix, recording: Recording, axes: tuple[str, ...]) -> Matrix:
-    """The block of ``noise`` (covariance of all force channels of ``recording``) that belongs to the fitted ``axes``."""
+    """The block of ``noise`` (covariance of all force channels of ``recording``) that belongs to the ``axes``."""
     fitted = [k for k, axis in enumerate(recording.forces) if axis in axes]
     return tuple(tuple(noise[i][j] for j in fitted) for i in fitted)
 

@@ -1,4 +1,4 @@
-"""Queries and changes of the database. Functions take the caller's session, so callers decide what is one transaction."""
+"""Queries and changes of the database. Functions take the caller's session, so the caller defines the transaction."""
 
 from __future__ import annotations
 
@@ -286,7 +286,7 @@ _MADE: dict[str, type[OwnedRow]] = {"datasets": DatasetRow, "runs": RunRow, "dia
 
 @dataclass(frozen=True)
 class Repeat:
-    """The path and Idempotency-Key of a request, and the hash of its body, which is equal for the same body."""
+    """The path and Idempotency-Key of a request, and the hash of its contents."""
 
     path: str
     key: str

@@ -55,7 +55,7 @@ class KeyRow(Table):
 
 
 class DatasetRow(OwnedRow, Table):
-    """The description of an uploaded dataset; ``kind`` is "tracks" or "forces"; the bytes are in :class:`ArchiveRow`."""
+    """The description of an uploaded dataset; ``kind`` is "tracks" or "forces"; its bytes: :class:`ArchiveRow`."""
 
     __tablename__ = "dataset"
 
