@@ -33,7 +33,7 @@ def check_file(path: Path | None, option: str, endings: tuple[str, ...] = ()) ->
 
 
 def new_file(about: str, *names: str) -> Any:
-    """A typer option ``names`` for a file to write, checked at once; its help text ``about`` has the ending: FILE.csv."""
+    """A typer option ``names`` for a file to write, checked at once; its help ``about`` has the ending: FILE.csv."""
 
     def checked(path: Path | None) -> Path | None:
         check_file(path, names[0], tuple(re.findall(r"FILE(\.\w+)", about)))
