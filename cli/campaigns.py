@@ -1,4 +1,4 @@
-"""``wingfit campaign`` and ``wingfit balance``: the virtual rig and the virtual balance."""
+"""``wingfit campaign`` and ``wingfit balance``: write simulated experiments (marker tracks, forces) as datasets."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def balance(
 
 @contextmanager
 def _writing(out: Path) -> Iterator[None]:
-    """Refuse an existing file or folder; turn errors into messages; name the next step."""
+    """Wrap the writing of ``out``: refuse an existing dataset, turn errors into messages, print the next step."""
     if out.exists() and not (out.is_dir() and not any(out.iterdir())):
         raise WingfitError("no campaign written", f"{out} exists already; name a new folder or file")
     with refused("no campaign written"):

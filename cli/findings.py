@@ -1,4 +1,4 @@
-"""The finding of a diagnosis, printed."""
+"""Prints the finding of a diagnosis."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ NOMINAL = "nominal model alone"
 
 
 def print_finding(finding: Json) -> None:
-    """Verdict, summary, location, ranking, validation and next recording; remarks go to standard error."""
+    """Print verdict, summary, location, ranking, validation and next recording; remarks go to standard error."""
     probability = finding["probabilities"].get(finding["verdict"])
     about = "" if probability is None else f" ({_probability(probability)})"
     named = f": {', '.join(finding['named'])}" if finding["named"] else ""

@@ -29,7 +29,7 @@ Output = Annotated[Path, typer.Option("--output", "-o", help="File to write to; 
 
 @dataclass(frozen=True)
 class JobKind:
-    """Words and client calls in which runs and diagnoses differ; ``stage_of`` and ``outcome_of`` take a job."""
+    """Texts and client calls in which runs and diagnoses differ; ``stage_of`` and ``outcome_of`` map a job to text."""
 
     name: str
     plural: str
@@ -48,7 +48,7 @@ class JobKind:
 
 
 def commands(kind: JobKind) -> typer.Typer:
-    """Commands list, cancel, delete and export, to which runs and diagnoses each add their own."""
+    """A command group with list, cancel, delete and export; the modules of runs and diagnoses add further commands."""
     app = typer.Typer(no_args_is_help=True, help=kind.help)
     group = f"wingfit {kind.plural}"
 
@@ -139,7 +139,7 @@ def dataset_id(client: Client, dataset: str) -> str:
 
 
 def _export(kind: JobKind, job_id: str, format_name: str, output: Path, url: str) -> None:
-    """Write an export in full or not at all, on standard output too."""
+    """Write an export to the file ``output`` or to standard output; nothing is written unless it is complete."""
     if format_name not in ENDINGS:
         raise typer.BadParameter(f"{format_name}: must be one of {', '.join(ENDINGS)}", param_hint="--format")
     if output != STANDARD_OUTPUT:

@@ -1,4 +1,4 @@
-"""The loads of a simulation: CSV, JSON, a page of plots, and a summary."""
+"""Writes the loads of a simulation as CSV, JSON or a page of plots, and summarises them."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def accuracy(numerics: Numerics | a.OutputNumerics) -> str:
 
 
 def columns(outputs: a.Outputs) -> Iterator[Column]:
-    """Every series with a unique name that ends in its unit; vectors by component."""
+    """Yield every time series as a column, with a unique name that ends in its unit; vectors by component."""
     for key, value in outputs.items():
         if key in ("averages", "numerics"):
             continue

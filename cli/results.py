@@ -1,4 +1,4 @@
-"""The result of a run, printed: misfits and genes of a wing, coefficients of a vehicle."""
+"""Prints the result of a run: misfits and genes of a wing, coefficients of a vehicle."""
 
 from __future__ import annotations
 

@@ -72,7 +72,7 @@ class Health(TypedDict):
 
 
 class RecordingInfo(TypedDict):
-    """One recording and its condition: ``markers`` counts the tracked markers, ``channels`` names those of forces."""
+    """One recording and its condition: ``markers`` counts tracked markers, ``channels`` names the force channels."""
 
     name: str
     rig: str
@@ -171,7 +171,7 @@ class Run(Job):
 
 
 class HistoryItem(TypedDict):
-    """One finished generation; ``best`` and ``mean`` are the fitness (Eq. 14) in m^2 or N^2.
+    """One finished generation; ``best`` and ``mean`` are misfits (Eq. 14 of van der Grinten's thesis) in m^2 or N^2.
 
     ``evaluations`` counts from the start of the run, ``failed`` in this generation, with up to ten of the ``reasons``.
     """
@@ -200,7 +200,7 @@ class GenerationEvent(HistoryItem):
 class GeneInfo(TypedDict):
     """One gene, nominal and best, with its bounds; ``identifiable`` says whether the data determine it.
 
-    Values and ``standard_error`` are in ``unit``; shares are normalised to sum to one.
+    Values and ``standard_error`` are in ``unit``; genes that are shares of a whole are normalised to sum to one.
     """
 
     name: str
@@ -249,7 +249,7 @@ class Result(TypedDict):
 
 
 class Numerics(TypedDict):
-    """How a simulation was solved: the largest error of any marker, as requested and as estimated.
+    """Accuracy and cost of a simulation: the largest position error of any marker, as requested and as estimated.
 
     ``beats`` were simulated until the motion was periodic, with at most ``steps_per_beat`` steps each.
     """

@@ -93,9 +93,9 @@ class Client(DiagnosisCalls, KeyCalls):
         return cast(a.Dataset, self._json("GET", f"/v1/datasets/{part(dataset_id)}"))
 
     def download(self, dataset_id: str, path: str | Path, *, on_bytes: OnBytes | None = None) -> Path:
-        """Write the bytes that were uploaded to ``path``; into a folder under the server's name for them.
+        """Write a dataset, byte for byte as uploaded, to ``path``; if that is a folder, the server's file name is used.
 
-        ``on_bytes(received, total)`` is called as they come in; total is 0 where the server does not say.
+        ``on_bytes(received, total)`` is called during the transfer; total is 0 where the server does not give it.
         """
         return self._file(f"/v1/datasets/{part(dataset_id)}/archive", Path(path), f"{dataset_id}.zip", on_bytes)
 
@@ -173,11 +173,11 @@ class Client(DiagnosisCalls, KeyCalls):
         return cast(a.GenomeInfo, self._json("GET", f"{_run(run_id)}/genome"))
 
     def result(self, run_id: str) -> a.Result | f.ForceResult:
-        """Fetch misfits before and after and the genes of a finished run; ``kind`` says of tracks or of forces."""
+        """Fetch misfits before and after calibration, and the genes, of a finished run; ``kind``: tracks or forces."""
         return cast("a.Result | f.ForceResult", self._json("GET", f"{_run(run_id)}/result"))
 
     def forces(self, run_id: str, recording: str | None = None, source: f.Source | None = None) -> f.Forces:
-        """Fetch recorded and modelled forces of one recording over the beat; ``source`` says whose coefficients."""
+        """Fetch recorded and modelled forces of one recording over the beat; ``source`` of the coefficients."""
         params = given(recording=recording, source=source)
         return cast(f.Forces, self._simulated("GET", f"{_run(run_id)}/forces", params=params))
 
@@ -232,7 +232,7 @@ class Client(DiagnosisCalls, KeyCalls):
         return cast(Loads, self._simulated("GET", f"{_run(run_id)}/loads", params=params))
 
     def _simulated(self, method: str, path: str, **options: Any) -> Any:
-        """An answer that requires a simulation; asking again has no effect on the server."""
+        """Send a request that requires a simulation, with a longer time limit; repeating it changes nothing."""
         return self._json(method, path, key=str(uuid.uuid4()), timeout=self.simulating, **options)
 
     def events(self, run_id: str, *, last_event_id: str | None = None, patience_s: float = 60.0) -> Iterator[a.Event]:
@@ -259,7 +259,7 @@ class Client(DiagnosisCalls, KeyCalls):
     ) -> a.Simulation:
         """Simulate one recording of a wing; genes not named in ``genome`` keep their nominal value.
 
-        ``accuracy_mm``: largest error of a simulated marker, 0.02 to 1; without it the server's, 0.1.
+        ``accuracy_mm``: largest error of a simulated marker, 0.02 to 1; None means 0.1.
         ``outputs`` asks for loads over the beat: True for all, or some of motors, air, strips, sections, connectors,
         power, energy, averages.
         """
@@ -282,8 +282,8 @@ class Client(DiagnosisCalls, KeyCalls):
     ) -> f.ForceSimulation:
         """Compute the forces of one recording of a vehicle; genes not named in ``genome`` keep their nominal value.
 
-        ``preset`` and the terms ``without`` which it is computed are those of :meth:`models`; ``low_pass_hz`` filters
-        recorded and modelled forces: None at 3.2 times the flap frequency, 0 not at all.
+        ``preset`` names a model and ``without`` the terms to omit from it, see :meth:`models`. ``low_pass_hz`` is the
+        cut-off of the filter for recorded and modelled forces: None is 3.2 times the flap frequency, 0 no filter.
         """
         model = {"preset": preset, "without": list(without), "peel_width_beats": peel_width_beats}
         body = _simulation(dataset_id, recording, genome, effects, low_pass_hz=low_pass_hz, **model)

@@ -11,7 +11,7 @@ class EffectParameter(TypedDict):
     """One gene of an effect.
 
     With ``relative_to``, ``lower``, ``upper`` and ``typical`` are fractions of that measure of the rig: its span, its
-    mean chord, or the mass of its wing. The genes of a run have them in ``unit``.
+    mean chord, or the mass of its wing. The genes of a run give the same quantities in ``unit``.
     """
 
     name: str

@@ -18,10 +18,10 @@ UPDATED = ("stage", "progress", "eta_seconds", "best_mm", "best_mn", "evaluation
 
 
 class Watching(Transport):
-    """A server whose jobs can be followed; a job is named by its path."""
+    """Base of the client that follows jobs; a job is identified by its path, e.g. ``/v1/runs/ID``."""
 
     def _events(self, path: str, last_event_id: str | None, patience_s: float) -> Iterator[a.Event]:
-        """The events of the job until its final state."""
+        """Yield the events of the job until its final state; ServerAwayError after ``patience_s`` without a server."""
         away_since: float | None = None
         while True:
             try:
@@ -44,7 +44,7 @@ class Watching(Transport):
             time.sleep(self.retry_wait_s)
 
     def _wait(self, path: str, on_progress: Callable[[JobT], None] | None, patience_s: float) -> JobT:
-        """The job when it has ended; ``on_progress`` gets it after each change."""
+        """Wait until the job has ended and return it; ``on_progress`` is called with the job after each change."""
         job: JobT = self._json("GET", path)
         report = on_progress or (lambda _: None)
         report(job)

@@ -22,7 +22,7 @@ ByQuantity = dict[Quantity, Series]
 class Coefficient(TypedDict):
     """A coefficient with its standard error (Cramer-Rao bound) and 90 % confidence interval.
 
-    The interval covers too little where a recording has fewer than 24 beats.
+    The true coverage is below 90 % where a recording has fewer than 24 beats.
     """
 
     name: str
@@ -73,7 +73,7 @@ class GlobalModel(TypedDict):
 
 
 class Agreement(TypedDict):
-    """Agreement of a model with a recording in one quantity; per cent are of the range of the recorded mean beat.
+    """Agreement of a model with a recording in one quantity; percentages refer to the range of the recorded mean beat.
 
     Percentage and correlation are null for a constant force.
     """
@@ -112,8 +112,8 @@ class ForceResult(TypedDict):
 class Forces(TypedDict):
     """Forces over the beat and their spectra: recorded (mean beat, standard deviation between beats) and modelled.
 
-    ``phase`` is t*: 0 where the wings are closest. ``standard_deviation_n`` is empty with a single beat; the spectra
-    are empty where the recording has no piece without gaps.
+    ``phase`` is t* (fraction of the beat), 0 where the wings are closest. ``standard_deviation_n`` is empty with a
+    single beat; the spectra are empty where the recording has no piece without gaps.
     """
 
     recording: str

@@ -10,14 +10,14 @@ from wingfit.client.transport import Transport, given, part
 
 
 class KeyCalls(Transport):
-    """What a key with the scope admin may ask for."""
+    """Calls that list, create and revoke API keys; they need a key with the scope admin."""
 
     def keys(self) -> list[Key]:
         """List all keys, newest first."""
         return cast(list[Key], self._json("GET", "/v1/keys")["items"])
 
     def create_key(self, name: str, *, owner: str | None = None, scopes: Sequence[str] = ("read", "write")) -> NewKey:
-        """Make a key; its secret is in the answer, which no other answer contains."""
+        """Create a key and return it with its secret, which the server never shows again."""
         body = given(name=name, owner=owner) | {"scopes": list(scopes)}
         return cast(NewKey, self._json("POST", "/v1/keys", json=body))
 

@@ -15,7 +15,7 @@ MotorPair = dict[Literal["front", "rear"], float]
 
 
 class Strip(TypedDict):
-    """Air on one strip; ``span_mm``: its edges."""
+    """Aerodynamic load on one spanwise strip of the wing; ``span_mm`` holds its inner and outer edge."""
 
     name: str
     span_mm: Annotated[list[float], Len(2, 2)]
@@ -26,7 +26,7 @@ class Strip(TypedDict):
 
 
 class SectionLoad(TypedDict):
-    """Load of the inner on the outer part of the wing through a cut at ``span_mm``; vectors [phase][x, y, z]."""
+    """Load that the inner part of the wing exerts on the outer at the cut ``span_mm``; vectors [phase][x, y, z]."""
 
     name: str
     span_mm: float
@@ -35,7 +35,7 @@ class SectionLoad(TypedDict):
 
 
 class ConnectorLoad(TypedDict):
-    """Wrench on, and motion of, the second of the bodies ``between`` relative to the first, in the first's axes."""
+    """Wrench on the second body of ``between``, and its motion relative to the first, in the first body's axes."""
 
     name: str
     kind: Literal["root", "spanwise", "chordwise"]
@@ -66,7 +66,7 @@ class Averages(TypedDict):
 
 
 class OutputNumerics(TypedDict):
-    """How the beat was solved; loads are solved more accurately than tracks where possible."""
+    """Time steps and error of the simulated beat; loads are solved more accurately than tracks where possible."""
 
     steps_per_beat: int
     beats: int
@@ -95,7 +95,7 @@ class OutputGroups(TypedDict, total=False):
 class Outputs(OutputGroups):
     """One periodic beat in order of ``phase``, with those outputs that were requested.
 
-    ``power_w`` is the power into the wing through each port; that through the dampers is never positive.
+    ``power_w`` is the power into the wing through each port; the power through the dampers is never positive.
     """
 
     phase: Series

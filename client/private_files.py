@@ -1,4 +1,4 @@
-"""Who on the machine may read what the service stores: only the user who runs it, whatever his umask."""
+"""Creates files and folders that only the user who runs the service can read, whatever the umask."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ OTHERS = 0o077  # all rights of the group and of everybody
 
 
 def make_folder(folder: Path, *names: str) -> None:
-    """Create ``folder`` for its owner alone, or close one that exists to all other users.
+    """Create ``folder`` with access for its owner only, or remove other users' access to an existing one.
 
-    An existing folder is closed only if it is ours and is empty or holds one of ``names``: any other may serve other
-    programs too. Where it stays open, as a volume of Kubernetes that belongs to root does, a warning is logged.
+    An existing folder is changed only if this user owns it and it is empty or holds one of ``names``: others may serve
+    other programs too. If it stays accessible, e.g. a Kubernetes volume owned by root, a warning is logged.
     """
     try:
         folder.mkdir(FOLDER, parents=True)
@@ -38,7 +38,7 @@ def _is_ours(folder: Path, names: tuple[str, ...]) -> bool:
 
 
 def make_file(path: Path) -> None:
-    """Create ``path``, empty, for its owner alone, or close one that exists to all other users."""
+    """Create the empty file ``path`` for its owner only, or remove other users' access to an existing one."""
     try:
         open(path, "xb", opener=_private).close()
     except FileExistsError:
@@ -58,7 +58,7 @@ def _private(name: str, flags: int) -> int:
 
 
 def tighten(path: Path, *, ours: bool = True) -> None:
-    """Take all rights on ``path`` from other users, and log it; only a warning where that must not or cannot be."""
+    """Remove all rights of other users on ``path``, and log it; only warn if not ``ours`` or if that fails."""
     found = path.stat()
     mode = stat.S_IMODE(found.st_mode)
     if not mode & OTHERS:

@@ -39,7 +39,7 @@ class WingfitError(Exception):
         status: HTTP status, or None when no answer came.
         title: short name of the problem.
         detail: the server's own explanation.
-        errors: for invalid input, where it is wrong: ``{"where", "value", "message"}`` each.
+        errors: for invalid input, the faulty places: ``{"where", "value", "message"}`` each.
 
     """
 
@@ -72,7 +72,7 @@ class Transport:
 
     ``retries`` is how often a call is repeated when the connection fails or the server answers 502, 503 or 504.
     A POST that creates something carries an Idempotency-Key, so that repeating it never creates a second one.
-    Answers that require a simulation may take ``simulating_s``.
+    ``simulating_s`` is the time limit (s) of answers that require a simulation.
     ``api_key`` is by default that of the environment (``WINGFIT_API_KEY``).
     """
 
@@ -126,7 +126,7 @@ class Transport:
         return self._repeat(lambda: self._http.request(method, path, headers=headers, **options), safe=safe)
 
     def _repeat(self, send: Callable[[], httpx.Response], *, safe: bool = True) -> httpx.Response:
-        """Send, again after passing failures; when not ``safe``, only if the request reached no server."""
+        """Call ``send``, again after temporary failures; if not ``safe``, only if the request reached no server."""
         for attempt in range(self.retries + 1):
             last = attempt == self.retries
             try:
@@ -152,7 +152,7 @@ class Transport:
 
     @contextlib.contextmanager
     def _stream(self, method: str, path: str, **options: Any) -> Iterator[httpx.Response]:
-        """An open answer; ServerAwayError also if the connection breaks while it is read."""
+        """Open a streamed answer; ServerAwayError if no server answers or the connection breaks during the block."""
         try:
             with self._http.stream(method, path, **options) as response:
                 if response.is_error:
@@ -219,7 +219,7 @@ class CountedFile(io.FileIO):
         self._on_bytes, self._total = on_bytes, path.stat().st_size
 
     def read(self, size: int | None = -1, /) -> bytes:
-        """Read, and report the position."""
+        """Read ``size`` bytes (all if negative), and report how much of the file has been read."""
         block = super().read(-1 if size is None else size) or b""
         if self._on_bytes:
             self._on_bytes(self.tell(), self._total)
@@ -227,7 +227,7 @@ class CountedFile(io.FileIO):
 
 
 def parse_events(lines: Iterator[str]) -> Iterator[a.Event]:
-    """Yield server-sent events from the lines of a stream; one that the end cuts off is dropped."""
+    """Yield server-sent events from the lines of a stream; an incomplete event at its end is dropped."""
     fields: dict[str, str] = {}
     for line in lines:
         if line:
@@ -244,7 +244,7 @@ def parse_events(lines: Iterator[str]) -> Iterator[a.Event]:
 
 
 def zip_folder(folder: Path, target: Path) -> Path:
-    """Zip ``folder`` (hidden files left out) into ``target``: the same bytes for the same files."""
+    """Zip ``folder`` without hidden files into ``target`` and return that; same files give the same bytes."""
     files = sorted(p for p in folder.rglob("*") if p.is_file() and not _hidden(p.relative_to(folder)))
     if not any(p.relative_to(folder).as_posix() == "dataset.yaml" for p in files):
         raise WingfitError("not a dataset", f"{folder} holds no dataset.yaml; give the folder that holds it")
@@ -279,7 +279,7 @@ def _checked(response: httpx.Response) -> httpx.Response:
 
 
 def is_passing(error: WingfitError) -> bool:
-    """Whether the same call may succeed in a moment."""
+    """Whether the error is temporary, so that the same call may succeed if it is repeated."""
     return isinstance(error, ServerAwayError) or error.status in (502, 503, 504)
 
 
@@ -300,19 +300,19 @@ def _reason(cause: Exception) -> str:
 
 
 def _described(error: dict[str, Any]) -> str:
-    """Say one entry of a problem's ``errors``: where, what, and the value that was given."""
+    """One entry of a problem's ``errors`` as text: where, what is wrong, and the value."""
     where = f"{error['where']}: " if error.get("where") else ""
     value = error.get("value")
     return f"{where}{error.get('message', '')}" + ("" if value is None else f" (given: {value!r})")
 
 
 def given(**values: Any) -> dict[str, Any]:
-    """Keep the values that are not None."""
+    """The keyword arguments that are not None, as a dict."""
     return {key: value for key, value in values.items() if value is not None}
 
 
 def part(identifier: str) -> str:
-    """Quote an id as one segment of a path, whatever characters were typed."""
+    """``identifier`` percent-encoded as one segment of a URL path, whatever characters it contains."""
     if not identifier:
         raise WingfitError("no id given", "list the ids with 'wingfit runs list' or 'wingfit datasets list'")
     return quote(identifier, safe="").replace(".", "%2E")

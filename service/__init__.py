@@ -1,1 +1,1 @@
-"""HTTP, database, command line, Python client, web page."""
+"""The server: HTTP API, database, computation of jobs, web page."""

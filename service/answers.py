@@ -1,6 +1,6 @@
-"""Answers (`wingfit.client`) from the objects and rows of the service; conversions follow from the names of fields.
+"""Builds the JSON answers (typed dicts of `wingfit.client`) from Python objects and database rows.
 
-A field called ``before_mm`` is the attribute ``before``, in metres, of the object that is described.
+The ending of a field's name gives the conversion: field ``before_mm`` is attribute ``before`` (m) of the object in mm.
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ UNITS: Mapping[str, tuple[Convert, Convert]] = {
 
 
 def answer(shape: type[T], source: object, /, **computed: object) -> T:
-    """Describe ``source`` in the ``shape`` of an answer; fields that ``source`` does not have are ``computed``.
+    """Build the typed dict ``shape``: each field is taken from ``computed``, or else from an attribute of ``source``.
 
-    Sequences become lists, objects within become answers as the shape says, numbers that are not finite become null.
+    Sequences become lists, nested objects become the typed dicts that ``shape`` names, infinity and NaN become null.
     AttributeError for a field that is neither computed nor an attribute.
     """
     found: Any = {}
@@ -44,12 +44,12 @@ def answer(shape: type[T], source: object, /, **computed: object) -> T:
 
 
 def checked(shape: type[T], values: Mapping[str, Any]) -> T:
-    """The fields of ``shape`` out of ``values``, which were stored; ValueError where they do not fit it."""
+    """Stored ``values`` as the typed dict ``shape``; ValueError where they do not have its fields and types."""
     return _adapter(shape).validate_python(values)  # type: ignore[no-any-return]
 
 
 def in_si(values: Mapping[str, Any]) -> dict[str, Any]:
-    """``values`` of fields by the names of attributes; those of fields that end in a unit are converted to SI."""
+    """The inverse: ``values`` by API field (``before_mm``) as values by attribute (``before``) in SI units."""
     found = dict(values)
     for name in values:
         if ending := _ending(name):
@@ -59,7 +59,7 @@ def in_si(values: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _attribute(source: object, name: str) -> tuple[Any, Convert | None]:
-    """The attribute that a field stands for, and the conversion of its numbers."""
+    """The attribute of ``source`` for the API field ``name``, and the conversion of its numbers from SI, or None."""
     if hasattr(source, name):
         return getattr(source, name), None
     if ending := _ending(name):
@@ -72,7 +72,7 @@ def _ending(name: str) -> str:
 
 
 def _plain(value: Any, convert: Convert | None, hint: Any) -> Any:
-    """``value`` as JSON of the type ``hint``."""
+    """``value``, its numbers converted by ``convert``, as JSON data of the type ``hint``."""
     if get_origin(hint) in (Union, UnionType):
         if value is None:
             return None

@@ -42,7 +42,7 @@ READ_SECONDS = 1.0  # that a caller waits for the database, or for the metrics
 
 
 class Parts(TypedDict, total=False):
-    """What computes; tests replace it by parts that take no time."""
+    """The parts of the service that compute; tests replace them by stubs that take no time."""
 
     engine: Engine
     diagnoser: Diagnoser
@@ -102,7 +102,7 @@ class Service:
         self.changes.close()
 
     def stop(self, limits: StopLimits | None = None) -> bool:
-        """Stop within ``limits``; jobs stay as they are stored. Whether all threads ended; the log names those left."""
+        """Stop within ``limits``; return whether all threads ended. Stored jobs stay; the log names running threads."""
         limits = limits or StopLimits()
         self.begin_stop()
         # In a thread, because a job that waits for the database may hold the lock of the runner.
@@ -143,7 +143,7 @@ class Service:
         return await self._metrics_text.result(READ_SECONDS)
 
     def gauges(self) -> Iterator[Metric]:
-        """The state of the service as metrics, over all owners; jobs as of the last count."""
+        """The state of the service as Prometheus gauges, over all owners; job numbers are those of the last count."""
         workers, pace = self._pool.standing or Standing(0), self.runner.pace()
         jobs = GaugeMetricFamily("wingfit_jobs", "Calibrations and diagnoses by state.", labels=["kind", "state"])
         for kind, counts in (self.health.jobs or {}).items():

@@ -27,7 +27,7 @@ def given(environment: Mapping[str, str]) -> dict[str, str]:
 
 
 def unknown(read: Mapping[str, str], settings: Iterable[str]) -> list[str]:
-    """The names in ``read`` that nothing reads, each with the nearest known name; the server reads ``settings``."""
+    """The set variables (``read``) that are neither ``settings`` nor used elsewhere, each with a similar known name."""
     known = {*settings, *OF_OTHERS}
     return [
         f"{name} ({nearest(name, sorted(known))})"

@@ -38,7 +38,7 @@ class ServeError(RuntimeError):
 
 
 class _Server(uvicorn.Server):
-    """Stops the service at a signal, because uvicorn would wait for open event streams, and in bounded time."""
+    """uvicorn's server, stopped by a signal in bounded time: ends open event streams, for which uvicorn would wait."""
 
     def __init__(self, config: uvicorn.Config, app: FastAPI, limits: StopLimits) -> None:
         super().__init__(config)

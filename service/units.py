@@ -21,7 +21,7 @@ def mn(value: float | None) -> float | None:
 
 
 def tidy_mm(stated: float) -> float:
-    """A distance (m) that a user gave, in mm without rounding errors: 0.07, not 0.07000000000000001."""
+    """A distance (m) that a user entered in mm, converted back to mm without rounding errors: 0.07, not 0.0700...01."""
     return round(stated * MM, 9)
 
 

@@ -11,8 +11,8 @@ class EvaluatorClosedError(RuntimeError):
 
 
 class EvaluationInterruptedError(RuntimeError):
-    """The caller interrupted the call. Units that have started run to their end; their results are dropped."""
+    """The caller interrupted the call. Simulations in progress run to their end; their results are dropped."""
 
 
 class WorkerLostError(RuntimeError):
-    """A unit was given up because the processes that evaluated it kept dying."""
+    """A unit of work (some individuals against one recording) was given up: the processes evaluating it kept dying."""

@@ -11,7 +11,7 @@ def make_evaluator(kind: EvaluatorKind, workers: int | None = None, address: str
     """Start an evaluator.
 
     ``workers`` is the number of worker processes, by default one per processor. ``address`` ("host:port" or "auto")
-    joins an existing Ray cluster, whose number of workers then counts; without it, Ray starts on this machine.
+    joins an existing Ray cluster and uses all its workers; without it, Ray starts on this machine.
     """
     if workers is not None and workers < 1:
         raise ValueError(f"workers is {workers}; it must be at least 1, or absent for one per processor")

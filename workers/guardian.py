@@ -1,4 +1,4 @@
-"""Kills this process if a unit exceeds its time limit or if the process is stopped; for Ray workers.
+"""Kills a Ray worker if one unit of its work exceeds the time limit, or if the worker process is suspended.
 
 A Ray worker is started by Ray, often on another machine, where its owner cannot watch it; a hung task would block its
 processor for ever. So each worker starts a small process that needs only the standard library. The worker sends it the
@@ -49,7 +49,7 @@ while True:
 
 
 class Guardian:
-    """The small process and the pipe to it; for one unit at a time."""
+    """Starts the watching process and reports to it through a pipe when a unit of work starts and ends."""
 
     def __init__(self, silence_s: float = SILENCE_SECONDS, beat_s: float = BEAT_SECONDS) -> None:
         self._silence, self._beat = silence_s, beat_s

@@ -1,4 +1,4 @@
-"""Evaluation in the caller's own thread. The other evaluators must return the same bits."""
+"""Evaluation in the caller's own thread. The other evaluators must return bit-identical numbers."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from wingfit.workers.watch import Standing
 
 
 class InProcessEvaluator(RunningEvaluator):
-    """Evaluates one unit after the other."""
+    """Evaluates the units of a batch (some individuals against one recording each) one after the other."""
 
     kind: Literal["in_process"] = "in_process"
     workers = 1
@@ -29,5 +29,5 @@ class InProcessEvaluator(RunningEvaluator):
         return done
 
     def close(self) -> None:
-        """Refuse further calls; a call in progress ends after its current unit."""
+        """Refuse further calls; a call in progress raises before its next unit."""
         self._closed = True

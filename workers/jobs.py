@@ -74,7 +74,7 @@ class Start:
 class Generation:
     """The runner finished one generation; ``progress`` is the fraction of the whole job, in [0, 1].
 
-    ``lasting``: a restart continues after this generation.
+    ``lasting``: whether a restarted job can continue after this generation, instead of repeating it.
     """
 
     progress: float
@@ -92,7 +92,7 @@ class Pause:
 
 @dataclass(frozen=True)
 class Resume:
-    """A user requested to continue, or withdrew a pause that has not happened yet."""
+    """A user requested that a paused job continue, or withdrew a pause that has not happened yet."""
 
 
 @dataclass(frozen=True)
@@ -114,14 +114,14 @@ class Fail:
 
 @dataclass(frozen=True)
 class Leave:
-    """The server shuts down in an orderly way while the job runs; the job continues after the next start."""
+    """The server shuts down in an orderly way while the job runs; the job continues when the server starts again."""
 
 
 @dataclass(frozen=True)
 class Restart:
-    """The server started and found the job unfinished, without its runner.
+    """The server started and found the job stored as RUNNING, although no process computes it: the server crashed.
 
-    A job that was started ``most_starts`` times without lasting progress fails, because it may be what ends the server.
+    A job that was started ``most_starts`` times without lasting progress fails, because it may cause the crashes.
     """
 
     most_starts: int = MOST_STARTS
@@ -135,7 +135,7 @@ class Job:
     """A job as it is stored.
 
     ``progress`` never decreases; ``error`` is set only in state FAILED; ``starts`` counts the starts since the last
-    lasting generation, with the present one and without those that ended by an orderly shutdown.
+    lasting generation, including the present start and excluding those that ended by an orderly shutdown.
     """
 
     state: State = State.QUEUED
@@ -150,7 +150,7 @@ Outcome = tuple[Job, tuple[Instruction, ...]]
 
 
 class IllegalTransition(ValueError):  # noqa: N818  it is a refusal more than an error, and named in the contract
-    """An event that the job's state does not allow; ``allowed`` names those that it does."""
+    """An event that the job's state does not allow; ``allowed`` holds the names of the allowed events."""
 
     def __init__(self, job: Job | None, event: Event) -> None:
         self.state = job.state if job else None
@@ -182,7 +182,7 @@ _ONE_OF_EACH: tuple[Event, ...] = (
 
 
 def _move(job: Job, state: State, *instructions: Instruction, error: str | None = None) -> Outcome:
-    """Enter ``state``; a wish is then fulfilled or void."""
+    """The job in ``state`` without a wish, which is now fulfilled or void, and the instructions for the caller."""
     return replace(job, state=state, wish=Wish.NONE, error=error), (*instructions, Instruction.PUBLISH)
 
 
@@ -237,7 +237,7 @@ def _while_running(job: Job, event: Event) -> Outcome | None:
 
 
 def _runner_lost(job: Job, event: Leave | Restart) -> Outcome:
-    """A running job whose server has shut down, or ended without notice."""
+    """The state after the server of a running job shut down (Leave) or crashed (Restart), and the instructions."""
     if isinstance(event, Leave):
         return replace(job, starts=max(0, job.starts - 1)), ()
     if job.wish is not Wish.NONE:

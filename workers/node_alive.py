@@ -1,8 +1,8 @@
 """Whether the Ray node of this machine is alive in its cluster: ``python -m wingfit.workers.node_alive ray-head:6379``.
 
-Exits with 0 if it is, else with 1 and the reason. The head is queried, because the processes of a node may live
-although the node has lost its head, or the head has dropped the node. A call takes half a second of processor time to
-import Ray.
+The exit status is 0 if the node is alive, else 1 with the reason. The head is queried, because the processes of a node
+may live although the node has lost its head, or the head has dropped the node. A call takes half a second of processor
+time to import Ray.
 """
 
 from __future__ import annotations

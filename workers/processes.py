@@ -1,8 +1,9 @@
 """Evaluation in worker processes of this machine.
 
-Each process is served by one thread over one pipe. If the process dies, that thread starts another and repeats the lost
-unit; the other processes are not affected. One more thread kills processes that are stopped or exceed the time limit of
-:class:`wingfit.workers.watch.Expectation`, so that they are replaced.
+A unit of work is some individuals against one recording. Each process is served by one thread over one pipe. If the
+process dies, that thread starts another and repeats the lost unit; the other processes are not affected. One more
+thread kills processes that are suspended or exceed the time limit of :class:`wingfit.workers.watch.Expectation`, so
+that they are replaced.
 """
 
 from __future__ import annotations
@@ -141,7 +142,7 @@ def _result(future: Future[Misfit], interrupted: Interrupted) -> Misfit:
 class _Died(Exception):  # noqa: N818  internal
     """The process at the other end of the pipe has ended.
 
-    ``begun``: it had started the unit; ``hung``: it was killed for exceeding the time limit.
+    ``begun``: whether it had started the unit; ``hung``: whether it was killed for exceeding the time limit.
     """
 
     def __init__(self, *, begun: bool, hung: bool = False) -> None:
@@ -150,7 +151,7 @@ class _Died(Exception):  # noqa: N818  internal
 
 
 class _Worker:
-    """Our end of one process, used by one thread at a time, and by the watch."""
+    """Handle of one worker process; used by one thread at a time, and by the thread that enforces time limits."""
 
     def __init__(self) -> None:
         self.last_exit = "exit code unknown"
@@ -190,7 +191,7 @@ class _Worker:
             return False
 
     def run(self, problem: Problem, task: Task, residuals: bool, limit: float) -> tuple[Misfit, float]:
-        """Evaluate ``task`` within ``limit`` s of its start; misfit and duration (s). _Died if the process dies.
+        """Evaluate ``task`` within ``limit`` s of its start; return misfit and duration (s). _Died if the process dies.
 
         Raises the model's own exceptions.
         """
@@ -208,7 +209,7 @@ class _Worker:
                 self.kill()
 
     def _expect(self, seconds: float | None) -> None:
-        """Set a deadline in ``seconds``, or none."""
+        """Set the deadline to ``seconds`` from now; None removes it."""
         with self._watching:
             self._deadline = None if seconds is None else time.monotonic() + seconds
 
@@ -240,7 +241,7 @@ class _Worker:
             self._process.kill()
 
     def release(self) -> None:
-        """Release a dead or dying process."""
+        """Wait for a dead or dying process and free its pipe."""
         if self._process is None or self._connection is None:
             return
         self._process.kill()

@@ -36,12 +36,13 @@ OF_THE_WORKER = (ray_errors.WorkerCrashedError, ray_errors.OutOfMemoryError)
 
 @dataclass
 class Batch:
-    """Tasks that are sent together, by their numbers.
+    """Tasks that are sent to one Ray worker together.
 
     Attributes:
+        numbers: indices of the tasks in the call.
         blamed: number of workers lost while they evaluated it.
         lost: number of workers and nodes lost with it.
-        due: time before which it must not be submitted.
+        due: time (s, monotonic clock) before which it must not be submitted.
         limit: time limit (s) of one of its tasks in the last submission, at ``began``.
     """
 
@@ -54,7 +55,7 @@ class Batch:
 
 
 class Cluster(NamedTuple):
-    """Functions of the cluster that a call needs.
+    """Functions with which :class:`Batches` uses the cluster.
 
     ``submit(batch, limit)`` returns a reference to the result, ``forget`` reports that the cluster has lost the
     problem, and ``check`` raises if the call is to end.
@@ -67,7 +68,7 @@ class Cluster(NamedTuple):
 
 
 class Batches:
-    """The ``count`` tasks of one call for ``problem``."""
+    """Submits the ``count`` tasks of one call for ``problem`` and collects their results."""
 
     def __init__(self, problem: Problem, count: int, cluster: Cluster, expectation: Expectation, tally: Tally) -> None:
         self._problem, self._count, self._cluster = problem, count, cluster

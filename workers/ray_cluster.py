@@ -33,7 +33,7 @@ STALE_SECONDS = 20.0
 
 
 class RayEvaluator(RunningEvaluator):
-    """Distributes units over a Ray cluster, or without ``address`` over ``workers`` processes of this machine."""
+    """Distributes a batch over the Ray cluster at ``address``, or without it over ``workers`` local processes."""
 
     kind: Literal["ray"] = "ray"
 
@@ -94,7 +94,7 @@ class RayEvaluator(RunningEvaluator):
                 self._condition.notify_all()
 
     def _look(self) -> None:
-        """Count the processors regularly, in a thread of its own, because a lost head blocks the query."""
+        """Count the cluster's processors regularly; runs in its own thread, because a lost head blocks the query."""
         while not self._over.wait(LOOK_SECONDS):
             # Without a head Ray raises various errors; the count becomes stale then.
             with suppress(Exception), self._call():
@@ -104,12 +104,12 @@ class RayEvaluator(RunningEvaluator):
                 self._workers, self._seen = count, time.monotonic()
 
     def _put(self, problem: Problem) -> Any:
-        """Reference to the problem in the cluster's memory, where it is stored once."""
+        """Store the problem in the cluster's memory unless it is there already; return the reference to it."""
         with self._condition:
             return self._references.use(problem.key, lambda: ray.put(pickle.dumps(problem, pickle.HIGHEST_PROTOCOL)))
 
     def _forget(self, problem: Problem) -> None:
-        """The cluster's memory lost the problem; it is stored again when next needed."""
+        """Discard the reference to a problem that the cluster's memory lost, so that the next call stores it again."""
         with self._condition:
             self._references.pop(problem.key, None)
 
@@ -125,7 +125,7 @@ _guardian: list[Guardian] = []
 def _run_tasks(
     key: str, reference: list[Any], tasks: list[Task], limit: float, residuals: bool
 ) -> list[tuple[Misfit, float]]:
-    """Evaluate some tasks in a Ray worker, each within ``limit`` s; misfit and duration (s) of each.
+    """Evaluate some tasks in a Ray worker, each within ``limit`` s; return misfit and duration (s) of each.
 
     ``reference`` is in a list, so that Ray does not fetch its object at every call.
     """

@@ -1,4 +1,4 @@
-"""A mapping that holds the entries used last."""
+"""A dictionary of limited size that discards the least recently used entry."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ T = TypeVar("T")
 
 
 class Recent(OrderedDict[str, T]):
-    """The ``most`` entries used last, by key; not thread-safe."""
+    """A dictionary of the ``most`` entries that were used last (an LRU cache); not thread-safe."""
 
     def __init__(self, most: int) -> None:
         super().__init__()
         self._most = most
 
     def use(self, key: str, make: Callable[[], T]) -> T:
-        """The entry of ``key``, made by ``make`` if it is missing; the one that was not used for longest makes room."""
+        """Return the entry of ``key``, made by ``make`` if missing; a full cache drops the least recently used one."""
         entry = self[key] if key in self else make()
         self[key] = entry
         self.move_to_end(key)

@@ -19,7 +19,7 @@ Interrupted = Callable[[], bool]
 
 
 class RunningEvaluator(ABC):
-    """Evaluates batches; each ``kind`` of evaluator runs the tasks of a batch elsewhere."""
+    """Base class: evaluates batches; a subclass runs their tasks in this process, in worker processes or on Ray."""
 
     kind: EvaluatorKind
     _closed = False
@@ -27,7 +27,7 @@ class RunningEvaluator(ABC):
     @property
     @abstractmethod
     def workers(self) -> int:
-        """Number of units that can be evaluated at the same time."""
+        """Number of tasks that can be evaluated at the same time."""
 
     @property
     @abstractmethod
@@ -39,7 +39,7 @@ class RunningEvaluator(ABC):
     ) -> Evaluation:
         """Misfits of ``values`` (individuals x genes) to every recording of the problem; several threads may call.
 
-        EvaluationInterruptedError soon after ``interrupted`` returns True; units that have not started are dropped.
+        EvaluationInterruptedError is raised soon after ``interrupted`` returns True; tasks not yet started are dropped.
         """
         batch = as_batch(values)
         tasks = [Task.cut(batch, unit) for unit in units(problem, len(batch))]

@@ -50,17 +50,17 @@ def lower_priority() -> None:
 
 @dataclass(frozen=True)
 class Task:
-    """A unit with its own rows of the batch, which can be sent to another process."""
+    """A unit of work with ``values``, its rows (individuals x genes) of the batch; can be sent to another process."""
 
     unit: Unit
     values: npt.NDArray[np.float64]
 
     @classmethod
     def cut(cls, batch: npt.NDArray[np.float64], unit: Unit) -> Task:
-        """A task with the rows of ``unit`` in ``batch``."""
+        """The task that evaluates rows ``unit.start`` to ``unit.stop`` of ``batch`` (individuals x genes)."""
         rows = batch[unit.start : unit.stop]
         return cls(Unit(0, len(rows), unit.recording), rows)
 
     def run(self, problem: Problem, *, residuals: bool) -> Misfit:
-        """Evaluate a copy, because arrays in shared memory may be read-only."""
+        """Misfits of the task's individuals; a copy is evaluated, because arrays in shared memory may be read-only."""
         return run_unit(problem, np.array(self.values), self.unit, residuals=residuals)

@@ -1,4 +1,4 @@
-"""Time limits of units, after which their worker counts as hung, and counts of lost workers."""
+"""Time limits of units of work, after which their worker counts as hung, and counts of lost workers."""
 
 from __future__ import annotations
 
@@ -24,12 +24,15 @@ START_SECONDS = 120.0
 
 
 def never() -> bool:
-    """The default of ``interrupted``: no call is interrupted."""
+    """Return False: the default of the argument ``interrupted``, with which no call is interrupted."""
     return False
 
 
 class Expectation:
-    """Median duration of units by problem; compilation of kernels in one unit does not affect it. Thread-safe."""
+    """Derives time limits from median durations of units, by problem. Thread-safe.
+
+    The median is hardly affected by a unit in which kernels were compiled.
+    """
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -38,7 +41,7 @@ class Expectation:
     def limit(self, key: str, attempt: int = 0) -> float:
         """Time limit (s) of a unit of the problem ``key``, doubled with each ``attempt`` at the same unit.
 
-        A slow unit is finished in the end, and one that never ends is given up.
+        The doubling lets a slow unit finish in the end; the number of attempts is limited elsewhere.
         """
         with self._lock:
             usual = self._usual(key)
@@ -52,7 +55,7 @@ class Expectation:
             return self._usual(key)
 
     def _usual(self, key: str) -> float:
-        """Median duration; 0 with fewer than ENOUGH units."""
+        """Median duration (s) of the units of problem ``key``; 0 with fewer than ENOUGH units. Needs the lock."""
         known = self._seconds.get(key, ())
         return median(known) if len(known) >= ENOUGH else 0.0
 

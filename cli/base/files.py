@@ -33,7 +33,7 @@ def check_file(path: Path | None, option: str, endings: tuple[str, ...] = ()) ->
 
 
 def new_file(about: str, *names: str) -> Any:
-    """An option for a file to write, checked before anything is computed; ``about`` names its ending: FILE.csv."""
+    """A typer option ``names`` for a file to write, checked at once; its help ``about`` has the ending: FILE.csv."""
 
     def checked(path: Path | None) -> Path | None:
         check_file(path, names[0], tuple(re.findall(r"FILE(\.\w+)", about)))
@@ -52,7 +52,7 @@ def refused(message: str) -> Iterator[None]:
 
 
 def read_bytes(path: Path) -> bytes:
-    """The content of a file; WingfitError with the path and the reason where it cannot be read."""
+    """The content of a file; WingfitError with the path and the reason if it cannot be read."""
     try:
         return path.read_bytes()
     except OSError as error:

@@ -35,7 +35,7 @@ def names(param: typer.CallbackParam, words: list[str] | None) -> list[str] | No
 
 
 def settings(ctx: typer.Context, *others: str) -> dict[str, Any]:
-    """The settings of a job that were given, by their names in the API: all options of a command but ``others``."""
+    """The options of a command that the user gave, except ``others``, as {field of the API request: value}."""
     return {name: value for name, value in ctx.params.items() if name not in others and value not in (None, [], ())}
 
 
@@ -76,14 +76,14 @@ PeelWidth = Annotated[
 
 
 def refuse(options: Mapping[str, object], why: str) -> None:
-    """Refuse those of ``options`` (name, value) that were given: they have no meaning here."""
+    """Raise a usage error with the reason ``why`` if the user gave any of ``options`` ({name: value})."""
     for option, value in options.items():
         if value not in (None, [], False):
             raise typer.BadParameter(f"{why}; leave it out", param_hint=option)
 
 
 def read_condition(words: list[str]) -> dict[str, float]:
-    """The quantities of a condition that ``name=value`` words set; the server checks the limits."""
+    """Flow or flapping conditions from ``name=value`` words as {name: value}; the server checks the limits."""
     values = {}
     for word in words:
         name, _, value = word.partition("=")

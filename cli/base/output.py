@@ -90,7 +90,7 @@ def table(columns: Sequence[str], rows: Sequence[Sequence[object]], empty: str =
 
 
 def records(items: Iterable[Any], columns: Columns[Any], empty: str = "none") -> None:
-    """Print a table of a row for each of ``items``; a column is a key of the item, or a function of it."""
+    """Print a table with one row per item; ``columns`` maps each heading to a key of the item or a function of it."""
     cells = [itemgetter(column) if isinstance(column, str) else column for column in columns.values()]
     table([*columns], [[cell(item) for cell in cells] for item in items], empty)
 
@@ -102,7 +102,7 @@ def _cell(value: object) -> str:
 
 
 def interval(low: float | None, high: float | None, digits: int = 3) -> str:
-    """``[low, high]``, in words where an end is missing."""
+    """The text ``[low, high]``, or a description in words where an end is None."""
     if low is None or high is None:
         ends = [f"{word} {number(end, digits)}" for word, end in (("above", low), ("below", high)) if end is not None]
         return ends[0] if ends else "not bounded by the data"
@@ -138,7 +138,7 @@ def mm(value: float | None) -> str:
 
 
 def moment(text: str | None) -> str:
-    """A time of the API to the second, in UTC."""
+    """A time as the API gives it (RFC 3339 text), shown to the second in UTC."""
     return "–" if text is None else text[:19].replace("T", " ") + " UTC"
 
 

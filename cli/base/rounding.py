@@ -48,7 +48,7 @@ UNITS = ((10.0, Unit("N", 1.0)), (1e-3, Unit("mN", 1e3)), (0.0, Unit("µN", 1e6)
 
 
 def force_unit(newtons: Iterable[float | None]) -> Unit:
-    """The unit in which the largest of ``newtons`` reads well: mN from 1 mN to 10 N, and where there is no value."""
+    """The unit that suits the largest of ``newtons``: mN from 1 mN to 10 N, and if there is no value."""
     largest = max((abs(value) for value in newtons if value), default=1.0)
     if not math.isfinite(largest):
         largest = 1.0

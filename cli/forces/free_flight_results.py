@@ -45,7 +45,7 @@ def entry(made: Recording, *, starts_at_beat: bool) -> None:
 
 
 def read_flight(tracks: Path, body: Path, mass_kg: float, low_pass: LowPass, inertia: str) -> FreeFlight:
-    """Forces from the tracks (CSV) of the markers that ``body`` (CSV) lists; ``inertia`` as the option gives it."""
+    """Forces from the tracks (CSV) of the markers in ``body`` (CSV); ``inertia``: "Ixx,Iyy,Izz,Ixz", kg m^2, or ""."""
     shape = _table(body, "marker")
     places = dict(zip(shape.labels, np.stack([shape.column(f"{a}_m") for a in AXES], axis=-1), strict=True))
     if CENTRE not in places:

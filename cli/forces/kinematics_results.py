@@ -39,7 +39,7 @@ def write_motion(motion: WingKinematics, path: Path) -> None:
 
 
 def _check_columns(header: list[str], file: str, markers: str) -> None:
-    """Name all columns that are missing before any number is read."""
+    """Raise an error that names all missing columns, before any number is read."""
     if len(header) < 2:
         return  # read_table reports the wrong separator or the empty file
     if not markers and "flap_angle_deg" not in header and any(name.endswith("_x_m") for name in header):
@@ -73,7 +73,7 @@ def read_angles(
 
 
 def _small(flap: np.ndarray[Any, np.dtype[np.float64]]) -> tuple[str, ...]:
-    """A remark where the flap angle, deg, has a small range: it may be in radians."""
+    """A remark if the range of ``flap`` (deg) is so small that it may be in radians; else empty."""
     seen = flap[np.isfinite(flap)]
     size = float(np.ptp(seen)) if len(seen) else np.inf
     if size >= SMALLEST_RANGE_DEG:

@@ -1,4 +1,4 @@
-"""Results on forces, printed and written: misfits, coefficients, agreement of the models, forces over the beat."""
+"""Prints and writes results on forces: misfits, coefficients, agreement of the models, forces over the beat."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def write_forces(answer: f.Forces, output: Path | None, plot: Path | None) -> No
 
 
 def charts(answer: f.Forces) -> list[Chart]:
-    """Of each force the mean beat, with a band of one standard deviation between beats, and the power spectrum."""
+    """Two charts per force: the mean beat, with a band of one standard deviation between beats; the power spectrum."""
     from wingfit.report.charts import Chart, Curve
 
     phase, frequency = answer["phase"], answer["frequency_hz"][1:]  # without 0 Hz: the mean was subtracted

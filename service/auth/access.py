@@ -1,7 +1,7 @@
 """The caller of a request: API keys, their scopes, and the rows that a database session of the caller may see.
 
-A secret has 256 random bits, so a plain hash of it cannot be searched; only the hash is stored. The valid keys are held
-in memory, because one process owns the database and changes them.
+Only a plain hash of each secret is stored: a secret has 256 random bits, so it cannot be guessed from its hash. The
+valid keys are held in memory, because one process owns the database and changes them.
 """
 
 from __future__ import annotations
@@ -49,19 +49,19 @@ CALLER: ContextVar[Caller | None] = ContextVar("caller", default=None)
 
 
 def visible_owner() -> str | None:
-    """The owner whose rows the caller may see; None: those of all owners."""
+    """The owner whose rows the caller of this request may see; None if the caller may see the rows of all owners."""
     caller = CALLER.get()
     return None if caller is None or caller.may("admin") else caller.owner
 
 
 def owner_of_new() -> str | None:
-    """The owner of what the caller makes; None where no key is required."""
+    """The owner of the resources that this request creates; None where no key is required."""
     caller = CALLER.get()
     return caller.owner if caller else None
 
 
 class OwnSession(Session):
-    """A session whose every query returns only rows that the caller may see, so no route can forget the condition."""
+    """A session that adds the owner's filter to every query: only rows that the caller may see are returned."""
 
 
 @event.listens_for(OwnSession, "do_orm_execute")
@@ -88,7 +88,7 @@ class KeyRing:
             self._ids = frozenset(caller.key for caller in self._callers.values())
 
     def caller(self, secret: str) -> Caller | None:
-        """The caller with this secret; None if it is no key or the key is revoked."""
+        """The caller whose key has this secret; None if no key has it or the key is revoked."""
         return self._callers.get(digest(secret))
 
     def admits(self, caller: Caller | None) -> bool:

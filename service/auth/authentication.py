@@ -20,7 +20,7 @@ READING = frozenset({"GET", "HEAD", "OPTIONS"})
 
 
 class Authentication:
-    """Middleware that refuses API calls without a valid key of the needed scope; the web page holds no data."""
+    """Middleware that refuses API calls without a valid key of the needed scope; the web page itself needs none."""
 
     def __init__(self, app: ASGIApp) -> None:
         self.app = app
@@ -75,7 +75,7 @@ def _refusal(scope: Scope, caller: Caller | None) -> ProblemError | None:
 
 
 def needed_scope(method: str, path: str) -> KeyScope:
-    """The scope that a key needs for a call."""
+    """The scope (read, write or admin) that a key needs for a request with this method and path."""
     if any(path == root or path.startswith(f"{root}/") for root in ADMINISTRATION):
         return "admin"
     return "read" if method in READING else "write"

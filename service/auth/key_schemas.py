@@ -15,7 +15,7 @@ SECRET = "wingfit_" + "x" * 43  # the form of one
 
 
 class KeyIn(BaseModel):
-    """A key to be made."""
+    """Body of a request to create an API key."""
 
     model_config = ConfigDict(
         extra="forbid",
@@ -32,7 +32,7 @@ class KeyIn(BaseModel):
 
 
 class SessionIn(BaseModel):
-    """The key that a browser will use from now on."""
+    """Body of a request to store an API key in the browser's cookie."""
 
     model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [{"key": SECRET}]})
 

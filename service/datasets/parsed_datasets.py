@@ -28,7 +28,7 @@ KEPT, KEPT_BYTES = 8, 2**28
 
 
 class Opened(NamedTuple):
-    """A dataset, and its parsed form if its archive must not be opened again."""
+    """A dataset, and its parsed form (bytes) if its archive is a NetCDF file, which is opened only once."""
 
     dataset: Dataset
     parsed: bytes | None
@@ -45,7 +45,7 @@ class Datasets:
         self._damaged: dict[str, DatasetError] = {}
 
     def get(self, dataset_id: str) -> Dataset:
-        """The dataset, or a 404."""
+        """The parsed dataset with this id, from the cache or the database; a 404 if there is none."""
         with self._database.read() as session:
             row = store.one(session, DatasetRow, dataset_id)
         if (known := self._known(dataset_id)) is not None:
@@ -74,7 +74,7 @@ class Datasets:
         return self._engine.load(archive, filename) if parsed is None else load_parsed(parsed, filename)
 
     def _is_old(self, dataset_id: str) -> bool:
-        """Whether it is a NetCDF file without parsed form, stored by an earlier version."""
+        """Whether the dataset is a NetCDF file that an earlier version stored without its parsed form."""
         with self._database.look() as connection:
             return is_netcdf(store.archive_piece(connection, dataset_id, 0, 8)) and not store.has_parsed(
                 connection, dataset_id
@@ -95,7 +95,7 @@ class Datasets:
         return opened.dataset
 
     def _keep_parsed(self, dataset_id: str, parsed: bytes) -> None:
-        """Store the parsed form, which only saves time, if there is disk space."""
+        """Store the parsed form in the database; a full disk is ignored, because the form only saves time."""
         try:
             with self._database.write() as session:
                 store.keep_parsed(session, dataset_id, parsed)

@@ -1,4 +1,4 @@
-"""What the service needs of diagnosis and report; tests replace it by one that takes no time."""
+"""The functions of `wingfit.diagnosis` and `wingfit.report` that the service calls, in a class that tests replace."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Diagnoser:
         check(dataset, spec)
 
     def diagnose(self, spec: DiagnosisSpec, dataset: Dataset, evaluator: Evaluator) -> Iterator[Progress]:
-        """Diagnose; the last progress has the finding."""
+        """Diagnose; yields the progress, and the last item has the finding."""
         return diagnose(dataset, spec, evaluator)
 
     def stored(self, finding: Finding) -> dict[str, Any]:

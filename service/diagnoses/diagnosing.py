@@ -1,4 +1,4 @@
-"""Diagnoses, which start again from the beginning after an interruption and give the same finding."""
+"""Diagnoses as jobs; an interrupted one is computed again from the beginning and gives the same finding."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ STORE_SECONDS = 0.5
 
 
 class Diagnosing(JobKind):
-    """How diagnoses are computed."""
+    """The kind of job that is a diagnosis: how the runner computes, stores and describes one."""
 
     what, path, prefix, step_event = "diagnosis", "/v1/diagnoses", "dx", "step"
     table, step_table, step_answer = DiagnosisRow, StepRow, StepEvent
@@ -43,7 +43,7 @@ class Diagnosing(JobKind):
         return []
 
     def steps(self, row: DiagnosisRow, evaluator: Evaluator) -> Iterator[Step]:
-        """Diagnose; a new stage is a step at once, progress within a stage after STORE_SECONDS."""
+        """Diagnose; yields a step at each new stage, and within a stage at most every STORE_SECONDS."""
         spec, dataset = views.spec(row), self._datasets.get(row.dataset_id)
         stage, stored_at = "", 0.0
         for progress in self._diagnoser.diagnose(spec, dataset, evaluator):

@@ -30,7 +30,7 @@ PHASE = "phase of the beat"
 
 
 def document(exported: Exported[DiagnosisRow], found: Json) -> DiagnosisExport:
-    """All of a diagnosis and of its finding."""
+    """The JSON export: the diagnosis, its dataset, and the finding ``found``."""
     heading = exported.heading("diagnosis-export")
     return DiagnosisExport(**heading, diagnosis=diagnosis_views.diagnosis(exported.row), finding=found)
 
@@ -69,7 +69,7 @@ def file(exported: Exported[DiagnosisRow], found: Json) -> bytes:
 
 
 def _recordings(root: Any, found: Json) -> None:
-    """Misfit to each recording, before and after, with 90 % intervals."""
+    """Write the misfit to each recording, without and with the named effects, with 90 % intervals, into ``root``."""
     items, unit, along = found["recordings"], found["unit"], ("recording",)
     if not items:
         return
@@ -88,7 +88,7 @@ def _recordings(root: Any, found: Json) -> None:
 
 
 def _markers(root: Any, found: Json) -> None:
-    """Misfit of each marker, or force axis, over all recordings."""
+    """Write the misfit of each marker or force axis, over all recordings, into ``root``."""
     items, unit, along = found["markers"], found["unit"], ("marker",)
     if not items:
         return
@@ -113,7 +113,7 @@ def _markers(root: Any, found: Json) -> None:
 
 
 def _phase_map(root: Any, found: Json) -> None:
-    """Misfit over the span and the beat."""
+    """Write the misfit as a function of span and phase of the beat into ``root``."""
     given, unit = found["phase_map"], found["unit"]
     if given is None:
         return
@@ -127,7 +127,7 @@ def _phase_map(root: Any, found: Json) -> None:
 
 
 def _load(group: Any, load: Json) -> None:
-    """The load missing from the nominal model in one recording."""
+    """Write the load that the nominal model lacks in one recording into ``group``."""
     units, along = str(CF_UNITS.get(load["unit"], load["unit"])), ("station", "phase")
     meaning = f"rotation missing at rod {load['rod']}" if load["rod"] else "force missing from the nominal model"
     nc.describe(group, {"recording": load["recording"], "rod": load["rod"]})

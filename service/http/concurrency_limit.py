@@ -21,7 +21,7 @@ MAX_WAITING = 64
 
 
 class ConcurrencyLimit:
-    """At most ``limit`` requests of a kind go on and ``max_waiting`` wait; further ones are answered with a 503."""
+    """At most ``limit`` requests of a kind run and ``max_waiting`` wait; further ones are answered with a 503."""
 
     def __init__(self, what: str, limit: int, max_waiting: int = MAX_WAITING) -> None:
         self._what, self._free = what, asyncio.Semaphore(limit)

@@ -18,9 +18,9 @@ LOG = logging.getLogger("wingfit.http")
 
 
 class ErrorBoundary:
-    """Middleware; an answer says nothing about the error, and has the headers of every other answer.
+    """Middleware that answers unexpected errors without their details, and with the headers of every other answer.
 
-    Starlette would answer outside all other middleware, without their headers, and end the connection.
+    Starlette's own handler is outside all other middleware: its answer lacks their headers and ends the connection.
     """
 
     def __init__(self, app: ASGIApp) -> None:

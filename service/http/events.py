@@ -38,7 +38,7 @@ JobState = tuple[Run | Diagnosis, Sequence[GenerationEvent | StepEvent]]
 
 
 class Watched(NamedTuple):
-    """A job to watch: its ``id``, the name of the events of its steps, and the function that reads both.
+    """A job to watch: its ``id``, the name of the event for each of its steps, and the function that reads them.
 
     ``read(session, after, limit)`` returns the job and at most ``limit`` of its steps after sequence number ``after``.
     """
@@ -49,14 +49,14 @@ class Watched(NamedTuple):
 
 
 class News(NamedTuple):
-    """What one read found, as events.
+    """The result of one database read of a job, as server-sent events ready to send.
 
     Attributes:
         steps: the events of new steps.
         after: sequence number of the last of them.
         complete: whether there are no further steps.
-        status: differs between two states that need an event each.
-        state: the event of the state.
+        status: the state and wish of the job; a ``state`` event is sent whenever it changes.
+        state: the ``state`` event.
         final: whether the state is the last one.
     """
 
@@ -126,7 +126,7 @@ class Events:
 
 
 def watched(kind: JobKind, job_id: str) -> Watched:
-    """A job to watch: of a run the generations, of a diagnosis the steps."""
+    """The job with this id to watch; its events report the generations of a run or the steps of a diagnosis."""
 
     def read(session: Session, after: int, limit: int) -> JobState:
         past = store.steps(session, kind.step_table, job_id, after, limit)

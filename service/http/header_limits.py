@@ -27,7 +27,7 @@ SLOW_SECONDS = 15.0
 
 
 class Protocol(HttpToolsProtocol):
-    """One connection; more than ``HEAD_LIMIT`` bytes that neither belong to a body nor end are refused."""
+    """One connection; refuses headers or trailers of more than ``HEAD_LIMIT`` bytes."""
 
     _unended = 0
     # While the server waits for the client: since when, and how many bytes were not taken then; totals so far.
@@ -67,14 +67,14 @@ class Protocol(HttpToolsProtocol):
         self._refuse("the bytes received are no HTTP/1.1 request with a known method; check the address and the port")
 
     def pause_writing(self) -> None:
-        """Wait until the client has taken what was sent."""
+        """Stop writing until the client has received what was sent, and start to check its rate."""
         super().pause_writing()
         if self._slow_timer is None:
             self._paused_at, self._waiting = self.loop.time(), self._untaken()
             self._slow_timer = self.loop.call_later(SLOW_SECONDS - self._slow_seconds, self._check_rate)
 
     def resume_writing(self) -> None:
-        """Go on: the client has taken it."""
+        """Continue writing: the client has received what was sent."""
         super().resume_writing()
         self._count_taken()
 
@@ -108,13 +108,13 @@ class Protocol(HttpToolsProtocol):
         LOG.info(line, self.client, rate / 2**10, self.scope["path"], SLOWEST_BYTES_PER_SECOND / 2**10)
 
     def _discard_untaken(self) -> None:
-        """Let the operating system discard its send buffer at the close; it would keep it for minutes."""
+        """Make the operating system discard its send buffer when the connection closes, instead of after minutes."""
         connection = self.transport.get_extra_info("socket")
         with suppress(OSError, ValueError), socket.socket(fileno=os.dup(connection.fileno())) as same:
             same.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
 
     def _untaken(self) -> int:
-        """Bytes that wait for the client, here and in the send buffer of the operating system (up to megabytes)."""
+        """Bytes not yet received by the client, here and in the operating system's send buffer (up to megabytes)."""
         waiting = self.transport.get_write_buffer_size()
         connection = self.transport.get_extra_info("socket")
         with suppress(OSError, ValueError):  # not supported, or the connection is gone
@@ -123,7 +123,7 @@ class Protocol(HttpToolsProtocol):
         return waiting
 
     def _refuse(self, detail: str) -> None:
-        """Send a problem like all other errors, and close the connection; the application is not called."""
+        """Answer with a problem document (RFC 9457) and close the connection; the application is not called."""
         refusal = response(ProblemError(400, "not-http", detail), {"Connection": "close"})
         lines = [name + b": " + value for name, value in [*refusal.raw_headers, *RAW_HEADERS]]
         self.transport.write(b"\r\n".join([b"HTTP/1.1 400 Bad Request", *lines, b"", bytes(refusal.body)]))

@@ -1,7 +1,7 @@
 """The commonest reads, from the database straight to JSON: a run, a page of runs, a page of a history.
 
-They pass by the object mapper, which would load and parse ``genome`` and ``result`` for nothing and take longer than
-all the rest (docs/decisions/0010-reads.md).
+They bypass SQLAlchemy's object mapper, which would load and parse the unneeded columns ``genome`` and ``result`` and
+take longer than all the rest (docs/decisions/0010-reads.md).
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ _HISTORY = f"SELECT {', '.join(ITEM)} FROM generation WHERE run_id = ? AND seque
 
 
 async def answer(read: Callable[[], bytes], *, short: bool) -> Response:
-    """The JSON of ``read``: a short one in the event loop, because a thread would cost more; others in a thread."""
+    """A response with the JSON that ``read`` returns; a ``short`` read runs in the event loop, others in a thread."""
     body = read() if short else await run_in_threadpool(read)
     return Response(body, media_type=http.JSON)
 

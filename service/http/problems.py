@@ -58,7 +58,7 @@ def error_item(where: str, value: object, message: str) -> ErrorItem:
 
 
 def shown(value: object) -> object:
-    """``value`` as an error may repeat it: short, and valid JSON for any value."""
+    """``value`` in a form that an error message can quote: shortened, and valid JSON for any value."""
     if value is None or isinstance(value, bool) or (isinstance(value, float) and math.isfinite(value)):
         return value
     if isinstance(value, int) and abs(value) < 2**63:

@@ -77,7 +77,7 @@ async def refuse_unknown_query(request: Request) -> None:
 
 
 def repeat(request: Request, key: str | None, *parts: str) -> store.Repeat | None:
-    """What identifies a repeated request: path, owner, idempotency key, and hash of the ``parts`` of its body."""
+    """Identify a request by path, owner, Idempotency-Key and the hash of ``parts`` (its body); None without a key."""
     if key is None:
         return None
     caller = CALLER.get()

@@ -23,7 +23,7 @@ NO_WORKER = (
 
 
 class Pool:
-    """The evaluator that all runs share. ``error`` says why there is none yet."""
+    """Holds the evaluator that all jobs share. ``error`` says why it has not started yet."""
 
     def __init__(self, make: Callable[[], RunningEvaluator], on_ready: Callable[[RunningEvaluator], None]) -> None:
         self._make, self._on_ready = make, on_ready

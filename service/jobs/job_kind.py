@@ -63,8 +63,8 @@ class JobKind(ABC):
 
     @abstractmethod
     def begin(self, session: Session, row: Any) -> Points:
-        """Prepare ``row`` for a start or restart; (elapsed s, progress) of the steps after which it continues."""
+        """Prepare ``row`` for a start or restart; return (elapsed s, progress) of the steps that stay valid."""
 
     @abstractmethod
     def steps(self, row: Any, evaluator: Evaluator) -> Iterator[Step]:
-        """Compute; only the last step has ``last``."""
+        """Compute the job and yield its steps; ``last`` is True for the final one only."""

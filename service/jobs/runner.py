@@ -68,7 +68,7 @@ class Runner:
         of_one: int | None = None,
         most_starts: int = jobs.MOST_STARTS,
     ) -> None:
-        """Compute at most ``at_once`` jobs at a time, of them ``of_one`` of one owner.
+        """Compute at most ``at_once`` jobs at a time, and at most ``of_one`` of these for one owner.
 
         A job fails if the server ended ``most_starts`` times during it without progress.
         """
@@ -146,7 +146,7 @@ class Runner:
         return not any(thread.is_alive() for thread in threads)
 
     def pace(self) -> Pace:
-        """The pace of the jobs now."""
+        """Return how long running jobs have made no progress and queued jobs have waited, now."""
         with self._lock:
             now = time.monotonic()
             return Pace(
@@ -170,7 +170,7 @@ class Runner:
     # -- the waiting line ------------------------------------------------------------------------------------
 
     def _is_suspect(self, row: JobRow) -> bool:
-        """Whether one more end of the server during this job would make it fail."""
+        """Whether the job fails if the server crashes once more while the job runs (it may have caused the crashes)."""
         return row.starts >= max(1, self._most_starts - 1)
 
     def _unfinished(self, session: Session, state: jobs.State) -> list[tuple[JobRow, JobKind]]:
@@ -205,7 +205,7 @@ class Runner:
         del self._waits_since[job]
 
     def _next(self) -> JobRef | None:
-        """The first job that may start now. A suspect waits until no other job runs, and so do the jobs behind it."""
+        """The first queued job that may start now. A suspect, and all jobs behind it, wait until no other job runs."""
         if self._suspects & self._threads.keys():
             return None
         for job in self._waiting:
@@ -263,7 +263,7 @@ class Runner:
                 return
 
     def _patiently(self, job: JobRef, write: Callable[[], Written]) -> Written:
-        """Write, and retry while the disk is full: the job waits for space and loses nothing."""
+        """Call ``write`` and return its result; wait and retry while the disk is full: the job loses nothing."""
         waited = 0.0
         while True:
             try:

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 
 
 class Changes:
-    """Threads publish, coroutines watch."""
+    """Notifications of changed jobs: threads call :meth:`publish`, coroutines wait in :meth:`watch`."""
 
     def __init__(self) -> None:
         self._lock = threading.RLock()

@@ -1,4 +1,4 @@
-"""Coefficients that a run on forces has for a recording: local, joint, average, or from the global model."""
+"""Selects the coefficients of a run on forces for one recording: local, joint, average, or from the global model."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Estimates = Mapping[str, Mapping[str, float]]
 
 @dataclass(frozen=True)
 class Chosen:
-    """A source, its full genome by name, and remarks on it."""
+    """Where coefficients come from (``source``), the full genome (name to value), and remarks for the user."""
 
     source: Source
     genome: Mapping[str, float]
@@ -32,7 +32,7 @@ class Chosen:
 
 
 def chosen(service: Service, row: RunRow, dataset: Dataset, recording: str, requested: Source | None) -> Chosen:
-    """The genome of the ``requested`` source, by default of the best; a 409 if the run does not have it."""
+    """The coefficients of the ``requested`` source, by default the best; a 409 if the run has none of it."""
     available = offered(service, row, dataset, recording, estimates(service, row, dataset))
     source = requested or next(iter(available))
     if source not in available:
@@ -71,7 +71,7 @@ def offered(
 
 
 def estimates(service: Service, row: RunRow, dataset: Dataset) -> Estimates:
-    """The coefficients of each stage of the run so far."""
+    """The coefficients estimated so far, by stage of the run and name; empty before the first checkpoint."""
     with service.database.read() as session:
         checkpoint = store.checkpoint(session, row.id)
     return service.engine.found(store.spec(row), dataset, checkpoint) if checkpoint else {}

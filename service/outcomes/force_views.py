@@ -1,4 +1,4 @@
-"""Answers about forces, from the results of calibrations, and back."""
+"""Converts results of calibrations on forces to the API's JSON answers, and stored answers back."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ MN2 = 1e6
 
 
 def result(outcome: ForceResult, spec: CalibrationSpec, dataset: Dataset) -> f.ForceResult:
-    """The result of a calibration on forces."""
+    """The result of a calibration on forces as the JSON answer."""
     model = outcome.global_model
     return answer(
         f.ForceResult,
@@ -52,7 +52,7 @@ def result(outcome: ForceResult, spec: CalibrationSpec, dataset: Dataset) -> f.F
 
 
 def stored(kind: str, result: Json) -> Result | f.ForceResult:
-    """The result of a calibration of either kind from its row."""
+    """The JSON answer for a ``result`` as stored in the database; ``kind`` is "tracks" or "forces"."""
     whole = {"kind": kind} | result
     return checked(Result, whole) if kind == "tracks" else checked(f.ForceResult, whole)
 
@@ -101,7 +101,7 @@ def condition(requested: PredictionIn) -> Condition:
 
 
 def prediction(found: Prediction) -> f.Prediction:
-    """Predicted forces."""
+    """Predicted forces as the JSON answer."""
     return {
         "coefficients": dict(found.values),
         "phase": np.round(found.phase, 9).tolist(),
@@ -135,7 +135,7 @@ def _estimate(found: LocalEstimate, spec: CalibrationSpec, dataset: Dataset) -> 
 
 
 def _fitted(noise: Matrix, recording: Recording, axes: tuple[str, ...]) -> Matrix:
-    """The rows and columns of the fitted axes of a covariance of all force channels."""
+    """The block of ``noise`` (covariance of all force channels of ``recording``) that belongs to the ``axes``."""
     fitted = [k for k, axis in enumerate(recording.forces) if axis in axes]
     return tuple(tuple(noise[i][j] for j in fitted) for i in fitted)
 
@@ -157,6 +157,6 @@ def _fraction(percent: float | None, nothing: Any) -> Any:
 
 
 def _named(series: Mapping[Quantity, Array], *, exact: bool = False) -> f.ByQuantity:
-    """Series by quantity without those that are not finite; ``exact`` keeps all digits."""
+    """Each series as a list, rounded unless ``exact``; series that contain infinity or NaN are omitted."""
     plain = (lambda values: values.tolist()) if exact else rounded
     return {name: plain(values) for name, values in series.items() if np.isfinite(values).all()}

@@ -26,7 +26,7 @@ SIDE = np.array([0.0, 1.0, 0.0])
 
 
 def wanted(requested: bool | Iterable[OutputName]) -> tuple[OutputName, ...]:
-    """The outputs that a request names."""
+    """Names of the outputs that a request asks for: True means all, False none."""
     if isinstance(requested, bool):
         return OUTPUT_NAMES if requested else ()
     return tuple(dict.fromkeys(requested))
@@ -39,7 +39,7 @@ def condition(recorded: Condition, changes: ConditionIn) -> Condition:
 
 @one_blas_thread
 def outputs(found: Outputs, names: Iterable[OutputName]) -> answers.Outputs:
-    """The requested outputs."""
+    """The outputs called ``names`` of a simulated beat as the JSON answer."""
     phase = (found.phase - found.crossing) % 1.0
     order = np.argsort(phase)
     phases = {"phase": phase, "drive_phase": found.phase}
@@ -71,7 +71,7 @@ def _air(found: Outputs, put: Put) -> OutputGroups:
 
 
 def _aerodynamic(found: Outputs, force: Array) -> tuple[Array, Array, Array]:
-    """Lift, thrust and side force of ``force`` [n, 3]."""
+    """Lift, thrust and side component, [n] each, of ``force`` [n, 3]."""
     return force @ found.lift_axis, force @ found.thrust_axis, force @ SIDE
 
 

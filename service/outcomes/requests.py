@@ -34,7 +34,7 @@ Wanted = Annotated[
 
 
 class ConditionIn(BaseModel):
-    """What differs from the recording's condition; limits as in `dataset.yaml`."""
+    """Changes to the recording's condition; omitted fields stay as recorded. Limits as in `dataset.yaml`."""
 
     model_config = ConfigDict(extra="forbid")
 

@@ -1,1 +1,1 @@
-"""The paths of the API, one file per thing."""
+"""The paths of the API, one file per resource."""

@@ -119,7 +119,7 @@ def fetch_archive(service: ServiceDep, dataset_id: str, if_none_match: http.IfNo
 
 
 async def _pieces(database: Database, dataset_id: str, size: int) -> AsyncIterator[bytes]:
-    """The archive; each piece is a separate read, because a long one would let the log of the database grow."""
+    """Yield the archive in pieces; each is a separate read, because a long read makes the database's log file grow."""
 
     def piece(start: int) -> bytes:
         with database.look() as connection:

@@ -11,14 +11,14 @@ from wingfit.service.storage.tables import RunRow
 
 
 def best(row: RunRow) -> dict[str, float]:
-    """The best genome so far by name, or a 409."""
+    """The best genome so far (gene name to value); a 409 before the first generation."""
     if row.genome is None:
         raise conflict("no generation has finished yet", state=row.state)
     return row.genome
 
 
 def standing(service: Service, row: RunRow) -> GenomeInfo:
-    """The best and the nominal genome, or a 409."""
+    """The best genome so far beside the nominal one, as the JSON answer; a 409 before the first generation."""
     if row.result is not None:
         return GenomeInfo(genes=row.result["genes"], final=True)
     genes = service.engine.genes(store.spec(row), service.datasets.get(row.dataset_id), best(row))

@@ -1,4 +1,4 @@
-"""Runs: calibrations, which continue after their last stored generation."""
+"""Calibration runs as jobs; an interrupted one continues after its last stored generation."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from wingfit.workers import jobs
 
 
 class Calibrating(JobKind):
-    """How runs are computed."""
+    """The kind of job that is a calibration run: how the runner computes, stores and describes one."""
 
     what, path, prefix, step_event = "run", "/v1/runs", "run", "generation"
     table, step_table, step_answer = RunRow, GenerationRow, GenerationEvent
@@ -37,7 +37,7 @@ class Calibrating(JobKind):
         return views.run(row)
 
     def begin(self, session: Session, row: RunRow) -> Points:
-        """Continue after the generations so far."""
+        """Return (elapsed s, progress) of the stored generations, after which the run continues."""
         return [(g.elapsed_seconds, g.progress) for g in store.steps(session, GenerationRow, row.id)]
 
     def steps(self, row: RunRow, evaluator: Evaluator) -> Iterator[Step]:
@@ -58,7 +58,7 @@ class Calibrating(JobKind):
 
 
 def _step(generation: Generation) -> Step:
-    """One generation with its checkpoint and genome."""
+    """The step that stores one generation with its checkpoint and best genome."""
 
     def store_step(session: Session, row: RunRow, eta: float | None) -> None:
         row.stage, row.genome = generation.stage, generation.genome

@@ -1,4 +1,4 @@
-"""What the service needs of calibration; tests replace it by a search that takes no time."""
+"""The functions of `wingfit.calibration` that the service calls, in a class that tests replace by a fast stub."""
 
 from __future__ import annotations
 
@@ -83,13 +83,13 @@ class Engine:
     def compare(
         self, spec: CalibrationSpec, dataset: Dataset, genome: Mapping[str, float], recording: str
     ) -> Comparison:
-        """Simulate one recording's condition."""
+        """Simulate one recording's condition with ``genome``; return recorded and simulated tracks."""
         return result.compare(spec, dataset, genome, recording)
 
     def loads(
         self, spec: CalibrationSpec, dataset: Dataset, genome: Mapping[str, float], recording: Recording
     ) -> Outputs:
-        """Simulate one recording's condition for what acts inside the wing and on it."""
+        """Simulate one recording's condition; return forces, torques, powers and energies over one beat."""
         model = wing_model(dataset, spec)
         return simulate_outputs(model, base_genome(model, genome).values, recording)
 
@@ -102,7 +102,7 @@ class Engine:
     def agreements(
         self, spec: CalibrationSpec, dataset: Dataset, genome: Mapping[str, float], recording: str
     ) -> tuple[Agreement, ...]:
-        """Compute one recording's forces and how they agree."""
+        """Compute one recording's forces; return their agreement with the recorded ones, one entry per quantity."""
         model, record = vehicle_model(dataset, spec), as_fitted(spec, dataset.recording(recording))
         observed = model.observe([base_genome(model, genome).values], record)
         if observed.reasons[0] is not None:

@@ -26,7 +26,7 @@ Dimensions = tuple[str, ...]
 
 
 def made(write: Callable[[Any], None], attributes: dict[str, Any]) -> bytes:
-    """The file that ``write`` fills, with global ``attributes``."""
+    """The bytes of a NetCDF-4 file with global ``attributes``, whose contents ``write(root group)`` adds."""
     buffer = io.BytesIO()
     with h5netcdf.File(buffer, "w") as file:
         describe(file, {"Conventions": CONVENTIONS, **attributes})
@@ -50,7 +50,7 @@ def provenance(row: RunRow | DiagnosisRow, dataset: DatasetRow, model: str, expo
 
 
 def describe(what: Any, attributes: dict[str, Any]) -> None:
-    """Set attributes of a group or a variable."""
+    """Set attributes of ``what``, a group or a variable."""
     for name, value in attributes.items():
         what.attrs[name] = _storable(value) if isinstance(value, str) else value
 
@@ -66,7 +66,7 @@ def numbers(
     kind: str = "f8",
     **attributes: Any,
 ) -> Any:
-    """A numeric variable; NaN is the fill value of floats. Without ``data`` it is filled later."""
+    """Add a numeric variable to ``group``; NaN is the fill value of floats. Without ``data`` it is filled later."""
     options: dict[str, Any] = {"fillvalue": np.nan} if kind.startswith("f") else {}
     if dimensions:
         options |= {"compression": "gzip", "shuffle": True}
@@ -77,7 +77,7 @@ def numbers(
 
 
 def flags(group: Any, name: str, dimension: str, meaning: str, data: Iterable[bool | None]) -> None:
-    """A variable of flags: yes, no, or unknown."""
+    """Add a variable of flags to ``group``: yes, no, or unknown (None)."""
     values = [FLAGS["unknown"] if one is None else int(one) for one in data]
     variable = numbers(group, name, (dimension,), NO_UNIT, meaning, values, kind="i1")
     stated = {"flag_values": np.array(list(FLAGS.values()), dtype=np.int8), "flag_meanings": " ".join(FLAGS)}
@@ -85,7 +85,7 @@ def flags(group: Any, name: str, dimension: str, meaning: str, data: Iterable[bo
 
 
 def texts(group: Any, name: str, dimension: str, meaning: str, data: Iterable[str] | None = None) -> Any:
-    """A variable of strings."""
+    """Add a variable of strings to ``group``."""
     given = None if data is None else text_array(data)
     variable = group.create_variable(name, (dimension,), dtype=h5py.string_dtype(), data=given)
     describe(variable, {"units": NO_UNIT, "long_name": meaning})
@@ -93,12 +93,12 @@ def texts(group: Any, name: str, dimension: str, meaning: str, data: Iterable[st
 
 
 def text_array(data: Iterable[str]) -> npt.NDArray[np.object_]:
-    """Strings as variables store them."""
+    """Strings as the object array that h5netcdf stores."""
     return np.array([_storable(text) for text in data], dtype=object)
 
 
 def or_nan(values: Iterable[float | None]) -> npt.NDArray[np.float64]:
-    """Numbers, NaN for None."""
+    """``values`` as an array, with NaN for None."""
     return np.array([np.nan if value is None else value for value in values], dtype=np.float64)
 
 

@@ -32,7 +32,7 @@ def refuse_unknown(spec: CalibrationSpec, dataset: Dataset, known_genes: tuple[s
 
 
 def _unknown_recordings(names: tuple[str, ...], known: tuple[str, ...]) -> list[ErrorItem]:
-    """Faults for requested recordings that the dataset does not have; only the first fault lists those that it has."""
+    """An error item per name that is not in ``known`` (the dataset's recordings); only the first lists ``known``."""
     unknown = [(place, name) for place, name in enumerate(names) if name not in known]
     remedies = [f"known are {', '.join(known)}", *["see those named above"] * len(unknown)]
     return [

@@ -82,7 +82,7 @@ Accuracy = Annotated[
 
 
 def once(names: list[AnyName]) -> list[AnyName]:
-    """``names``, none of which may be there twice."""
+    """``names`` unchanged; ValueError if one of them occurs twice."""
     for name in names:
         if names.count(name) > 1:
             raise PydanticCustomError("repeated", "must name each once; {name} is there twice", {"name": name})

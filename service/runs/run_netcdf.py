@@ -1,4 +1,4 @@
-"""A run as NetCDF: its history and genome, and every recording beside what the best genome makes of it.
+"""A run as NetCDF: its history and genome, and every recording beside its simulation with the best genome.
 
 Layout: at the root the history along ``generation`` and the genes along ``gene``; a group ``recordings/<name>`` with
 tracks along ``time, marker, axis``, or forces along ``quantity, phase``, the modelled ones also along ``source``.
@@ -164,7 +164,7 @@ def _forces(
 
 
 def _beats(group: Any, beats: dict[str, Forces]) -> None:
-    """Recorded forces, which are the same for every source, and modelled forces."""
+    """Write recorded and modelled forces of one recording; ``beats`` maps each source of coefficients to its forces."""
     first = next(iter(beats.values()))
     quantities, phase = tuple(first["recorded_n"]), first["phase"]
     group.dimensions = {"source": len(beats), "quantity": len(quantities), "phase": len(phase)}

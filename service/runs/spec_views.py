@@ -82,7 +82,7 @@ def refuse_effects(names: Sequence[str], dataset: Dataset, vehicle: VehicleModel
 
 
 def unknown_genes(named: Iterable[tuple[str, str]], known: Sequence[str]) -> list[ErrorItem]:
-    """Faults for those of ``named`` (place in the request, name) that are not ``known``; the first lists the known."""
+    """An error item per gene in ``named`` (place in request, name) that is not ``known``; the first lists ``known``."""
     faults, remedy = [], f"known are {', '.join(known)}"
     for where, name in named:
         if name in known:
@@ -119,7 +119,7 @@ def refuse_idle(body: RunIn, method: str | None) -> None:
 
 
 def run_name(dataset: Dataset, spec: CalibrationSpec) -> str:
-    """Default name of a run: its settings that other runs on the dataset may not have."""
+    """Default name of a run, made of the settings in which runs on the same dataset usually differ."""
     unusual = spec.method not in (None, USUAL[dataset.kind])
     method = METHODS.get(spec.method or "", spec.method) if unusual else None
     if spec.finish:
@@ -152,7 +152,7 @@ def _refuse_terms(name: str, dataset: Dataset, vehicle: VehicleModel | None) -> 
 
 
 def _given(body: BaseModel, names: Iterable[str], message: str) -> list[ErrorItem]:
-    """Faults for those settings of ``names`` that differ from their defaults."""
+    """An error item with ``message`` for each setting in ``names`` that differs from its default."""
     fields = type(body).model_fields
     given = [name for name in names if name in fields and getattr(body, name) != fields[name].default]
     return [error_item(f"body.{name}", getattr(body, name), message) for name in given]

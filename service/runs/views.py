@@ -1,4 +1,4 @@
-"""Answers about datasets, runs and tracks, from rows and from the results of calibrations."""
+"""Converts database rows and results of calibrations to the API's JSON answers about datasets, runs and tracks."""
 
 from __future__ import annotations
 
@@ -99,7 +99,7 @@ def comparison(tracks: tracks_result.Comparison) -> Comparison:
 
 
 def numerics(tracks: tracks_result.Comparison) -> Numerics:
-    """How a simulation was solved."""
+    """Time steps, beats and error of a simulation as the JSON answer."""
     return {
         "accuracy_mm": tidy_mm(tracks.accuracy),
         "estimated_error_mm": mm(tracks.solution.error),
@@ -127,7 +127,7 @@ def track_mm(positions: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
 
 
 def tidy_phase(phase: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    """Phases, rounded as in answers."""
+    """Phases (fraction of the beat), rounded as in answers."""
     return np.round(phase, PHASE_DECIMALS)
 
 
@@ -138,5 +138,5 @@ def _track(positions: npt.NDArray[np.float64]) -> list[list[list[float | None]]]
 
 
 def columns(row: object) -> dict[str, Any]:
-    """The values of a row by their attributes."""
+    """The columns of a database row as a dict: attribute name to value."""
     return {column.key: getattr(row, column.key) for column in class_mapper(type(row)).column_attrs}

@@ -54,7 +54,7 @@ def snapshot(folder: Path) -> Path:
 
 
 def forget_snapshots(folder: Path) -> None:
-    """Remove copies that a killed process left."""
+    """Remove copies that a killed process left in ``folder``."""
     for left in folder.glob(f"copy-*{SUFFIX}"):
         left.unlink(missing_ok=True)
 
@@ -119,7 +119,7 @@ def _put(backup: Path, target: Path, keep_keys: bool) -> Contents:
 
 
 def _examined(copy: Path, name: Path) -> Contents:
-    """Check a ``copy`` of the file ``name`` and return its keys and owners; BackupError if it is not ours."""
+    """Check a ``copy`` of file ``name``; return its keys and owners. BackupError if it is no database of wingfit."""
     with _opened(copy, name) as opened:
         try:
             check_schema(opened)  # first: reading a table could run SQL of the schema
@@ -161,7 +161,7 @@ def move(copy: Path, target: Path) -> None:
 
 
 def _copied(backup: Path, target: Path) -> None:
-    """Copy to a new file completely, or not at all."""
+    """Copy ``backup`` to the new file ``target``; an incomplete copy is removed."""
     try:
         with backup.open("rb") as source, open_new(target) as into:
             shutil.copyfileobj(source, into)

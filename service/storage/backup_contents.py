@@ -32,7 +32,7 @@ class BackupKey:
 
 @dataclass(frozen=True)
 class BackupOwner:
-    """Numbers of datasets and jobs of ``owner`` in a backup; None owns what was made without keys."""
+    """Numbers of datasets and jobs of ``owner`` in a backup; owner None: created while no key was required."""
 
     owner: str | None
     datasets: int
@@ -42,7 +42,7 @@ class BackupOwner:
 
 @dataclass(frozen=True)
 class Contents:
-    """Keys, oldest first, and owners by name."""
+    """The valid API keys in a backup, oldest first, and the owners of its data, sorted by name."""
 
     keys: tuple[BackupKey, ...]
     owners: tuple[BackupOwner, ...]

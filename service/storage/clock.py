@@ -27,7 +27,7 @@ def _wall() -> datetime:
 
 
 def _steady() -> float:
-    """Seconds of the monotonic clock; of one that counts while the system is suspended, if there is one."""
+    """Seconds of a monotonic clock, where possible of one that also counts while the system is suspended."""
     boot = getattr(time, "CLOCK_BOOTTIME", None)
     return time.monotonic() if boot is None else time.clock_gettime(boot)
 
@@ -44,7 +44,7 @@ class ServiceClock:
         self._last: tuple[datetime, float] | None = None
 
     def advance(self, session: Session) -> float:
-        """Store and return the seconds until now."""
+        """Advance the clock to now, store its reading, and return it (s)."""
         wall, steady = self._wall(), self._steady()
         row = session.get(ClockRow, ROW)
         if row is None:
@@ -73,7 +73,7 @@ def _elapsed(before: tuple[datetime, float], now: tuple[datetime, float]) -> flo
 
 
 def _stopped(stored: str, wall: datetime) -> float:
-    """Seconds, in [0, 1 day], since an earlier process ``stored`` the wall time."""
+    """Seconds from the ``stored`` wall time of an earlier process to ``wall``, limited to [0, 1 day]."""
     try:
         gap = (wall - datetime.fromisoformat(stored)).total_seconds()
     except (TypeError, ValueError):  # no time, or one without a zone

@@ -19,6 +19,6 @@ _LEFT = count(int(COUNT or 1) - 1, -1)  # passes that are still survived; next()
 
 
 def passing(place: Place) -> None:
-    """Kill the process if WINGFIT_FAIL_POINT names this point, and this is the pass that it counts."""
+    """Count a pass of ``place``; kill the process if WINGFIT_FAIL_POINT names this place and this count."""
     if place == PLACE and next(_LEFT) <= 0:
         os.kill(os.getpid(), signal.SIGKILL)

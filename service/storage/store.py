@@ -1,4 +1,4 @@
-"""Queries and changes of the database. Every function works in a session, so that callers decide what is atomic."""
+"""Queries and changes of the database. Functions take the caller's session, so the caller defines the transaction."""
 
 from __future__ import annotations
 
@@ -94,12 +94,12 @@ def page(
 
 
 def cursor_before(number: int) -> str:
-    """The cursor to the rows before ``number``."""
+    """The page cursor (opaque text) for the rows created before row ``number``."""
     return f"{BEFORE}{number}"
 
 
 def number(cursor: str) -> int:
-    """The number that a cursor stands for, or a 422."""
+    """The row number that a cursor encodes; a 422 for an invalid cursor."""
     if re.fullmatch(rf"{BEFORE}[0-9]{{1,18}}", cursor):
         return int(cursor.removeprefix(BEFORE))
     item = error_item("query.cursor", cursor, "use next_cursor of the last page")
@@ -118,7 +118,7 @@ def archive(session: Session, dataset_id: str) -> bytes:
 
 
 def parsed(session: Session, dataset_id: str) -> bytes | None:
-    """The dataset in the parsed form, if that is stored."""
+    """The dataset in its parsed form (bytes), or None if that form is not stored."""
     return session.scalar(select(ParsedRow.body).where(ParsedRow.dataset_id == dataset_id))
 
 
@@ -261,7 +261,7 @@ def put_job(row: JobRow, after: Job) -> None:
 
 
 def spec(row: RunRow) -> CalibrationSpec:
-    """The row's specification."""
+    """The specification of a run from its row."""
     return spec_from(row.spec)
 
 
@@ -286,7 +286,7 @@ _MADE: dict[str, type[OwnedRow]] = {"datasets": DatasetRow, "runs": RunRow, "dia
 
 @dataclass(frozen=True)
 class Repeat:
-    """The Idempotency-Key of a request, and a fingerprint that is equal for the same request."""
+    """The path and Idempotency-Key of a request, and the hash of its contents."""
 
     path: str
     key: str

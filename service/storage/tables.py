@@ -55,7 +55,7 @@ class KeyRow(Table):
 
 
 class DatasetRow(OwnedRow, Table):
-    """An uploaded dataset, described; ``kind`` is "tracks" or "forces". Its bytes are in :class:`ArchiveRow`."""
+    """The description of an uploaded dataset; ``kind`` is "tracks" or "forces"; its bytes: :class:`ArchiveRow`."""
 
     __tablename__ = "dataset"
 
@@ -98,7 +98,7 @@ class ClockRow(Table):
 class JobRow(OwnedRow):
     """The columns of every job: state, wish, generations, progress, error and starts are those of `workers.jobs.Job`.
 
-    ``ended_at_service_seconds`` is when the service's clock first saw that the job had ended.
+    ``ended_at_service_seconds`` is the service clock (s) when the end of the job was first noticed.
     """
 
     dataset_id: Mapped[str] = mapped_column(ForeignKey("dataset.id", ondelete="RESTRICT"), index=True)

@@ -10,7 +10,7 @@ down_revision = "0001"
 
 
 def upgrade() -> None:
-    """Add the columns; whatever is there is of tracks."""
+    """Add the columns; existing datasets and runs get the kind "tracks"."""
     for table in ("dataset", "run"):
         op.add_column(table, sa.Column("kind", sa.String, nullable=False, server_default="tracks"))
     for table in ("run", "generation"):

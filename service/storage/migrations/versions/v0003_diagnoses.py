@@ -1,4 +1,4 @@
-"""Diagnoses: their jobs, how far they were, and what they found."""
+"""Diagnoses: their jobs, progress and findings."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""API keys, and whose datasets and jobs are."""
+"""API keys, and the owners of datasets and jobs."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ OWNED = ("dataset", "run", "diagnosis")
 
 
 def upgrade() -> None:
-    """Create the table of keys; what is there belongs to nobody, and is the administrators' to see."""
+    """Create the table of keys; existing datasets and jobs get no owner, so only administrators see them."""
     op.create_table(
         "key",
         sa.Column("number", sa.Integer, primary_key=True),
