@@ -173,7 +173,8 @@ class Run(Job):
 class HistoryItem(TypedDict):
     """One finished generation; ``best`` and ``mean`` are misfits (Eq. 14 of van der Grinten's thesis) in m^2 or N^2.
 
-    ``evaluations`` counts from the start of the run, ``failed`` in this generation, with up to ten of the ``reasons``.
+    ``evaluations`` counts simulated individuals since the start of the run, ``failed`` those of this generation that
+    could not be simulated, with up to ten ``reasons``.
     """
 
     sequence: int
