@@ -1,4 +1,4 @@
-"""Answers about effects."""
+"""JSON answers of the server about effects (physics or measurement errors that a model can include)."""
 
 from __future__ import annotations
 
@@ -51,6 +51,6 @@ class Effect(TypedDict):
 
 
 class Effects(TypedDict):
-    """All effects, in the order in which they act."""
+    """All effects, in the order in which the simulation applies them."""
 
     effects: list[Effect]

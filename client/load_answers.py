@@ -1,4 +1,4 @@
-"""Answers about loads, powers and energies over one beat; ``docs/api.md`` gives axes and signs."""
+"""JSON answers about loads, powers and energies over one beat; ``docs/api.md`` gives axes and signs."""
 
 from __future__ import annotations
 

@@ -79,7 +79,7 @@ class _Gauges(Collector):
         return []
 
     def collect(self) -> Iterable[Metric]:
-        """The gauges as they are now."""
+        """The present state of the service as Prometheus gauges."""
         return self._gauges()
 
 
