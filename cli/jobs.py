@@ -29,7 +29,11 @@ Output = Annotated[Path, typer.Option("--output", "-o", help="File to write to; 
 
 @dataclass(frozen=True)
 class JobKind:
-    """Texts and client calls in which runs and diagnoses differ; ``stage_of`` and ``outcome_of`` map a job to text."""
+    """Texts and client calls in which runs and diagnoses differ; ``stage_of`` and ``outcome_of`` map a job to text.
+
+    ``outcome`` is the heading of the column of ``outcome_of``, ``work`` the title of the progress bar, ``submit`` an
+    example command, ``exported`` the help on formats.
+    """
 
     name: str
     plural: str

@@ -171,9 +171,11 @@ class Run(Job):
 
 
 class HistoryItem(TypedDict):
-    """One finished generation; ``best`` and ``mean`` are misfits (Eq. 14 of van der Grinten's thesis) in m^2 or N^2.
+    """One finished generation; ``best`` and ``mean`` are sums of squared differences to the recordings, m^2 or N^2.
 
-    ``evaluations`` counts from the start of the run, ``failed`` in this generation, with up to ten of the ``reasons``.
+    ``diversity`` is the mean over genes of the population's standard deviation, bounds scaled to [0, 1].
+    ``evaluations`` counts simulated individuals since the start of the run, ``failed`` those of this generation that
+    could not be simulated, with up to ten ``reasons``.
     """
 
     sequence: int
@@ -191,7 +193,7 @@ class HistoryItem(TypedDict):
 
 
 class GenerationEvent(HistoryItem):
-    """The data of a ``generation`` event."""
+    """The data of the server-sent event ``generation``: the generation, and the progress of the whole run in [0, 1]."""
 
     progress: float
     eta_seconds: float | None

@@ -1,4 +1,4 @@
-"""Answers about diagnoses."""
+"""JSON answers of the server about diagnoses."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Diagnosis(Job):
 
 
 class StepEvent(TypedDict):
-    """The data of a ``step`` event; ``elapsed_seconds`` counts from the last start."""
+    """The data of the server-sent event ``step``; ``elapsed_seconds`` counts from the last start of the diagnosis."""
 
     sequence: int
     stage: str

@@ -1,4 +1,4 @@
-"""Answers about effects."""
+"""JSON answers of the server about effects (physics or measurement errors that a model can include)."""
 
 from __future__ import annotations
 
@@ -12,6 +12,8 @@ class EffectParameter(TypedDict):
 
     With ``relative_to``, ``lower``, ``upper`` and ``typical`` are fractions of that measure of the rig: its span, its
     mean chord, or the mass of its wing. The genes of a run give the same quantities in ``unit``.
+    ``is_size``: the effect is off if this and its other sizes are zero; ``is_location``: where on the wing it acts;
+    ``scale``: how a search spreads over the bounds.
     """
 
     name: str
@@ -29,7 +31,9 @@ class EffectParameter(TypedDict):
 class Effect(TypedDict):
     """One piece of physics, or one measurement error, that a model can contain.
 
-    The effect is off where all its parameters with ``is_size`` are zero, as in every nominal genome.
+    The effect is off where all its parameters with ``is_size`` are zero, as in every nominal genome. ``port`` is where
+    it enters the model, ``power`` how it exchanges energy over a beat, ``memory`` its internal states in words,
+    ``law`` its equations, ``source`` their publication, ``signature`` its trace in a recording.
     """
 
     name: str
@@ -47,6 +51,6 @@ class Effect(TypedDict):
 
 
 class Effects(TypedDict):
-    """All effects, in the order in which they act."""
+    """All effects, in the order in which the simulation applies them."""
 
     effects: list[Effect]

@@ -1,4 +1,4 @@
-"""Answers about forces: forces in N, misfits in mN, angles in degrees."""
+"""JSON answers of the server about forces: forces in N, misfits in mN, angles in degrees."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Answers about API keys and the session of a browser."""
+"""JSON answers of the server about API keys and the session of a browser."""
 
 from __future__ import annotations
 

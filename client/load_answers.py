@@ -1,4 +1,4 @@
-"""Answers about loads, powers and energies over one beat; ``docs/api.md`` gives axes and signs."""
+"""JSON answers about loads, powers and energies over one beat; ``docs/api.md`` gives axes and signs."""
 
 from __future__ import annotations
 
@@ -50,7 +50,10 @@ class ConnectorLoad(TypedDict):
 
 
 class Averages(TypedDict):
-    """Means over the beat, and the largest motor torques; supplied = dissipated + to air + closing error."""
+    """Means over the beat, and the largest motor torques.
+
+    Energy balance: ``supplied_w`` = ``dissipated_w`` + ``to_air_w`` + ``closing_error_w`` (numerical error).
+    """
 
     lift_n: float
     thrust_n: float
@@ -74,7 +77,7 @@ class OutputNumerics(TypedDict):
 
 
 class OutputGroups(TypedDict, total=False):
-    """The outputs that can be requested."""
+    """The outputs that can be requested; each series has one value per ``phase`` of the beat."""
 
     numerics: OutputNumerics
     motor_angle_deg: MotorSeries
@@ -103,7 +106,7 @@ class Outputs(OutputGroups):
 
 
 class Loads(TypedDict):
-    """Loads under a recording's condition, or under one that differs from it as the request says."""
+    """Simulated loads under the condition of ``recording``, with the changes to it that the request gave."""
 
     recording: str
     outputs: Outputs

@@ -1,4 +1,4 @@
-"""Runs the service: takes the data folder and the port, or says why it cannot, then starts uvicorn."""
+"""Runs the service: opens the data folder and the port, or reports why it cannot, then starts uvicorn."""
 
 from __future__ import annotations
 

@@ -52,11 +52,11 @@ class Settings:
         workers: number of worker processes (``WINGFIT_WORKERS``); None: the evaluator decides.
         ray_address: address of a running Ray cluster (``WINGFIT_RAY_ADDRESS``); None: the server starts its own.
         max_runs: jobs computed at the same time (``WINGFIT_MAX_RUNS``).
-        max_runs_per_owner: the same of one owner of keys (``WINGFIT_MAX_RUNS_PER_OWNER``); None: ``max_runs``.
-        max_starts: number of starts of a job, each ended by an end of the server without progress of the job, after
-            which the job fails (``WINGFIT_MAX_STARTS``).
-        max_active: jobs of one owner that have not ended (``WINGFIT_MAX_ACTIVE``).
-        max_stored_mb: MB of archives of one owner (``WINGFIT_MAX_STORED_MB``).
+        max_runs_per_owner: jobs of one owner computed at once (``WINGFIT_MAX_RUNS_PER_OWNER``); None: ``max_runs``.
+        max_starts: a job fails after this many starts without progress that ended with a crash of the server
+            (``WINGFIT_MAX_STARTS``).
+        max_active: largest number of jobs of one owner that have not ended (``WINGFIT_MAX_ACTIVE``).
+        max_stored_mb: largest total size of the datasets of one owner, MB (``WINGFIT_MAX_STORED_MB``).
         keep_days: days after which runs and diagnoses that have ended are deleted (``WINGFIT_KEEP_DAYS``); None: never.
         log: text, or json, which has one object per line and every request (``WINGFIT_LOG``).
         require_keys: require an API key also on loopback (``WINGFIT_REQUIRE_KEYS=1``).
@@ -141,7 +141,7 @@ def _variable(field: str) -> str:
 
 
 def _parsed(field: str, text: str) -> Any:
-    """The value of a setting; SettingsError if the text has not the form of one."""
+    """The value of the setting ``field`` from its ``text``; SettingsError if the text is not a valid value."""
     if field in RANGES:
         return _integer(field, text)
     if field in FLAGS:
@@ -152,7 +152,7 @@ def _parsed(field: str, text: str) -> Any:
 
 
 def _hosts(text: str) -> tuple[str, ...]:
-    """Host names with commas between; SettingsError for one that no request can match."""
+    """The host names in comma-separated ``text``; SettingsError for one that no request can match."""
     names = tuple(name.strip().lower() for name in text.split(",") if name.strip())
     for name in names:
         if not (HOST_NAME.fullmatch(name) or _address(name)):

@@ -102,7 +102,7 @@ class Cancel:
 
 @dataclass(frozen=True)
 class Finish:
-    """The runner reached the end."""
+    """The runner computed the last step of the job."""
 
 
 @dataclass(frozen=True)

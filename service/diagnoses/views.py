@@ -1,4 +1,4 @@
-"""Answers about diagnoses, and their specifications, from the database."""
+"""Converts database rows of diagnoses to JSON answers and to specifications."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _SPEC = TypeAdapter(DiagnosisSpec)
 
 
 def diagnosis(row: DiagnosisRow) -> answers.Diagnosis:
-    """A diagnosis from its row."""
+    """The JSON answer that describes a diagnosis, from its row."""
     return job_of(answers.Diagnosis, columns(row), diagnosis_settings(spec(row)))
 
 
@@ -25,7 +25,7 @@ def spec(row: DiagnosisRow) -> DiagnosisSpec:
 
 
 def diagnosis_settings(spec: DiagnosisSpec) -> answers.DiagnosisSpec:
-    """The settings of a diagnosis as answers give them."""
+    """The settings of a diagnosis as JSON answers contain them (units of the API)."""
     return answer(
         answers.DiagnosisSpec,
         spec.calibration,

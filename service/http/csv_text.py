@@ -1,4 +1,4 @@
-"""CSV (RFC 4180) with numbers in full precision and no text that a spreadsheet would run as a formula."""
+"""Writes CSV (RFC 4180) with numbers in full precision; a spreadsheet cannot run any of its text as a formula."""
 
 from __future__ import annotations
 

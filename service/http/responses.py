@@ -88,7 +88,7 @@ def repeat(request: Request, key: str | None, *parts: str) -> store.Repeat | Non
 def created(
     database: Database, again: store.Repeat | None, create: Callable[[Session], store.Answer]
 ) -> tuple[store.Answer, bool]:
-    """Call ``create`` unless the request is a repetition, in one transaction with storing its answer.
+    """Call ``create`` unless the request is a repetition, and store its answer in the same transaction.
 
     Return the answer, and whether it is new.
     """
@@ -102,7 +102,7 @@ def created(
 
 
 def sent(answer: store.Answer) -> Response:
-    """The response that sends ``answer``."""
+    """The HTTP response that sends ``answer``, the stored answer to a request that created a resource."""
     return JSONResponse(answer.body, answer.status, {"Location": answer.location})
 
 

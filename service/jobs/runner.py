@@ -39,7 +39,7 @@ Written = TypeVar("Written")
 
 
 class JobRef(NamedTuple):
-    """A job, its kind and its owner."""
+    """Identifies a job: its kind (run or diagnosis), id and owner."""
 
     kind: JobKind
     id: str

@@ -25,7 +25,7 @@ Jobs = dict[str, dict[str, int]]
 
 
 class Health:
-    """Counts jobs in a thread of its own; concurrent callers share the count."""
+    """Reports the health of the service; a separate thread counts jobs, and concurrent callers share the count."""
 
     def __init__(self, settings: Settings, database: Database, pool: Pool, kinds: Sequence[JobKind]) -> None:
         self._settings, self._database, self._pool, self._kinds = settings, database, pool, kinds
@@ -34,7 +34,7 @@ class Health:
         """Number of jobs of all owners by kind and state; None if the database did not answer in time."""
 
     async def look(self) -> str | None:
-        """Count the jobs again. Return None, or why there is no count."""
+        """Count the jobs again into ``jobs``. Return None, or the reason if they could not be counted."""
         try:
             self.jobs = await self._counting.result(READ_SECONDS)
         except TimeoutError:

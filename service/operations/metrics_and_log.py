@@ -75,11 +75,11 @@ class _Gauges(Collector):
         self._gauges = gauges
 
     def describe(self) -> list[Metric]:
-        """Nothing, so that registering does not read the gauges."""
+        """Return an empty list, so that registering this collector does not read the gauges."""
         return []
 
     def collect(self) -> Iterable[Metric]:
-        """The gauges as they are now."""
+        """The present state of the service as Prometheus gauges."""
         return self._gauges()
 
 
@@ -142,7 +142,7 @@ class JsonFormatter(logging.Formatter):
 
 
 def set_up_log(log_format: LogFormat) -> None:
-    """Log to standard error. Only the JSON log has every request, because in a text they would hide the rest."""
+    """Log to standard error. Only the JSON log contains every request: in a text log they would hide other messages."""
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(levelname)s %(name)s: %(message)s")
     logging.getLogger("alembic").setLevel(logging.WARNING)
     if log_format == "json":

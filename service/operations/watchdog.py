@@ -1,4 +1,4 @@
-"""A process beside the server that kills it if it does not end after a signal to stop.
+"""A separate process that kills the server if the server does not end after a signal to stop.
 
 It is needed when no thread of the server can run Python, because one of them holds the interpreter lock for ever. The
 server starts this file by its path, without the package, so that it starts in milliseconds and takes few megabytes. Its

@@ -37,7 +37,7 @@ _RANKING = (
 
 
 def _described(example: str) -> dict[str, Any]:
-    """The description of the CSV and NetCDF answers."""
+    """OpenAPI description of the answers as CSV (with ``example``) and NetCDF."""
     saved = {"Content-Disposition": {"description": "name to save it under", "schema": {"type": "string"}}}
     return {
         "headers": saved,

@@ -27,7 +27,7 @@ Actions = Mapping[str, tuple[jobs.Event, str]]
 def submit_job(
     request: Request, service: Service, kind: JobKind, key: str | None, body: BaseModel, plan: Callable[[], JobRow]
 ) -> Response:
-    """Store the job of a request and queue it; the same answer again for a repeated request.
+    """Store the job of a request and queue it; return the answer. A repeated request gets the same answer again.
 
     Two requests with one Idempotency-Key are equal if they contain the same fields with the same values. A default
     written out differs from a field left out, because it overrides a run's setting. ``plan`` checks the request and

@@ -33,7 +33,7 @@ MORE_COLUMNS = ("evaluations", "failed", "reasons", "elapsed_seconds")
 
 @dataclass(frozen=True)
 class Exported(Generic[AnyJob]):
-    """A run or diagnosis and its dataset, read ``at`` this time."""
+    """The database rows of a run or diagnosis and of its dataset, read at the time ``at`` (RFC 3339, UTC)."""
 
     row: AnyJob
     dataset: DatasetRow

@@ -132,7 +132,7 @@ class JobSettings(VehicleModel):
 
 
 class RunIn(JobSettings):
-    """A calibration to run."""
+    """Body of a request for a calibration run."""
 
     model_config = ConfigDict(
         extra="forbid",

@@ -32,7 +32,7 @@ LONGEST_NAME = 200
 
 
 def run_settings(spec: CalibrationSpec) -> RunSpec:
-    """The settings of a run as answers give them."""
+    """The settings of a run as JSON answers contain them (units of the API)."""
     return answer(RunSpec, spec, accuracy_mm=tidy_mm(spec.accuracy))
 
 

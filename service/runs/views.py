@@ -30,7 +30,7 @@ PHASE_DECIMALS = 9
 
 
 def dataset(row: DatasetRow) -> a.Dataset:
-    """A dataset from its row."""
+    """The JSON answer that describes a dataset, from its row."""
     recordings = [BEFORE_FORCES | record for record in row.recordings]
     return checked(a.Dataset, columns(row) | {"recordings": recordings})
 
@@ -58,17 +58,17 @@ def recordings(loaded: Dataset) -> list[a.RecordingInfo]:
 
 
 def run(row: RunRow) -> a.Run:
-    """A run from its row."""
+    """The JSON answer that describes a run, from its row."""
     return run_of(columns(row))
 
 
 def run_of(values: Mapping[str, Any]) -> a.Run:
-    """A run from the values of its row."""
+    """The JSON answer that describes a run, from ``values``: column name of its row to value."""
     return job_of(a.Run, values, run_settings(store.spec_from(values["spec"])))
 
 
 def job_of(shape: type[T], values: Mapping[str, Any], spec: object) -> T:
-    """A run or diagnosis from the values of its row."""
+    """The JSON answer ``shape`` about a run or diagnosis, from its row (``values`` by column) and its settings."""
     action = None if values["wish"] == Wish.NONE else values["wish"]
     return checked(shape, {**values, "pending_action": action, "steps": values["generations"], "spec": spec})
 
@@ -80,12 +80,12 @@ def gene(estimated: tracks_result.GeneResult) -> a.GeneInfo:
 
 
 def result(outcome: tracks_result.Result) -> a.Result:
-    """The result of a calibration on tracks."""
+    """The result of a calibration on tracks as the JSON answer."""
     return answer(a.Result, outcome, kind="tracks", genes=[gene(one) for one in outcome.genes])
 
 
 def comparison(tracks: tracks_result.Comparison) -> Comparison:
-    """Recorded and simulated tracks."""
+    """Recorded and simulated tracks as the JSON answer (mm)."""
     stride = max(1, -(-tracks.recorded.size // MOST_COORDINATES))
     return {
         "recording": tracks.recording,
