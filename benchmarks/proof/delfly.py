@@ -1,4 +1,4 @@
-"""The DelFly study: data of wings that clap and peel, diagnosed with a model that lacks wing-wing interaction.
+"""The DelFly study: data of wings that clap and peel, diagnosed with a model without wing-wing interaction.
 
 The model is after Berman and Wang (2007). Conditions are those of Armanini et al. (2016), Table 4, with the
 coefficients estimated there for each test (Table 8).

@@ -127,7 +127,7 @@ def _phase_map(root: Any, found: Json) -> None:
 
 
 def _load(group: Any, load: Json) -> None:
-    """Write the load that the nominal model lacks in one recording into ``group``."""
+    """Write the load missing from the nominal model in one recording into ``group``."""
     units, along = str(CF_UNITS.get(load["unit"], load["unit"])), ("station", "phase")
     meaning = f"rotation missing at rod {load['rod']}" if load["rod"] else "force missing from the nominal model"
     nc.describe(group, {"recording": load["recording"], "rod": load["rod"]})
