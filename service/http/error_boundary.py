@@ -20,7 +20,7 @@ LOG = logging.getLogger("wingfit.http")
 class ErrorBoundary:
     """Middleware that answers unexpected errors without their details, and with the headers of every other answer.
 
-    Starlette's own handler is outside all other middleware: its answer is without their headers and ends the connection.
+    Starlette's own handler is outside all other middleware: its answer omits their headers and ends the connection.
     """
 
     def __init__(self, app: ASGIApp) -> None:
