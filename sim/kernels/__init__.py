@@ -1,7 +1,8 @@
-"""Compiled inner loops for eight individuals at a time; the last axis of the arrays is the individual, called lane.
+"""Compiled inner loops that compute eight individuals (parameter sets of one wing) at a time.
 
-Only ``sim`` uses these. The arithmetic of every lane has a fixed order, so that the results of an individual do not
-depend on the other lanes or on the size of the batch.
+The last axis of the arrays, of length W = LANES, is the individual; its elements are called lanes. Only ``sim`` uses
+these functions. The arithmetic of every lane has a fixed order, so that the results of an individual do not depend on
+the other lanes or on the size of the batch.
 """
 
 LANES = 8

@@ -1,10 +1,11 @@
-"""Strip aerodynamics (thesis III-E, Eqs. 8-13), lane by lane.
+"""Strip aerodynamics (van der Grinten's thesis III-E, Eqs. 8-13), for W individuals at a time.
 
-Each strip has one airflow and one angle of attack, from the area-weighted motion of its bodies; its lift and drag are
-distributed to these. Differences from the printed equations: alpha lies in [-pi/2, pi/2]; drag grows with |alpha| (as
-printed, it would accelerate the wing at negative angles); in reversed flow the lift has the sign of the normal flow,
-with the change of sign smoothed within 15 degrees of 90 so that the force is continuous. The affine law is valid to
-about 15 degrees and is used as printed beyond.
+Each strip of the wing, a slice across the span made of one or more bodies, has one airflow and one angle of attack
+alpha, from the area-weighted motion of its bodies; its lift and drag are distributed to these bodies. Differences from
+the printed equations: alpha lies in [-pi/2, pi/2]; drag grows with |alpha| (as printed, it would accelerate the wing at
+negative angles); in reversed flow the lift has the sign of the normal flow, with the change of sign smoothed within 15
+degrees of 90 so that the force is continuous. The affine laws of C_L and C_D are valid to about 15 degrees and are
+used as printed beyond.
 """
 
 from __future__ import annotations
@@ -29,12 +30,15 @@ def strip_flow(
     start: Index, weight: Array, centroid: Array, wind: Array, coefficients: Array, induced: Array, R: Array,
     p: Array, V: Array, flow: Array, loads: Array,
 ) -> None:  # fmt: skip
-    """Set the airflow of every strip, ``flow`` [S, FLOW, W], and its ``loads`` [S, LOADS, W] by the affine laws.
+    """Set the airflow ``flow`` [S, FLOW, W] of every strip, and its ``loads`` [S, LOADS, W] by the affine laws.
 
-    Strip s consists of the bodies ``start[s]`` to ``start[s + 1]`` - 1; ``weight`` [N]: a body's share of the strip's
-    area, ``centroid`` [N, 2]: of its planform, body frame (m); ``coefficients`` [4, W]: L_a, L_b, ID_a, ID_b of C_L =
-    L_a alpha + L_b and C_D = ID_a |alpha| + ID_b; ``induced`` [S, 3, W]: velocity of the air in addition to the wind
-    (m/s); if it is empty, position and pitch rate of the strips are not computed either.
+    S strips, W individuals, N bodies; the columns of ``flow`` and ``loads`` are listed in
+    :mod:`wingfit.sim.kernels.arrays`. Strip s consists of the bodies ``start[s]`` to ``start[s + 1]`` - 1. ``weight``
+    [N]: each body's fraction of the strip's area; ``centroid`` [N, 2]: x and y of the centroid of its planform, body
+    frame (m); ``coefficients`` [4, W]: L_a, L_b, ID_a, ID_b of C_L = L_a alpha + L_b and C_D = ID_a |alpha| + ID_b.
+    ``wind`` [3, W] and ``induced`` [S, 3, W]: velocity of the stream and of the air in addition to it (m/s, world
+    axes); if ``induced`` is empty, position and pitch rate of the strips are not computed either. R, p, V: poses and
+    twists of the bodies (:mod:`wingfit.sim.kernels.bodies`).
     """
     mean = np.empty((9, LANES))
     for s in range(len(start) - 1):
@@ -90,7 +94,10 @@ def strip_flow(
 def _position_and_pitch_rate(
     s: int, start: Index, weight: Array, centroid: Array, R: Array, p: Array, V: Array, flow: Array
 ) -> None:
-    """Set in ``flow`` the position of the centroid of strip ``s`` in the world, and the strip's pitch rate."""
+    """Set in ``flow`` the world position (m) of the centroid of strip ``s``, and the strip's pitch rate (rad/s).
+
+    Both are area-weighted means over the strip's bodies; arguments as in :func:`strip_flow`.
+    """
     for i in (arrays.PLACE_X, arrays.PLACE_X + 1, arrays.PLACE_X + 2, arrays.PITCH_RATE):
         store(flow, s, i, 0.0)
     for n in range(start[s], start[s + 1]):
@@ -103,7 +110,7 @@ def _position_and_pitch_rate(
 
 @inlined
 def _vector(array: Array) -> Three:
-    """The first three elements of an array."""
+    """Load rows 0, 1 and 2 of ``array`` [., W] as a 3-vector of lanes."""
     return load1(array, 0), load1(array, 1), load1(array, 2)
 
 
@@ -113,12 +120,14 @@ def strip_forces(
     drag_share: Array, drag_x: Array, flow: Array, loads: Array, spread: bool, R: Array, V: Array, wrench: Array,
     damping: Array, power: Array, force: Array,
 ) -> None:  # fmt: skip
-    """Add to ``wrench`` that of the air on every body, from the ``loads`` of its strip.
+    """Add to ``wrench`` [N+2, 6, W] the moment and force of the air on every body, from the ``loads`` of its strip.
 
-    ``lift_share``, ``drag_share`` [N, W]: the body's fraction of the strip's lift and drag; ``lift_x``, ``drag_x``
-    [N, W]: where these act along the chord, body frame (m); ``spread``: whether there are uniformly distributed loads.
-    Also set: ``damping`` [N, W], force per normal speed of the body (for the linearisation), ``power`` [W] of the air
-    on the wing, ``force`` [3, W] of the air on the wing in the world.
+    S strips, N bodies, W individuals. ``geometry`` [S, GEOMETRY] of the strips; ``density`` [W] of the air, kg/m^3;
+    ``lift_share``, ``drag_share`` [N, W]: the body's fraction of the strip's lift and drag; ``lift_x``, ``drag_x`` [N,
+    W]: where these act along the chord, body frame (m); ``spread``: whether the columns PUSH_* of ``loads``, uniform
+    over the strip, are nonzero; other inputs as in :func:`strip_flow`. Outputs: ``damping`` [N, W] is set to the force
+    per normal speed of each body (N s/m, for the linearisation); the power of the air on the wing is added to ``power``
+    [W] (W), and its force in world axes to ``force`` [3, W] (N).
     """
     lift, drag = np.empty((4, LANES)), np.empty((4, LANES))
     push = np.empty((5, LANES))

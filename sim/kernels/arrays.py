@@ -1,4 +1,4 @@
-"""Inputs and outputs of the kernels: all arrays of a group of lanes, with their shapes."""
+"""Named tuples of the arrays that enter and leave the kernels, with their shapes; W individuals are one group."""
 
 from __future__ import annotations
 
@@ -42,14 +42,17 @@ AREA, MEAN_CHORD, WIDTH, STATION, GEOMETRY = range(5)  # m^2, m, m, part of the 
 
 
 class Wiring(NamedTuple):
-    """Topology and geometry, the same for all individuals. Bodies 0..N-1, driving rods N and N+1.
+    """Topology and geometry of a discretised wing, the same for all individuals.
 
-    ``mass`` [N] (kg) and ``inertia`` [N, 9] (kg m^2) of the bodies. Connector c joins the arm ``a`` [C, 3] of body
-    ``first`` [C] to the arm ``b`` of ``second`` (m); those from index ``driven`` on start at a driving rod. ``lower``
-    and ``upper`` [C] are their blocks in the matrix (:func:`wingfit.sim.kernels.tangents.add_connectors`); ``order`` to
-    ``fill`` are those of ``wingfit.sim.solver.elimination``. ``strip_start``, ``weight``, ``centroid``: see
-    :func:`wingfit.sim.kernels.air.strip_flow`; ``geometry`` [S, GEOMETRY] of the strips. ``markers`` [M, 3]: positions
-    in the frames of the bodies ``carrier`` [M], m.
+    N bodies have the indices 0..N-1, the front and the rear driving rod N and N+1; there are C connectors, S strips and
+    M markers. ``mass`` [N] (kg) and ``inertia`` [N, 9] (kg m^2, about the centre of mass, row by row) of the bodies.
+    Connector c joins the point at ``a`` [C, 3] (m) from the centre of mass of body ``first`` [C] to the point at ``b``
+    [C, 3] of body ``second`` [C]; connectors from index ``driven`` on start at a driving rod. ``lower`` and ``upper``
+    [C] are the numbers of the connector's off-diagonal blocks in the matrix of a step
+    (:func:`wingfit.sim.kernels.tangents.add_connectors`); ``order`` to ``fill`` describe how this matrix is factored
+    (``wingfit.sim.solver.elimination``). ``strip_start``, ``weight``, ``centroid``: see
+    :func:`wingfit.sim.kernels.air.strip_flow`, where ``strip_start`` is called ``start``; ``geometry`` [S, GEOMETRY] of
+    the strips. ``markers`` [M, 3]: positions in the frames of the bodies ``carrier`` [M], m.
     """
 
     mass: Array
@@ -77,7 +80,10 @@ class Wiring(NamedTuple):
 
 
 class Setting(NamedTuple):
-    """One condition: air density [W] (kg/m^3), wind [3, W] (m/s), gravity (m/s^2), step (s)."""
+    """One condition: air density [W] (kg/m^3), wind [3, W] (m/s), gravity (m/s^2, along -z), step of time (s).
+
+    W individuals.
+    """
 
     density: Array
     wind: Array
@@ -86,14 +92,16 @@ class Setting(NamedTuple):
 
 
 class Laws(NamedTuple):
-    """Compiled laws of the effects chosen: functions called by address (:mod:`wingfit.sim.kernels.laws`).
+    """Compiled laws of the effects that are on: functions called by address (:mod:`wingfit.sim.kernels.laws`).
 
-    ``strip`` and ``connector`` [L, 6]: address of the law, number of its parameters and of its states for each strip or
-    connector, their first indices in ``parameters`` [., W] and in the states [Z, W], first index in ``axes``. ``axes``:
-    axis of each state of a connector, 0..5 as in stiffness. ``size`` [Z]: scale of a state in metres. ``point`` [L, 5]:
-    address of the law, number of parameters and of points, first indices in ``parameters`` and among the points, which
-    lie on ``bodies`` [P] at ``arms`` [P, 3, W] (m, body frame). ``motor`` [MOTOR, W] or empty: a compliant drive
-    (:mod:`wingfit.sim.kernels.motor`), whose states are the last.
+    ``strip``, ``connector`` [., 6], one row for each law: address of the law, number of its parameters, number of its
+    states for each strip or connector, index of its first row in ``parameters`` [., W], index of its first state in
+    :class:`State`; last, for strips whether it is also called BEFORE the flow is known (1 or 0), for connectors its
+    first index in ``axes``. ``axes``: axis of each state of a connector, 0..5 as in the stiffness. ``size`` [Z]: factor
+    from each of all Z states to metres of motion. ``point`` [., 5], one row for each law: address, number of
+    parameters, number of points, index of its first row in ``parameters``, index of its first point among all P points,
+    which lie on ``bodies`` [P] at ``arms`` [P, 3, W] from the centre of mass (m, body frame). ``motor`` [MOTOR, W] or
+    empty: a compliant drive (:mod:`wingfit.sim.kernels.motor`), whose states are the last three.
     """
 
     strip: Index
@@ -108,14 +116,16 @@ class Laws(NamedTuple):
 
 
 class Lanes(NamedTuple):
-    """Inputs that differ between individuals.
+    """Inputs that differ between the W individuals of a group.
 
-    Stiffness and damping [C, 6, W], air coefficients [4, W], shares of lift and drag and where they act [N, W]
-    (:mod:`wingfit.sim.kernels.air`), ``hinge`` [9, W]: axis of the driving rods, offset of its true position from that
-    in the rods' frame, and the true position (m). The others are empty for most wings: the stiffness [C, 9, W] that
-    couples rotation with translation; ``pairs`` [P, 3] of bodies (i, j) with the number of their matrix block, whose
-    momenta are coupled by ``masses`` [P, 36, W], the first ``weighing`` of which have weight, while the others are
-    added mass of the air; and the laws of effects, see :mod:`wingfit.sim.kernels.laws`.
+    ``stiffness`` and ``damping`` [C, 6, W] of C connectors (rotation about x, y, z, then translation); air
+    ``coefficients`` [4, W]; ``lift_share`` to ``drag_x`` [N, W]: how lift and drag are distributed to N bodies
+    (:mod:`wingfit.sim.kernels.air`); ``hinge`` [9, W]: unit vector along the axis of the driving rods, then the
+    position of the true hinge relative to the described one, in the rods' frame (m), then its position in the world
+    (m). The others are empty for most wings: ``coupling`` [C, 9, W], stiffness that couples rotation with translation;
+    ``pairs`` [P, 3] of bodies (i, j) with the number of their matrix block, whose momenta are coupled by the mass
+    matrices ``masses`` [P, 36, W], the first ``weighing`` of which have weight, while the others are added mass of the
+    air; and ``laws`` of effects.
     """
 
     stiffness: Array
@@ -134,7 +144,11 @@ class Lanes(NamedTuple):
 
 
 class State(NamedTuple):
-    """Motion of all lanes: rotation [N+2, 9, W], position [N+2, 3, W], twist [N+2, 6, W], effects' states [Z, W]."""
+    """Motion of N bodies and the two driving rods, which are last, of W individuals, and the effects' Z states.
+
+    R [N+2, 9, W]: rotation from body to world; p [N+2, 3, W]: position in the world, m; V [N+2, 6, W]: twist (angular
+    velocity, velocity) in body axes, rad/s and m/s; z [Z, W]. One individual's state has the same arrays without W.
+    """
 
     R: Array
     p: Array
@@ -153,11 +167,13 @@ Work = namedtuple(
 
 
 class Trace(NamedTuple):
-    """Results at n steps of a beat for W lanes (M markers, N bodies).
+    """Results at the n steps of one beat of W individuals (M markers, N bodies).
 
-    ``tracks`` [n, M, 3, W]; ``rods`` [n, 2, 6, W]: wrench of the connectors on the driving rods; ``air`` [n, 3, W]: its
-    force in world axes; ``power`` [n, PORTS, W] into the wing; ``energy`` [n, 3, W]: kinetic, elastic, gravitational.
-    R, p, V, z: the motion of all bodies and rods [n, N+2, ., W] as in :class:`State`, or empty if not requested.
+    ``tracks`` [n, M, 3, W]: positions of the markers in the world, m; ``rods`` [n, 2, 6, W]: moment and force of the
+    wing on the front and the rear driving rod, in the rod's axes (N m, N); ``air`` [n, 3, W]: force of the air on the
+    wing in world axes, N; ``power`` [n, PORTS, W] into the wing through dampers, front motor, rear motor and air, W;
+    ``energy`` [n, 3, W]: kinetic, elastic, gravitational, J. R, p, V, z: the motion of all bodies and rods [n, N+2, .,
+    W] as in :class:`State`, or empty if not requested.
     """
 
     tracks: Array
@@ -172,7 +188,10 @@ class Trace(NamedTuple):
 
 
 def new_work(wiring: Wiring, setting: Setting, lanes: Lanes) -> Work:
-    """Allocate the working arrays for a group of lanes, zero except for the constants, and address them to the laws."""
+    """Allocate the working arrays for a group of W individuals, and store their addresses where the laws read them.
+
+    The arrays are zero except for the constants.
+    """
     n, c, s = len(wiring.mass), len(wiring.first), len(wiring.geometry)
     z, laws = len(lanes.laws.size), lanes.laws
     motion, stages = (n + 2, 6), (STAGES, n + 2, 6)
@@ -211,7 +230,10 @@ def new_work(wiring: Wiring, setting: Setting, lanes: Lanes) -> Work:
 
 
 def _frame_laws(wiring: Wiring, setting: Setting, laws: Laws, work: Work) -> None:
-    """Fill the frame of every law in ``work``: integers, its array sizes and the addresses of its arrays."""
+    """Fill the frame of every law of an effect in ``work``: integers that describe the arrays the law may use.
+
+    These are the sizes and the addresses of its arrays, see :func:`_frame`.
+    """
     air = (work.flow, work.loads, work.induced, wiring.geometry, setting.density, setting.wind, work.clock)
     joints = (work.Q, work.d, work.twist, work.more, work.more_k, work.more_d, work.lost, work.stored)
     for k, row in enumerate(laws.strip):
@@ -229,6 +251,10 @@ def _frame_laws(wiring: Wiring, setting: Setting, laws: Laws, work: Work) -> Non
 
 
 def _frame(places: int, row: Index, arrays: tuple[Array, ...]) -> list[int]:
-    """Numbers of strips, connectors or points (``places``), of parameters and of states, then addresses of arrays."""
+    """Return the FRAME integers of a law's frame: three sizes, then addresses of ``arrays``, padded with zeros.
+
+    ``places``: number of strips, connectors or points; ``row``: the law's row in :class:`Laws`, which has the numbers
+    of its parameters and of its states.
+    """
     found = [places, int(row[1]), int(row[2]), *(array.ctypes.data for array in arrays)]
     return found + [0] * (FRAME - len(found))

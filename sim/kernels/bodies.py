@@ -1,8 +1,10 @@
-"""Poses and inertia of rigid bodies, lane by lane.
+"""Poses and inertia of rigid bodies, for W individuals at a time.
 
-Layout: R [N, 9, W] row-major rotation body -> world, p [N, 3, W] centre of mass in the world, V [N, 6, W] twist
-(omega, v) in the body frame, xi [N, 6, W] local coordinates (theta, d) about the pose at the start of the step:
-R = R0 exp(theta~), p = p0 + R0 d. Wrenches [N, 6, W] are (tau, F) in the body frame at the centre of mass.
+Layout for N bodies: R [N, 9, W] row-major rotation body -> world, p [N, 3, W] centre of mass in the world (m), V [N, 6,
+W] twist (angular velocity omega, velocity v) in the body frame, xi [N, 6, W] local coordinates (rotation vector theta,
+displacement d) about the pose (R0, p0) at the start of the step: R = R0 exp(theta~), p = p0 + R0 d, where theta~ x =
+theta x x is the matrix of the cross product. Wrenches [N, 6, W] are (moment tau, force F) in the body frame at the
+centre of mass. Driving rods, where included, are two more rows.
 """
 
 from __future__ import annotations
@@ -17,10 +19,10 @@ from wingfit.sim.kernels.lanes.vector import Vector, load, load0, store, store0
 
 @kernel
 def move(R0: Array, p0: Array, xi: Array, R: Array, p: Array) -> None:
-    """Set ``R``, ``p`` to the pose at local coordinates ``xi`` about (R0, p0).
+    """Set ``R``, ``p`` to the poses at the local coordinates ``xi`` about the poses (R0, p0); shapes as in this module.
 
-    sin(t)/t and (1 - cos(t))/t^2 are power series in t^2, exact to round-off for t < 1; the integrator treats larger
-    rotations in one step as divergence.
+    sin(t)/t and (1 - cos(t))/t^2 of the rotation angle t are power series in t^2, exact to round-off for t < 1; the
+    integrator treats larger rotations in one step as divergence.
     """
     for n in range(len(xi)):
         x, y, z = load(xi, n, 0), load(xi, n, 1), load(xi, n, 2)
@@ -45,10 +47,10 @@ def move(R0: Array, p0: Array, xi: Array, R: Array, p: Array) -> None:
 
 @inlined
 def body_rate(theta: Three, omega: Three, v: Three) -> tuple[Vector, Vector, Vector, Vector, Vector, Vector]:
-    """Components of theta', then of d': the rates of the local coordinates ``theta`` and d at the twist (omega, v).
+    """Return the six rates theta', d' of the local coordinates (theta, d) of a body with the twist (omega, v).
 
-    theta' = omega + theta x omega / 2 + theta x (theta x omega) / 12, d' = exp(theta~) v. theta is O(step); the series
-    are truncated at an error of fourth order in theta.
+    theta' = omega + theta x omega / 2 + theta x (theta x omega) / 12, d' = exp(theta~) v, with theta in rad. theta is
+    O(step); both series are truncated at an error of fourth order in theta.
     """
     a, b = cross(theta, omega), cross(theta, v)
     c, d = cross(theta, a), cross(theta, b)
@@ -66,7 +68,11 @@ def body_rate(theta: Three, omega: Three, v: Three) -> tuple[Vector, Vector, Vec
 
 @kernel
 def inertial(mass: Array, inertia: Array, R: Array, V: Array, gravity: float, wrench: Array) -> None:
-    """Set the wrench on each body to gravity and the gyroscopic terms -omega x (I omega), -m omega x v."""
+    """Set ``wrench`` to the weight of each body and the gyroscopic terms -omega x (I omega), -m omega x v.
+
+    ``mass`` [N] m (kg), ``inertia`` [N, 9] I (kg m^2), ``gravity`` (m/s^2, along -z of the world); R, V, ``wrench`` as
+    in this module.
+    """
     for n in range(len(mass)):
         m = mass[n]
         i00, i11, i22 = inertia[n, 0], inertia[n, 4], inertia[n, 8]
@@ -82,7 +88,10 @@ def inertial(mass: Array, inertia: Array, R: Array, V: Array, gravity: float, wr
 
 @kernel
 def times_mass(mass: Array, inertia: Array, V: Array, out: Array) -> None:
-    """Add M V to ``out``: momentum of each body in its own frame."""
+    """Add the momentum M V of each body, in its own frame, to ``out`` [N, 6, W] (angular, then linear).
+
+    M: ``mass`` [N] (kg) and ``inertia`` [N, 9] (kg m^2); ``V`` [N, 6, W]: twists.
+    """
     for n in range(len(mass)):
         m = mass[n]
         i00, i11, i22 = inertia[n, 0], inertia[n, 4], inertia[n, 8]
@@ -100,7 +109,10 @@ def times_mass(mass: Array, inertia: Array, V: Array, out: Array) -> None:
 def kinetic_and_height(
     mass: Array, inertia: Array, p: Array, V: Array, gravity: float, kinetic: Array, potential: Array
 ) -> None:
-    """Set ``kinetic`` to 1/2 V^T M V and ``potential`` to m g z, summed over all bodies (both [W], J)."""
+    """Set ``kinetic`` to 1/2 V^T M V and ``potential`` to m g z, summed over all bodies (both [W], J).
+
+    z is the height of the body's centre of mass, from ``p`` [N, 3, W] (m); other arguments as in :func:`inertial`.
+    """
     kinetic[:] = 0.0
     potential[:] = 0.0
     momentum = np.zeros_like(V)
@@ -113,7 +125,10 @@ def kinetic_and_height(
 
 @kernel
 def track(markers: Array, carrier: Index, R: Array, p: Array, out: Array) -> None:
-    """Set ``out`` [M, 3, W] to world positions of markers at ``markers`` [M, 3] in the frames of bodies ``carrier``."""
+    """Set ``out`` [M, 3, W] to the world positions (m) of M markers at ``markers`` [M, 3] on the bodies ``carrier``.
+
+    ``markers`` are relative to the centre of mass, in the frame of the body ``carrier`` [M]; R, p: poses of the bodies.
+    """
     for m in range(len(carrier)):
         n = carrier[m]
         x, y, z = markers[m, 0], markers[m, 1], markers[m, 2]

@@ -1,4 +1,7 @@
-"""Coordinates of one individual's state relative to a pose, and back; used by the search for a periodic motion."""
+"""Convert one individual's state to coordinates relative to a given pose, and back.
+
+The search for a periodic motion (``wingfit.sim.solver.periodic``) works with these coordinates.
+"""
 
 from __future__ import annotations
 
@@ -13,10 +16,11 @@ LENGTH = 0.1  # m, about a chord; converts rotations to displacements
 
 @kernel
 def coordinates(about: State, state: State, rate: float, sizes: Array, out: Array) -> None:
-    """Fill ``out`` [12 N + Z] with coordinates (m) of ``state`` relative to the pose ``about``, without the rods.
+    """Fill ``out`` [12 N + Z] with coordinates (m) of ``state`` relative to the pose of the state ``about``.
 
-    For each body: rotation vector times LENGTH, displacement, angular velocity times LENGTH over ``rate`` (rad/s),
-    velocity over ``rate``; then the effects' states times ``sizes`` [Z]. The arrays of both states have no lanes.
+    N bodies without the driving rods, Z states of effects. For each body: rotation vector times LENGTH, displacement,
+    angular velocity times LENGTH over ``rate`` (rad/s, of the beat), velocity over ``rate``; then the effects' states
+    times ``sizes`` [Z]. Both states are those of one individual: their arrays lack the axis of individuals.
     """
     bodies = len(state.V) - 2
     for n in range(bodies):
@@ -33,7 +37,10 @@ def coordinates(about: State, state: State, rate: float, sizes: Array, out: Arra
 
 @kernel
 def displaced(about: State, x: Array, rate: float, sizes: Array, state: State) -> None:
-    """Set ``state`` from its coordinates ``x`` [12 N + Z] (:func:`coordinates`); its driving rods are not changed."""
+    """Set ``state`` from its coordinates ``x`` [12 N + Z]: the inverse of :func:`coordinates`.
+
+    ``about``, ``rate`` and ``sizes`` as there; the driving rods in ``state`` are not changed.
+    """
     bodies = len(state.V) - 2
     for n in range(bodies):
         k = 12 * n
@@ -48,7 +55,7 @@ def displaced(about: State, x: Array, rate: float, sizes: Array, state: State) -
 
 @inlined
 def rotation_vector(first: Array, second: Array) -> tuple[float, float, float]:
-    """Rotation vector (rad) of first^T second, for rotation matrices [9], by the unit quaternion.
+    """Return the rotation vector (rad) of first^T second, for two rotation matrices [9], by the unit quaternion.
 
     The quaternion's largest component is computed first and the others from it, for accuracy at any angle (Shepperd, J.
     Guidance and Control 1, 1978).
@@ -72,7 +79,7 @@ def rotation_vector(first: Array, second: Array) -> tuple[float, float, float]:
 
 @inlined
 def _column(first: Array, second: Array, k: int) -> tuple[float, float, float]:
-    """Column k of first^T second, for matrices [9] row by row."""
+    """Return column ``k`` of first^T second, for matrices [9] row by row."""
     u, v, w = second[k], second[3 + k], second[6 + k]
     return (
         first[0] * u + first[3] * v + first[6] * w,
@@ -83,7 +90,10 @@ def _column(first: Array, second: Array, k: int) -> tuple[float, float, float]:
 
 @inlined
 def turn(first: Array, x: float, y: float, z: float, out: Array) -> None:
-    """Set ``out`` [9] to ``first`` [9] exp([x, y, z]~), the rotation vector (x, y, z) in rad (Rodrigues 1840)."""
+    """Set ``out`` [9] to the rotation matrix ``first`` [9] turned by the rotation vector (x, y, z) (rad).
+
+    This is first exp([x, y, z]~), ~ being the matrix of the cross product (Rodrigues 1840).
+    """
     angle = math.sqrt(x * x + y * y + z * z)
     half = 0.5 * angle
     once = math.sin(angle) / angle if angle > 0 else 1.0

@@ -1,10 +1,11 @@
-"""The 6-D springs and dampers between bodies (thesis Eqs. 4-7), lane by lane.
+"""The 6-D springs and dampers between bodies (van der Grinten's thesis, Eqs. 4-7), for W individuals at a time.
 
-A connector joins frame A on body ``first`` (at arm a) to frame B on body ``second`` (at arm b), both aligned with
-their bodies. Q = R_A^T R_B and d = R_A^T (o_B - o_A) are B's pose in A. Energies (physics of the spring):
-V_o = -tr(G_o Q) + tr(G_o), V_t = 1/4 d^T K_t d + 1/4 d^T Q K_t Q^T d and, where rotation and translation are coupled,
-V_c = tr(G_c Q^T d~), signed so that it is phi^T K_c d for small rotations phi. The wrench on B, in A's axes at o_B, is
-minus their gradient; that on A balances it.
+A connector joins frame A on body ``first`` (at the arm a from its centre of mass) to frame B on body ``second`` (at arm
+b), both aligned with their bodies. Q = R_A^T R_B and d = R_A^T (o_B - o_A) are B's pose in A; o_A, o_B are the origins
+of the frames, K_o, K_t, K_c the stiffness of rotation, of translation and of the coupling between them, and G = tr(K) /
+2 - K for each. Energies of the spring: V_o = -tr(G_o Q) + tr(G_o), V_t = 1/4 d^T K_t d + 1/4 d^T Q K_t Q^T d and, where
+rotation and translation are coupled, V_c = tr(G_c Q^T d~), signed so that it is phi^T K_c d for small rotations phi.
+The wrench on B, in A's axes at o_B, is minus their gradient; that on A balances it.
 """
 
 from __future__ import annotations
@@ -37,7 +38,11 @@ from wingfit.sim.kernels.lanes.vector import Vector, load, load0, store, store0
 
 @kernel
 def relative_pose(first: Index, second: Index, a: Array, b: Array, R: Array, p: Array, Q: Array, d: Array) -> None:
-    """Set Q [C, 9, W] and d [C, 3, W], rotation and position of frame B in frame A, of every connector."""
+    """Set Q [C, 9, W] and d [C, 3, W] (m), rotation and position of frame B in frame A, of each of C connectors.
+
+    ``first``, ``second`` [C]: bodies that carry A and B, at the arms ``a``, ``b`` [C, 3] (m); R, p: poses of all
+    bodies.
+    """
     for c in range(len(first)):
         i, j = first[c], second[c]
         back, B, bx, by, bz = transposed(load_matrix(R, i)), load_matrix(R, j), b[c, 0], b[c, 1], b[c, 2]
@@ -50,9 +55,10 @@ def relative_pose(first: Index, second: Index, a: Array, b: Array, R: Array, p: 
 
 @inlined
 def spring_wrench(Q: Nine, d: Three, ko: Three, kt: Three) -> tuple[Three, Three, Vector]:
-    """Moment and force of the spring on B in A's axes at o_B, and its energy, by thesis Eqs. 5-7.
+    """Return moment and force of the spring on B, in A's axes at o_B, and its energy, by thesis Eqs. 5-7.
 
-    ``ko`` and ``kt``: stiffness of rotation about and of translation along the axes.
+    Q, d: pose of B in A; ``ko`` and ``kt``: stiffness of rotation about and of translation along the axes (N m/rad,
+    N/m).
     """
     g = co_stiffness(ko)
     x, y, z = d
@@ -75,7 +81,10 @@ def spring_wrench(Q: Nine, d: Three, ko: Three, kt: Three) -> tuple[Three, Three
 
 @inlined
 def coupling_wrench(N: Nine, d: Three) -> tuple[Three, Three, Vector]:
-    """Moment, force and energy of the coupling stiffness, with N = Q G_c: V_c = n . d for n~ = N - N^T."""
+    """Return moment and force on B, and energy, of the stiffness that couples rotation with translation.
+
+    N = Q G_c, d: position of B in A. The energy V_c is n . d, where n~ = N - N^T.
+    """
     n = axial(N)
     t = times(transposed(trace_minus(N)), d)
     return negative(t), negative(n), n[0] * d[0] + n[1] * d[1] + n[2] * d[2]
@@ -85,10 +94,11 @@ def coupling_wrench(N: Nine, d: Three) -> tuple[Three, Three, Vector]:
 def relative_twist(
     Q: Nine, e: Three, arm: Three, omega: Three, velocity: Three, turning: Three, v: Three
 ) -> tuple[Three, Three]:
-    """Angular and linear velocity of B relative to A at o_B, in A's axes.
+    """Return the angular and the linear velocity of frame B relative to A, at o_B in A's axes (rad/s, m/s).
 
-    ``omega``, ``velocity`` are the first body's; ``turning`` is the second's angular velocity in A's axes, ``v`` its
-    velocity in its own; e and ``arm`` lead from the two centres to o_B, in A's axes.
+    ``omega``, ``velocity``: twist of the first body; ``turning``: the second body's angular velocity in A's axes;
+    ``v``: its velocity in its own axes; ``e`` and ``arm``: vectors from the centres of the first and of the second body
+    to o_B, in A's axes (m). Q: rotation of B in A.
     """
     moving = added(times(Q, v), cross(turning, arm))
     return less(turning, omega), less(less(moving, velocity), cross(omega, e))
@@ -96,7 +106,10 @@ def relative_twist(
 
 @inlined
 def damper_wrench(rate: Three, slide: Three, do: Three, dt: Three) -> tuple[Three, Three]:
-    """Moment ``do`` times ``rate`` (rad/s) and force ``dt`` times ``slide`` (m/s), against the motion (Eq. 4)."""
+    """Return the moment ``do`` times ``rate`` (rad/s) and the force ``dt`` times ``slide`` (m/s), axis by axis (Eq. 4).
+
+    The damper exerts minus these on the second body.
+    """
     return ((do[0] * rate[0], do[1] * rate[1], do[2] * rate[2]), (dt[0] * slide[0], dt[1] * slide[1], dt[2] * slide[2]))
 
 
@@ -105,11 +118,12 @@ def connect(
     first: Index, second: Index, a: Array, b: Array, K: Array, D: Array, coupling: Array, more: Array, Q_: Array,
     d_: Array, V: Array, wrench: Array, dissipated: Array, stored: Array,
 ) -> None:  # fmt: skip
-    """Add spring and damper wrenches to both bodies; add up the power lost in dampers and the energy of springs.
+    """Add the wrenches of springs and dampers to ``wrench`` [N+2, 6, W] of both bodies of every connector.
 
-    K, D [C, 6, W]: stiffness and damping (rotation about x, y, z, then translation along x, y, z of A); coupling
-    [C, 9, W]: the symmetric K_c between them, row by row, and ``more`` [C, 6, W]: another wrench on the second body;
-    both may be empty.
+    K, D [C, 6, W]: stiffness and damping (rotation about x, y, z, then translation along x, y, z of A); ``coupling``
+    [C, 9, W]: the symmetric stiffness K_c between rotation and translation, row by row, and ``more`` [C, 6, W]: another
+    wrench on the second body; both may be empty. ``Q_``, ``d_``: from :func:`relative_pose`. The power lost in the
+    dampers is added to ``dissipated`` [W] (W), the energy of the springs to ``stored`` [W] (J).
     """
     for c in range(len(first)):
         i, j = first[c], second[c]
@@ -140,7 +154,10 @@ def connect(
 
 @kernel
 def twists(first: Index, second: Index, a: Array, b: Array, Q: Array, d: Array, V: Array, out: Array) -> None:
-    """Set ``out`` [C, 6, W] to the twist J V of each second body relative to the first at o_B, in A's axes."""
+    """Set ``out`` [C, 6, W] to the twist J V of each second body relative to the first, at o_B in A's axes.
+
+    V [N+2, 6, W]: twists of all bodies; Q, d: from :func:`relative_pose`.
+    """
     for c in range(len(first)):
         i, j = first[c], second[c]
         q, x = load_matrix(Q, c), load_vector(d, c, 0)
@@ -156,9 +173,10 @@ def twists(first: Index, second: Index, a: Array, b: Array, Q: Array, d: Array, 
 def add_turned(
     first: Index, second: Index, a: Array, b: Array, Q: Array, d: Array, V: Array, X: Array, out: Array
 ) -> None:
-    """Add to ``out`` [C, 6, W] the change B J X of the relative twists due to displacements X of the bodies.
+    """Add to ``out`` [C, 6, W] the change B J X of the relative twists that small displacements X cause.
 
-    B and J are those of :mod:`wingfit.sim.kernels.tangents`.
+    X, V [N+2, 6, W]: displacements and twists of the bodies; the matrices B and J are those of
+    :mod:`wingfit.sim.kernels.tangents`.
     """
     for c in range(len(first)):
         i, j = first[c], second[c]
@@ -175,7 +193,10 @@ def add_turned(
 
 @kernel
 def push_apart(first: Index, second: Index, a: Array, b: Array, Q: Array, d: Array, push: Array, wrench: Array) -> None:
-    """Subtract the wrench ``push`` [C, 6, W] (at o_B, A's axes) from that on B, and its reaction from that on A."""
+    """Subtract the wrench ``push`` [C, 6, W] (at o_B, A's axes) from that on each body B; add it to that on A.
+
+    ``wrench`` [N+2, 6, W]: of all bodies, at their centres in their own axes; it is changed in place.
+    """
     for c in range(len(first)):
         i, j = first[c], second[c]
         q, x = load_matrix(Q, c), load_vector(d, c, 0)
@@ -189,9 +210,10 @@ def push_apart(first: Index, second: Index, a: Array, b: Array, Q: Array, d: Arr
 def tangent(
     first: Index, second: Index, a: Array, b: Array, C: Array, Q: Array, d: Array, X: Array, out: Array
 ) -> None:
-    """Subtract J^T C J X from ``out`` for twists or displacements X of the bodies; C [C, 6, W] is a diagonal.
+    """Subtract J^T C J X from ``out`` [N+2, 6, W], for twists or displacements X [N+2, 6, W] of the bodies.
 
-    J maps twists of the bodies to the relative twist of B in A. This is the material stiffness (or damping) only.
+    J maps motions of the bodies to the relative motion of B in A; C [C, 6, W], stiffness or damping, is diagonal. Terms
+    that arise because the wrench turns with the bodies (geometric stiffness) are not included.
     """
     for c in range(len(first)):
         i, j = first[c], second[c]

@@ -1,10 +1,12 @@
-"""Rosenbrock integration of the wing over its beats, eight individuals at a time.
+"""Rosenbrock integration of the wing over a beat, for eight individuals at a time.
 
 The method is RODAS4P2 (Steinebach, *Improvement of Rosenbrock-Wanner Method RODASP*, 2020): six stages, fourth order,
 L-stable, stiffly accurate, without order reduction on stiff problems and robust to an inexact Jacobian. The Jacobian is
 exact except for the air, of which it contains the damping along the normal. Driving rods are bodies with prescribed
 acceleration, so that the stages are consistent for the stiff connectors at the root; their pose is set to the exact
-profile at the start of each step.
+profile of the drive at the start of each step. The arguments ``wiring``, ``setting``, ``lanes``, ``state`` and
+``trace`` are described in :mod:`wingfit.sim.kernels.arrays`; ``work`` holds the working arrays, W is the number of
+individuals.
 """
 
 from __future__ import annotations
@@ -63,10 +65,12 @@ MAX_ROTATION = 1.0  # rad in one step; above, the individual has diverged
 
 @kernel
 def set_rods(rods: Array, hinge: Array, state: State) -> None:
-    """Put the driving rods at angle and rate ``rods`` [2, 3, W] (angle, rate, acceleration) about the hinge.
+    """Set the pose and twist of both driving rods in ``state`` from their angle and rate ``rods`` [2, 3, W].
 
-    R = c I + s u~ + (1 - c) u u^T about the axis u; with the hinge at an offset ``off`` in the rods'
-    frame, that frame moves on a circle about the hinge: p = place - R off, v = -u rate x off.
+    ``rods`` holds angle (rad), rate and acceleration of the front and rear rod; ``hinge`` [9, W]: the axis u, the
+    offset ``off`` of the true hinge in the rods' frame, and its ``place`` in the world (m). R = c I + s u~ + (1 - c) u
+    u^T, c and s being cosine and sine of the angle; the rods' frame moves on a circle about the hinge: p = place - R
+    off, v = -u rate x off.
     """
     n = len(state.R) - 2
     u, off = (load1(hinge, 0), load1(hinge, 1), load1(hinge, 2)), (load1(hinge, 3), load1(hinge, 4), load1(hinge, 5))
@@ -88,7 +92,11 @@ def set_rods(rods: Array, hinge: Array, state: State) -> None:
 
 @kernel
 def forces(wiring: Wiring, setting: Setting, lanes: Lanes, work: Work) -> None:
-    """Set ``work.wrench`` of all bodies and rods and the rates of the effects' states, for the motion in ``work``."""
+    """Compute ``work.wrench`` of all bodies and rods and ``work.z_rate`` of the effects' states.
+
+    Pose, twist and states are read from ``work``; powers and energies (``lost``, ``stored``, ``air_power``) and the
+    force of the air are also set.
+    """
     n = len(wiring.mass)
     w_, Q, d, laws = work.wrench, work.Q, work.d, lanes.laws
     relative_pose(wiring.first, wiring.second, wiring.a, wiring.b, work.R, work.p, Q, d)
@@ -126,7 +134,7 @@ def forces(wiring: Wiring, setting: Setting, lanes: Lanes, work: Work) -> None:
 def point_forces(lanes: Lanes, work: Work) -> None:
     """Call the effects' laws that act at points of bodies, and add their wrenches to ``work.wrench``.
 
-    The laws themselves add the power that they dissipate and the energy that they store to ``lost`` and ``stored``.
+    The laws add the power that they dissipate and the energy that they store to ``work.lost`` and ``work.stored``.
     """
     laws = lanes.laws
     work.point_wrench[:] = 0.0
@@ -140,7 +148,7 @@ def point_forces(lanes: Lanes, work: Work) -> None:
 
 @kernel
 def airflow(wiring: Wiring, setting: Setting, lanes: Lanes, work: Work) -> None:
-    """Set ``work.flow`` and ``work.loads`` of all strips, with the contributions of the effects' laws of the air."""
+    """Set the flow ``work.flow`` and loads ``work.loads`` of all strips, including the effects' laws of the air."""
     laws = lanes.laws
     work.induced[:] = 0.0
     for k in range(len(laws.strip)):
@@ -158,7 +166,7 @@ def airflow(wiring: Wiring, setting: Setting, lanes: Lanes, work: Work) -> None:
 def record_step(wiring: Wiring, setting: Setting, lanes: Lanes, work: Work, trace: Trace, t: int) -> None:
     """Store motion, rods' load, air force, powers and energies at the start of step ``t`` in ``trace``.
 
-    They are not stored at the stages, where stiff springs are far from their values at the ends of the step.
+    The values at the stages within a step are not stored, because stiff springs are far from their true values there.
     """
     n, power = len(wiring.mass), trace.power[t]
     store1(power, arrays.DAMPERS, -load0(work.lost))
@@ -187,7 +195,8 @@ def record_step(wiring: Wiring, setting: Setting, lanes: Lanes, work: Work, trac
 def linearise(wiring: Wiring, setting: Setting, lanes: Lanes, work: Work) -> None:
     """Assemble and factor the matrix S of the equations of all stages of a step, at the start of the step.
 
-    S is defined in ``wingfit.sim.kernels.tangents``.
+    S is defined in ``wingfit.sim.kernels.tangents``. The pose, the twist and the derivatives for which it holds are
+    copied to the arrays of ``work`` whose names end in 0.
     """
     hg = setting.step * GAMMA
     work.Q0[:] = work.Q
@@ -218,11 +227,12 @@ def linearise(wiring: Wiring, setting: Setting, lanes: Lanes, work: Work) -> Non
 
 @kernel
 def solve_stage(wiring: Wiring, setting: Setting, lanes: Lanes, work: Work, rods: Array, stage: int) -> None:
-    """Solve the stage for U_V, U_xi and U_z; ``rods`` [2, 3, W]: angle, rate and acceleration of the driving rods.
+    """Solve one stage for the increments U_V (twists), U_xi (local coordinates) and U_z (effects' states).
 
-    With the right-hand side f of the equations and r = f + sum of COUPLING U / h, Y = U_xi / (h gamma) solves S Y = M
-    (r_V + r_xi / (h gamma)) - dW/dV r_xi, and U_V = (I - h gamma A) Y - r_xi. The rods' Y is known, their acceleration
-    being prescribed.
+    ``rods`` [2, 3, W]: angle, rate and acceleration of the driving rods at the stage. With the right-hand side f of the
+    equations and r = f + sum of COUPLING U / h (h: step), Y = U_xi / (h gamma) solves S Y = M (r_V + r_xi / (h gamma))
+    - dW/dV r_xi, and U_V = (I - h gamma A) Y - r_xi; A, M, S and W are those of :mod:`wingfit.sim.kernels.tangents`.
+    The rods' Y is known, their acceleration being prescribed.
     """
     n, hg, k = len(wiring.mass), setting.step * GAMMA, wiring.driven
     r_xi, wrench, known = work.r_xi, work.wrench, work.known
@@ -250,7 +260,10 @@ def solve_stage(wiring: Wiring, setting: Setting, lanes: Lanes, work: Work, rods
 
 @kernel
 def _to_stage(work: Work, state: State, stage: int) -> None:
-    """Set local coordinates, twist, effects' states and pose in ``work`` to those at which ``stage`` is evaluated."""
+    """Set local coordinates, twist, effects' states and pose in ``work`` to the point where ``stage`` is evaluated.
+
+    ``state``: the motion at the start of the step; ``stage`` = STAGES gives the end of the step.
+    """
     if stage < STAGES - 1:
         combine(0.0, state.V, work.U_xi, STAGE[stage], stage, work.xi)
         combine(1.0, state.V, work.U_V, STAGE[stage], stage, work.V)
@@ -267,7 +280,10 @@ def _to_stage(work: Work, state: State, stage: int) -> None:
 
 @kernel
 def _set_clock(clock: Array, turn: float, t: int, stage: int) -> None:
-    """Set in ``clock`` the drive phase of a stage of step ``t``, which the laws read; a step is ``turn`` (rad)."""
+    """Set in ``clock`` [CLOCK, W] the drive phase of ``stage`` of step ``t``, which the effects' laws read.
+
+    ``turn``: drive phase that passes in a step, rad.
+    """
     clock[arrays.NOW] = turn * (t + NODES[stage])
     clock[arrays.START] = turn * t
     clock[arrays.SHARE] = turn * SLOPES[stage]
@@ -275,7 +291,10 @@ def _set_clock(clock: Array, turn: float, t: int, stage: int) -> None:
 
 @allocating
 def finish_step(work: Work, state: State, alive: Mask) -> None:
-    """Set ``state`` to the end of the step, and ``alive`` to False for lanes that rotated too far or are NaN."""
+    """Set ``state`` to the end of the step, and ``alive`` [W] to False for individuals that diverged in it.
+
+    These are the ones of which a body rotated by more than MAX_ROTATION, or became NaN.
+    """
     _to_stage(work, state, STAGES)
     state.R[:] = work.R
     state.p[:] = work.p
@@ -292,12 +311,13 @@ def finish_step(work: Work, state: State, alive: Mask) -> None:
 def advance(
     wiring: Wiring, setting: Setting, lanes: Lanes, drive: Array, work: Work, state: State, trace: Trace, alive: Mask
 ) -> None:
-    """Integrate one beat of n steps from ``state``, in place.
+    """Integrate one beat of n steps from ``state``, in place, and store the motion at every step in ``trace``.
 
-    ``drive`` [n, STAGES, 2, 3, W]: angle, rate and acceleration of both rods at the stages of every step (six
-    columns instead of three for a compliant drive, see :func:`wingfit.sim.kernels.motor.rods_of`). Angle and rate are
-    used at the start of the step only; within it they follow from the acceleration. Lanes whose bodies rotate more than
-    MAX_ROTATION in a step, or become NaN, are set to False in ``alive``; they are computed further but not used.
+    ``drive`` [n, STAGES, 2, 3, W]: angle, rate and acceleration of both rods at the stages of every step (six columns
+    instead of three for a compliant drive, see :func:`wingfit.sim.kernels.motor.rods_of`). Angle and rate are used at
+    the start of the step only; within the step they follow from the acceleration. Individuals whose bodies rotate more
+    than MAX_ROTATION in a step, or become NaN, are set to False in ``alive`` [W]; their further results are
+    meaningless.
     """
     for t in range(len(drive)):
         rods = drive[t, 0]

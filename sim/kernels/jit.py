@@ -1,4 +1,6 @@
-"""Compilation of kernels: cached on disk; fused multiply-add is allowed, but no other change of the arithmetic.
+"""Compile kernels with numba and cache them on disk.
+
+Fused multiply-add is allowed, but no other change of the arithmetic.
 
 Numba's cache checks only the file of the cached function, although a kernel contains functions of other files: after a
 change there, outdated code would run. The cache folder is therefore named after a hash of the source of all kernels.
@@ -25,17 +27,17 @@ _MAX_VERSIONS = 8  # versions of the kernels whose compiled code is stored
 
 
 def kernel(function: F) -> F:
-    """Compile a function over groups of lanes that allocates no array; cached on disk by the source of all kernels.
+    """Compile ``function``, which works on arrays of eight individuals and allocates no array, and cache it on disk.
 
-    It is compiled without reference counting, which would take a third of the time of a small wing's step. Functions
-    that allocate or copy whole arrays need :func:`allocating`. OSError if no folder for the cache is writable;
-    RuntimeError if numba uses another folder.
+    The cache depends on the source of all kernels. The function is compiled without reference counting, which would
+    take a third of the time of a small wing's step. Functions that allocate or copy whole arrays need
+    :func:`allocating`. OSError if no folder for the cache is writable; RuntimeError if numba uses another folder.
     """
     return _compiled(function, counting=False)
 
 
 def allocating(function: F) -> F:
-    """As :func:`kernel`, for a function that allocates or copies whole arrays."""
+    """Compile ``function`` like :func:`kernel`, but with reference counting, so that it may allocate or copy arrays."""
     return _compiled(function, counting=True)
 
 
@@ -50,7 +52,7 @@ def _compiled(function: F, *, counting: bool) -> F:
 
 
 def _check(function: Callable[..., object], path: str, folder: Path) -> None:
-    """RuntimeError if numba does not use the requested cache folder."""
+    """Raise RuntimeError if numba caches ``function`` at ``path`` rather than in the requested ``folder``."""
     if not Path(path).is_relative_to(folder):
         raise RuntimeError(
             f"numba {numba.__version__} caches {function.__qualname__!r} in {path} instead of {folder}: "
@@ -59,7 +61,10 @@ def _check(function: Callable[..., object], path: str, folder: Path) -> None:
 
 
 def callback(function: F, signature: Any) -> Any:
-    """Compile a function that is called by address; cached on disk by the source of its file and of all kernels."""
+    """Compile ``function`` to be called by its address with arguments of the numba type ``signature``.
+
+    It is cached on disk under a hash of the source of its file and of all kernels. Returns numba's compiled function.
+    """
     folder = _cache_folder(Path(inspect.getfile(function)).resolve())
     with _cached_in(folder):
         compiled = numba.cfunc(signature, cache=True, fastmath={"contract"}, error_model="numpy", nogil=True)(function)
@@ -68,16 +73,16 @@ def callback(function: F, signature: Any) -> Any:
 
 
 def inlined(function: F) -> F:
-    """Compile a small function into each kernel that calls it."""
+    """Compile a small function whose code is copied into each kernel that calls it, so that a call costs nothing."""
     return cast(F, numba.njit(forceinline=True, fastmath={"contract"}, error_model="numpy")(function))
 
 
 @cache
 def _cache_folder(source: Path) -> Path:
-    """Cache folder for the kernels of ``source``, a file or folder, named after a hash of the sources.
+    """Create, if needed, and return the cache folder for the kernels of ``source``, a file or folder.
 
-    The hash includes this folder, and ``source``: all files of a folder; for a file also those next to it whose names
-    start with an underscore, which contain shared code.
+    It is named after a hash of the sources: those of this folder and of ``source``, which means all files of a folder,
+    or a file and its neighbours whose names start with an underscore (shared code). OSError if no folder is writable.
     """
     digest = hashlib.sha256()
     alone = source.is_file()
@@ -107,7 +112,7 @@ def _cache_folder(source: Path) -> Path:
 
 
 def _start_with(shipped: Path, folder: Path) -> None:
-    """Copy the compiled kernels ``shipped``, part of a read-only installation, to a ``folder`` that does not exist yet.
+    """Copy the compiled kernels in ``shipped``, part of a read-only installation, to ``folder`` if that does not exist.
 
     They are copied to another name and renamed, since other processes may read the folder at any time.
     """
@@ -123,9 +128,10 @@ def _start_with(shipped: Path, folder: Path) -> None:
 
 
 def _forget_old(place: Path) -> None:
-    """Remove all but the most recently used folders; a process that still needs one creates it again.
+    """Remove all but the _MAX_VERSIONS most recently used folders of compiled kernels in the folder ``place``.
 
-    Other processes may do the same: a folder that has disappeared counts as oldest.
+    A process that still needs a removed folder creates it again. Other processes may remove folders at the same time: a
+    folder that has disappeared counts as oldest.
     """
     folders = sorted(place.glob("kernels-*"), key=_last_used)
     for folder in folders[:-_MAX_VERSIONS]:
@@ -141,7 +147,7 @@ def _last_used(folder: Path) -> float:
 
 @contextmanager
 def _cached_in(folder: Path) -> Iterator[None]:
-    """Set NUMBA_CACHE_DIR, which numba reads when a function is decorated."""
+    """Context in which ``numba.config.CACHE_DIR``, which numba reads when it decorates a function, is ``folder``."""
     before = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(folder)
     try:

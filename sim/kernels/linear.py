@@ -1,10 +1,10 @@
-"""The block-sparse linear system of a step, solved by block LU.
+"""Solve the block-sparse linear system of a step by block LU, for W individuals at a time.
 
 The matrix is not symmetric, because dampers and the moments of wrenches turn with the bodies. It is eliminated in 6 x 6
-blocks, without exchanging rows: inertia and damping make the diagonal dominant. ``blocks`` [NB, 36, W] (W lanes) holds
-the N diagonal blocks, then those below the diagonal (rows eliminated later, including fill), then as many above it, in
-the same order, and last the columns of the driving rods, which are known and not factored.
-``wingfit.sim.solver.elimination`` lists the blocks and the products to subtract, in the order of elimination.
+blocks, without exchanging rows: inertia and damping make the diagonal dominant. ``blocks`` [NB, 36, W] (NB blocks, row
+by row) holds the N diagonal blocks, one for each body, then those below the diagonal (rows eliminated later, including
+fill), then as many above it, in the same order, and last the columns of the driving rods, which are known and not
+factored. ``wingfit.sim.solver.elimination`` lists the blocks and the products to subtract, in the order of elimination.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ from wingfit.sim.kernels.lanes.vector import Vector, load, load1, store, store1
 
 @inlined
 def _row(A: Array, i: int) -> tuple[Vector, Vector, Vector, Vector, Vector, Vector]:
-    """Elements i to i + 5 of a block [36, W]."""
+    """Load elements i to i + 5 of a block [36, W]."""
     return load1(A, i), load1(A, i + 1), load1(A, i + 2), load1(A, i + 3), load1(A, i + 4), load1(A, i + 5)
 
 
 @inlined
 def _set_row(A: Array, i: int, x: Any) -> None:
-    """Put six vectors into the elements i to i + 5 of a block [36, W]."""
+    """Store six vectors ``x`` as the elements i to i + 5 of a block [36, W]."""
     store1(A, i, x[0])
     store1(A, i + 1, x[1])
     store1(A, i + 2, x[2])
@@ -35,7 +35,7 @@ def _set_row(A: Array, i: int, x: Any) -> None:
 
 @inlined
 def _minus(x: Any, m: Vector, y: Any) -> Any:
-    """x - m y, of six vectors each."""
+    """Return x - m y, for ``x`` and ``y`` of six vectors each."""
     a, b, c = x[0] - m * y[0], x[1] - m * y[1], x[2] - m * y[2]
     return a, b, c, x[3] - m * y[3], x[4] - m * y[4], x[5] - m * y[5]
 
@@ -58,7 +58,7 @@ def _invert(A: Array) -> None:
 
 @kernel
 def _times_inverse(A: Array, D: Array) -> None:
-    """A <- A D for 6 x 6 blocks [36, W], one row of A at a time."""
+    """Replace A by A D for 6 x 6 blocks [36, W], one row of A at a time; D is already inverted."""
     for i in range(0, 36, 6):
         a0, a1, a2 = load1(A, i), load1(A, i + 1), load1(A, i + 2)
         a3, a4, a5 = load1(A, i + 3), load1(A, i + 4), load1(A, i + 5)
@@ -70,7 +70,10 @@ def _times_inverse(A: Array, D: Array) -> None:
 
 @kernel
 def _subtract_product(A: Array, B: Array, C: Array) -> None:
-    """C <- C - A B for 6 x 6 blocks [36, W], two rows of C at a time, to use both arithmetic units."""
+    """Replace C by C - A B for 6 x 6 blocks [36, W].
+
+    Two rows of C are computed at a time, to use both arithmetic units of the processor.
+    """
     for i in range(0, 36, 12):
         c, d = _row(C, i), _row(C, i + 6)
         for k in range(6):
@@ -82,10 +85,11 @@ def _subtract_product(A: Array, B: Array, C: Array) -> None:
 
 @kernel
 def factor(order: Index, start: Index, below: Index, products: Index, product_start: Index, blocks: Array) -> None:
-    """Block LU in place: inverses on the diagonal, L = A D^-1 below it, U above.
+    """Replace ``blocks`` by their block LU factors: inverses on the diagonal, L = A D^-1 below it, U above.
 
-    ``below[start[k]:start[k + 1]]`` are the blocks under the diagonal block of body order[k]; the products to subtract
-    after it are rows ``product_start[k]:product_start[k + 1]`` of ``products`` (target, left, right).
+    ``order`` [N]: bodies in the order of elimination; ``below[start[k]:start[k + 1]]``: numbers of the blocks under the
+    diagonal block of body order[k]; rows ``product_start[k]:product_start[k + 1]`` of ``products`` [., 3] (target,
+    left, right: numbers of blocks): the products to subtract after its elimination.
     """
     for k in range(len(order)):
         n = order[k]
@@ -98,7 +102,7 @@ def factor(order: Index, start: Index, below: Index, products: Index, product_st
 
 @kernel
 def subtract_column(row: int, m: int, blocks: Array, known: Array, column: int, x: Array) -> None:
-    """x[row] <- x[row] - block m times ``known[column]``; ``x`` and ``known`` [., 6, W]."""
+    """Subtract block ``m`` of ``blocks`` times ``known[column]`` from ``x[row]``; ``x`` and ``known`` are [., 6, W]."""
     y0, y1, y2 = load(known, column, 0), load(known, column, 1), load(known, column, 2)
     y3, y4, y5 = load(known, column, 3), load(known, column, 4), load(known, column, 5)
     for i in range(6):
@@ -109,7 +113,7 @@ def subtract_column(row: int, m: int, blocks: Array, known: Array, column: int, 
 
 @kernel
 def _times_block(m: int, blocks: Array, n: int, x: Array) -> None:
-    """x[n] <- block m times x[n]."""
+    """Replace x[n] by block ``m`` of ``blocks`` times x[n]; ``x`` is [., 6, W]."""
     y0, y1, y2, y3, y4, y5 = load(x, n, 0), load(x, n, 1), load(x, n, 2), load(x, n, 3), load(x, n, 4), load(x, n, 5)
     for i in range(6):
         total = load(blocks, m, 6 * i) * y0 + load(blocks, m, 6 * i + 1) * y1 + load(blocks, m, 6 * i + 2) * y2
@@ -119,9 +123,10 @@ def _times_block(m: int, blocks: Array, n: int, x: Array) -> None:
 
 @kernel
 def solve(order: Index, start: Index, below: Index, row: Index, blocks: Array, x: Array) -> None:
-    """Replace the right-hand side x [N, 6, W] by the solution, given the factors in ``blocks`` (:func:`factor`).
+    """Replace the right-hand side ``x`` [N, 6, W] by the solution, given the factors in ``blocks`` (:func:`factor`).
 
-    ``row`` gives the body whose row of the matrix holds each block of ``below``.
+    ``order``, ``start``, ``below`` as there; ``row``: for each block of ``below``, the body whose row of the matrix it
+    is in.
     """
     for k in range(len(order)):
         for s in range(start[k], start[k + 1]):

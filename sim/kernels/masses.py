@@ -1,4 +1,6 @@
-"""Masses of effects: masses fixed to a body, and added mass of the air, which couples the bodies of a strip.
+"""Masses that effects add: masses fixed to a body, and added mass of the air, which couples the bodies of a strip.
+
+Both are 6 x 6 matrices of pairs of bodies (i, j) in ``lanes.pairs``, with i = j for fixed masses.
 
 **Fixed masses.** The kinetic energy is V . M V / 2, M constant in the body's frame. With (h, p) = M V the law of motion
 is h' = h x omega + p x v, p' = p x omega, which keeps the energy exactly.
@@ -47,7 +49,10 @@ from wingfit.sim.kernels.lanes.vector import load, load0, load1, store0
 
 @inlined
 def _across(masses: Array, k: int) -> Nine:
-    """Nonzero 3 x 3 part of the added mass of pair k: rotation about x and y, translation along z."""
+    """Return the nonzero 3 x 3 part of the added mass of pair ``k``: rotation about x and y, translation along z.
+
+    ``masses`` [P, 36, W]: 6 x 6 matrices of P pairs of bodies, row by row.
+    """
     return (
         load(masses, k, 0), load(masses, k, 1), load(masses, k, 5),
         load(masses, k, 6), load(masses, k, 7), load(masses, k, 11),
@@ -57,20 +62,23 @@ def _across(masses: Array, k: int) -> Nine:
 
 @inlined
 def _in_body(R: Array, n: int, wind: Array) -> Three:
-    """The wind [3, W] (m/s, world) in the frame of body n."""
+    """Return the wind [3, W] (m/s, world) in the frame of body ``n``, whose rotation is R[n]."""
     return times(transposed(load_matrix(R, n)), (load1(wind, 0), load1(wind, 1), load1(wind, 2)))
 
 
 @inlined
 def _relative(V: Array, R: Array, n: int, wind: Array, air: bool) -> Three:
-    """Velocity of body n in its own frame; for added mass (``air``) relative to the wind."""
+    """Return the velocity (m/s) of body ``n`` in its own frame; for added mass (``air``) relative to the wind."""
     v = load_vector(V, n, 3)
     return less(v, _in_body(R, n, wind)) if air else v
 
 
 @kernel
 def add_momentum(lanes: Lanes, setting: Setting, R: Array, V: Array, wrench: Array) -> None:
-    """Add to ``wrench`` the gyroscopic terms of all pairs and the weight of the first ``weighing`` pairs."""
+    """Add to ``wrench`` [N+2, 6, W] the gyroscopic terms of the effects' masses, and the weight of fixed masses.
+
+    The first ``lanes.weighing`` pairs of bodies (i, j) are fixed masses, with i = j, and the others added mass.
+    """
     for k in range(lanes.weighing):
         i, j = lanes.pairs[k, 0], lanes.pairs[k, 1]
         M, omega = load_block(lanes.masses, k), load_vector(V, i, 0)
@@ -89,19 +97,24 @@ def add_momentum(lanes: Lanes, setting: Setting, R: Array, V: Array, wrench: Arr
 
 @inlined
 def _first_moment(M: Six) -> Three:
-    """Mass times centre of mass s of the 6 x 6 mass matrix M, whose upper right block is s~."""
+    """Return mass times centre of mass, s, of the 6 x 6 mass matrix M, whose upper right quarter is s~."""
     return M[1][7], M[1][2], M[1][3]
 
 
 @inlined
 def _weight(M: Six, gravity: float, R: Array, i: int) -> tuple[Three, Three]:
+    """Return moment and force of the weight of mass matrix M on body ``i``, in its frame."""
     g = (-gravity * load(R, i, 6), -gravity * load(R, i, 7), -gravity * load(R, i, 8))
     return cross(_first_moment(M), g), times(M[3], g)
 
 
 @kernel
 def add_mass_blocks(lanes: Lanes, setting: Setting, R: Array, V: Array, length: float, blocks: Array) -> None:
-    """Add the masses' part of S, (M / l - dW/dV) (I - l A) - l dW/dxi (:mod:`wingfit.sim.kernels.tangents`)."""
+    """Add to ``blocks`` the effects' masses' part of S, (M / l - dW/dV) (I - l A) - l dW/dxi.
+
+    S, A and l = ``length`` = h gamma (in s) are those of :mod:`wingfit.sim.kernels.tangents`; W is the wrench of the
+    pair's mass matrix M.
+    """
     for k in range(lanes.weighing):
         i = lanes.pairs[k, 0]
         M, omega, v = load_block(lanes.masses, k), load_vector(V, i, 0), load_vector(V, i, 3)
@@ -124,7 +137,7 @@ def add_mass_blocks(lanes: Lanes, setting: Setting, R: Array, V: Array, length: 
 
 @inlined
 def _by_twist(M: Six, omega: Three, v: Three, factor: float) -> Six:
-    """``factor`` M + [[omega~, v~], [0, omega~]] M."""
+    """Return ``factor`` M + [[omega~, v~], [0, omega~]] M, for a body with the twist (omega, v)."""
     return (
         plus(scaled(factor, M[0]), plus(skew_times(omega, M[0]), skew_times(v, M[2]))),
         plus(scaled(factor, M[1]), plus(skew_times(omega, M[1]), skew_times(v, M[3]))),
@@ -135,7 +148,10 @@ def _by_twist(M: Six, omega: Three, v: Three, factor: float) -> Six:
 
 @inlined
 def _with_motion(A: Six, omega: Three, v: Three, length: float) -> Six:
-    """A (I - l A_j) for a body j with the twist (omega, v): I - l A_j = [[I + l omega~ / 2, 0], [l v~, I]]."""
+    """Return A (I - l A_j) for a body j with the twist (omega, v), where l is ``length``.
+
+    I - l A_j = [[I + l omega~ / 2, 0], [l v~, I]].
+    """
     half = 0.5 * length
     return (
         plus(A[0], plus(scaled(half, times_skew(A[0], omega)), scaled(length, times_skew(A[1], v)))),
@@ -147,7 +163,10 @@ def _with_motion(A: Six, omega: Three, v: Three, length: float) -> Six:
 
 @inlined
 def _with_wind(A: Six, M: Six, omega: Three, w: Three, length: float) -> Six:
-    """A plus l M (omega~ w~ - w~ omega~ / 2) in the columns of rotation: the wind w turns in the body's frame."""
+    """Return A plus l M (omega~ w~ - w~ omega~ / 2) in the columns of rotation; l is ``length``.
+
+    The terms arise because the wind ``w`` turns in the frame of the body.
+    """
     turned = plus(scaled(length, skew_times(omega, skew(w))), scaled(-0.5 * length, skew_times(w, skew(omega))))
     return plus(A[0], product(M[1], turned)), A[1], plus(A[2], product(M[3], turned)), A[3]
 
@@ -156,7 +175,10 @@ def _with_wind(A: Six, M: Six, omega: Three, w: Three, length: float) -> Six:
 def add_mass_terms(
     lanes: Lanes, setting: Setting, R: Array, V: Array, factor: float, lead: Array, X: Array, wrench: Array
 ) -> None:
-    """Add M (lead + ``factor`` X) - dW/dV X to the wrenches, M being the pairs' masses and W their wrenches."""
+    """Add M (lead + ``factor`` X) - dW/dV X to ``wrench`` [N+2, 6, W]; M and W: the pairs' masses and their wrenches.
+
+    ``lead``, X [N+2, 6, W]: vectors of the equation of a stage (:func:`wingfit.sim.kernels.integrate.solve_stage`).
+    """
     for k in range(lanes.weighing):
         i, j = lanes.pairs[k, 0], lanes.pairs[k, 1]
         M, omega, v = load_block(lanes.masses, k), load_vector(V, i, 0), load_vector(V, i, 3)
@@ -181,7 +203,7 @@ def add_mass_terms(
 
 @kernel
 def add_energies(lanes: Lanes, setting: Setting, work: Work, kinetic: Array, potential: Array) -> None:
-    """Add the kinetic energy of all pairs and the potential energy of those with weight, both [W], J."""
+    """Add the kinetic energy of all effects' masses and the potential energy of fixed masses, [W] each, J."""
     R, V = work.R, work.V
     for k in range(len(lanes.pairs)):
         i, j, air = lanes.pairs[k, 0], lanes.pairs[k, 1], k >= lanes.weighing

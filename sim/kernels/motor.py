@@ -22,10 +22,11 @@ DROOP, FOLLOWING, HOLDING, AVERAGING, MOTOR = range(5)  # d, 1 / T, k, a
 
 @kernel
 def rods_of(profile: Array, tau_sigma: Array, turning: Array, out: Array) -> None:
-    """Set ``out`` [2, 3, W] to angle, rate and acceleration of both rods, from ``profile`` [2, 6, W].
+    """Set ``out`` [2, 3, W] to angle, rate and acceleration of both rods, delayed or advanced by the motor's lead tau.
 
-    The profile is the angle and four time derivatives, then the method's term for explicit time dependence.
-    ``tau_sigma`` [Z, W]: all states; ``turning`` [Z, W]: their rates.
+    ``profile`` [2, 6, W]: the described angle of each rod (rad) and its first four time derivatives, then the
+    integration method's term for explicit dependence on time. ``tau_sigma`` [Z, W]: all states of effects, of which the
+    motor's are the last three; ``turning`` [Z, W]: their rates.
     """
     z = len(tau_sigma) - 3
     tau, pace, quickening = load1(tau_sigma, z), load1(tau_sigma, z + 1) + 1.0, load1(turning, z + 1)
@@ -41,7 +42,10 @@ def rods_of(profile: Array, tau_sigma: Array, turning: Array, out: Array) -> Non
 
 @kernel
 def motor_rates(motor: Array, work: Work) -> None:
-    """Set the rates of the motor's states under the load of the rods; ``motor`` [MOTOR, W]: d, 1 / T, k, a."""
+    """Set the rates of the motor's three states in ``work.z_rate``, from the power that the rods draw.
+
+    Their decay, minus the derivative by the state itself, is also set; ``motor`` [MOTOR, W]: d, 1 / T, k, a.
+    """
     n, z = len(work.V) - 2, len(work.z) - 3
     tau, sigma, mean = load1(work.z, z), load1(work.z, z + 1), load1(work.z, z + 2)
     drawn = tau * 0.0

@@ -41,7 +41,11 @@ from wingfit.sim.kernels.tangents import moved, turned_left, turned_right
 
 @kernel
 def follow_points(laws: Laws, work: Work) -> None:
-    """Set ``place`` [P, 3, W], ``turn`` [P, 9, W] and ``point_twist`` [P, 6, W]: pose and twist of all points."""
+    """Set in ``work`` the position, rotation and twist of all P points, in world axes.
+
+    These are ``place`` [P, 3, W] (m), ``turn`` [P, 9, W] and ``point_twist`` [P, 6, W] (rad/s, m/s); ``laws`` has the
+    bodies and arms of the points.
+    """
     for k in range(len(laws.bodies)):
         i = laws.bodies[k]
         A, b, omega = load_matrix(work.R, i), load_vector(laws.arms, k, 0), load_vector(work.V, i, 0)
@@ -53,7 +57,7 @@ def follow_points(laws: Laws, work: Work) -> None:
 
 @kernel
 def add_point_wrenches(laws: Laws, work: Work) -> None:
-    """Add the wrenches ``point_wrench`` [P, 6, W] at the points, in the world, to those of the bodies."""
+    """Add the wrenches ``work.point_wrench`` [P, 6, W] at the points, in world axes, to those of the bodies."""
     for k in range(len(laws.bodies)):
         back = transposed(load_matrix(work.R, laws.bodies[k]))
         m, f = times(back, load_vector(work.point_wrench, k, 0)), times(back, load_vector(work.point_wrench, k, 3))
@@ -62,10 +66,10 @@ def add_point_wrenches(laws: Laws, work: Work) -> None:
 
 @kernel
 def add_point_blocks(laws: Laws, work: Work, length: float) -> None:
-    """Add the points' part of S, -dW/dV (I - l A) - l dW/dxi, to the blocks; store -dW/dV in ``drag`` [P, 36, W].
+    """Add to ``work.blocks`` the points' part of S, -dW/dV (I - l A) - l dW/dxi; l is ``length`` = h gamma.
 
-    Both terms together are E (D + l K + [[X, 0], [Y, 0]]) E^T with (X, Y) = l (D (-omega~ / 2, b~ omega~ / 2 -
-    omega~ b~) - (m~, f~)).
+    -dW/dV of each point is stored in ``work.drag`` [P, 36, W]. Both terms together are E (D + l K + [[X, 0], [Y, 0]])
+    E^T with (X, Y) = l (D (-omega~ / 2, b~ omega~ / 2 - omega~ b~) - (m~, f~)).
     """
     for k in range(len(laws.bodies)):
         i = laws.bodies[k]
@@ -90,7 +94,7 @@ def add_point_blocks(laws: Laws, work: Work, length: float) -> None:
 
 @kernel
 def add_point_terms(bodies: Index, drag: Array, X: Array, wrench: Array) -> None:
-    """Add -dW/dV X to the wrenches [N+2, 6, W]; ``drag`` [P, 36, W]: -dW/dV of each point."""
+    """Add -dW/dV X to ``wrench`` [N+2, 6, W]; ``drag`` [P, 36, W]: -dW/dV of each point, on body ``bodies`` [P]."""
     for k in range(len(bodies)):
         i = bodies[k]
         t, f = times_six(load_block(drag, k), load_vector(X, i, 0), load_vector(X, i, 3))

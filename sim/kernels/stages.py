@@ -1,4 +1,4 @@
-"""Sums over the stages of a step, one body at a time."""
+"""Sums over the stages of a Rosenbrock step, for each body and W individuals."""
 
 from __future__ import annotations
 
@@ -11,7 +11,10 @@ from wingfit.sim.kernels.lanes.vector import Vector, load, load1, load3, store
 
 @kernel
 def combine(part: float, base: Array, U: Array, coefficient: Array, count: int, out: Array) -> None:
-    """Set ``out`` [., 6, W] to ``part`` ``base`` + sum_s coefficient[s] U[s] over the first ``count`` stages."""
+    """Set ``out`` [., 6, W] to ``part`` ``base`` + sum_s coefficient[s] U[s] over the first ``count`` stages s.
+
+    U [STAGES, ., 6, W]: increments of the stages.
+    """
     for i in range(out.shape[0]):
         for k in range(6):
             total = part * load(base, i, k)
@@ -26,7 +29,8 @@ def coupled_rates(
 ) -> None:
     """Set ``rate`` to r + scale sum_s coefficient[s] U_xi[s] and ``lead`` to scale sum_s coefficient[s] U_V[s].
 
-    r is the rate of the local coordinates ``xi`` of each body at the twist ``V``; s are the first ``count`` stages.
+    r is the rate of the local coordinates ``xi`` [N+2, 6, W] of each body at the twist ``V``; s runs over the first
+    ``count`` stages; U_xi, U_V [STAGES, N+2, 6, W]: increments of coordinates and twists.
     """
     for i in range(xi.shape[0]):
         first = body_rate(load_vector(xi, i, 0), load_vector(V, i, 0), load_vector(V, i, 3))
@@ -42,7 +46,11 @@ def coupled_rates(
 
 @kernel
 def keep_stage(Y: Array, rate: Array, V: Array, length: float, U_xi: Array, U_V: Array) -> None:
-    """Set U_xi = l Y and U_V = (I - l A) Y - r_xi of a stage: l is ``length``, A (x, y) = (x x omega / 2, x x v)."""
+    """Store the increments U_xi = l Y and U_V = (I - l A) Y - r_xi of one stage, where l is ``length``.
+
+    A (x, y) = (x x omega / 2, x x v) for a body with the twist V = (omega, v); Y [N+2, 6, W]: solution of the stage's
+    equations; ``rate``: r_xi.
+    """
     for i in range(Y.shape[0]):
         turn = load_vector(Y, i, 0)
         a, b = cross(turn, load_vector(V, i, 0)), cross(turn, load_vector(V, i, 3))
@@ -58,10 +66,11 @@ def keep_stage(Y: Array, rate: Array, V: Array, length: float, U_xi: Array, U_V:
 def place_rod(
     rod: int, turning: Vector, length: float, hinge: Array, V: Array, lead: Array, rate: Array, known: Array
 ) -> None:
-    """Set ``known[rod]`` [6, W] to Y of a driving rod with the acceleration ``turning`` (rad/s^2); l is ``length``.
+    """Set ``known[rod]`` [6, W] to the solution Y of a stage for a driving rod, whose acceleration is prescribed.
 
-    Y = (I - l A)^-1 (r_xi + l (lead + acceleration)) as in :func:`keep_stage`; A has no effect on rotation about a
-    fixed axis.
+    ``turning``: angular acceleration, rad/s^2. Y = (I - l A)^-1 (r_xi + l (lead + acceleration)) as in
+    :func:`keep_stage`, with l = ``length`` and r_xi = ``rate``; A has no effect on rotation about a fixed axis.
+    ``hinge`` as in :func:`wingfit.sim.kernels.integrate.set_rods`.
     """
     u, off = (load1(hinge, 0), load1(hinge, 1), load1(hinge, 2)), (load1(hinge, 3), load1(hinge, 4), load1(hinge, 5))
     sweep, v = cross(u, off), load_vector(V, rod, 3)

@@ -1,10 +1,10 @@
-"""Internal states of effects within a step: solved with the motion; those of connectors by elimination.
+"""Integrate the internal states of effects within a step, together with the motion of the bodies.
 
 A state z of a connector's axis depends on the relative twist r along it, z' = g(z, r), and causes a wrench -f(z). With
-u = dg/dr, b = -dg/dz, k = df/dz at the start of the step and theta = 1 / (1 / (h gamma) + b), the increment of z in a
-stage is U_z = theta (r_z + u U_r), r_z being its rate with the coupling to earlier stages, U_r the increment of r. In
-the equation of motion this is a damper k theta u and a wrench -k theta r_z. States of the air act through forces that
-change little within a step; for them U_z = theta r_z.
+u = dg/dr, b = -dg/dz, k = df/dz at the start of the step and theta = 1 / (1 / (h gamma) + b) (h: step), the increment
+of z in a stage is U_z = theta (r_z + u U_r), r_z being the rate of z with the coupling to earlier stages, U_r the
+increment of r. In the equation of motion, from which z is thus eliminated, this is a damper k theta u and a wrench -k
+theta r_z. States of laws of the air act through forces that change little within a step; for them U_z = theta r_z.
 """
 
 from __future__ import annotations
@@ -18,7 +18,10 @@ from wingfit.sim.kernels.lanes.vector import load, load1, store, store1
 
 @kernel
 def combine_states(base: Array, U: Array, coefficient: Array, count: int, out: Array) -> None:
-    """Set the states ``out`` [Z, W] to ``base`` + sum_s coefficient[s] U[s] over the first ``count`` stages."""
+    """Set the states ``out`` [Z, W] to ``base`` + sum_s coefficient[s] U[s] over the first ``count`` stages s.
+
+    U [STAGES, Z, W]: increments of the stages.
+    """
     for i in range(len(out)):
         total = load1(base, i)
         for s in range(count):
@@ -28,7 +31,10 @@ def combine_states(base: Array, U: Array, coefficient: Array, count: int, out: A
 
 @allocating
 def keep_tangents(laws: Laws, wiring: Wiring, length: float, work: Work) -> None:
-    """Store the states' derivatives at the start of a step, with theta as row DECAY, and add dampers k theta u."""
+    """Store the states' derivatives at the start of a step in ``work.z_tangent0``, and add the dampers k theta u.
+
+    Row DECAY of the copy holds theta instead of b; ``length`` is h gamma. The dampers go to ``work.more_d0``.
+    """
     work.z_tangent0[:] = work.z_tangent
     for i in range(len(work.z)):
         store(work.z_tangent0, DECAY, i, 1.0 / (load(work.z_tangent, DECAY, i) + 1.0 / length))
@@ -44,7 +50,10 @@ def keep_tangents(laws: Laws, wiring: Wiring, length: float, work: Work) -> None
 
 @kernel
 def start_states(wiring: Wiring, laws: Laws, step: float, coupling: Array, stage: int, work: Work) -> None:
-    """Set ``work.z_known`` [Z, W] to r_z of a stage, and add the connectors' wrenches -k theta r_z."""
+    """Set ``work.z_known`` [Z, W] to r_z of a stage, and add the connectors' wrenches -k theta r_z to ``work.wrench``.
+
+    ``coupling``: coefficients of the earlier stages; ``step``: h, s.
+    """
     for i in range(len(work.z)):
         total = load1(work.z_rate, i)
         for s in range(stage):
@@ -65,7 +74,7 @@ def start_states(wiring: Wiring, laws: Laws, step: float, coupling: Array, stage
 
 @kernel
 def finish_states(wiring: Wiring, laws: Laws, work: Work, stage: int) -> None:
-    """Set ``work.U_z`` of a stage, given ``U_xi`` and ``U_V`` of the same stage, from which U_r follows."""
+    """Set ``work.U_z`` of a stage, once ``U_xi`` and ``U_V`` of the same stage are known, from which U_r follows."""
     for i in range(len(work.z)):
         store(work.U_z, stage, i, load(work.z_tangent0, DECAY, i) * load1(work.z_known, i))
     if len(laws.connector) == 0:

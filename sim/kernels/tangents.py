@@ -1,17 +1,21 @@
-"""The linearised connectors: derivatives of the wrenches of springs and dampers by the bodies' poses and twists.
+"""Linearise the connectors: derivatives of the wrenches of springs and dampers by the bodies' poses and twists.
 
-In the axes of frame A, a displacement of the bodies moves B by eta = (phi, delta) = J xi and changes the relative twist
-r = J V by B eta. With the wrench (t, f) on B, the wrenches on the bodies change by
+Frames A and B, the pose (Q, d) of B in A, and the arms a, b are those of :mod:`wingfit.sim.kernels.connectors`; x~ is
+the matrix of the cross product with x. In the axes of frame A, a displacement xi of the bodies moves B by
+eta = (phi, delta) = J xi and changes the relative twist r = J V by B eta. With the wrench (t, f) on B, the wrenches on
+the bodies change by
 
     second: -J_2^T (D J dV + K_2 eta),    K_2 = K + D B - [[t~, 0], [f~, 0]],
     first:       E (D J dV + K_1 eta),    K_1 = K + D B + [[0, f~], [0, 0]],
 
-K being minus the derivative of the spring's wrench. The last terms are the geometric stiffness: the wrench rotates with
-the body and moves with the end of the spring. The derivative is exact, so the matrix is not symmetric. E = [[I, e~],
-[0, I]] with e = a + d takes a wrench at o_B to the first body, F the same with e = Q b to the second.
+K being minus the derivative of the spring's wrench and D the damping. The last terms are the geometric stiffness: the
+wrench rotates with the body and moves with the end of the spring. The derivative is exact, so the matrix is not
+symmetric. E = [[I, e~], [0, I]] with e = a + d takes a wrench at o_B to the first body, the same matrix with e = Q b to
+the second.
 
 The step solves for the change of the local coordinates xi, of rate xi' = V + A xi, A = [[-omega~ / 2, 0], [-v~, 0]] in
-each body; its matrix is S = (M / l - dW/dV) (I - l A) - l dW/dxi with l = h gamma. A connector has J A = B_k J.
+each body; its matrix is S = (M / l - dW/dV) (I - l A) - l dW/dxi with the mass matrix M, the wrenches W and l = h gamma
+(h: step, gamma: coefficient of the Rosenbrock method). For the twist of body k, a connector has J A = B_k J.
 """
 
 from __future__ import annotations
@@ -56,7 +60,10 @@ from wingfit.sim.kernels.lanes.vector import load, load1, store
 
 @inlined
 def spring_tangent(Q: Nine, d: Three, ko: Three, kt: Three) -> Six:
-    """K: minus the derivative of the spring's wrench on B by eta."""
+    """Return K [6 x 6]: minus the derivative of the spring's wrench on B by the displacement eta of B.
+
+    ``ko``, ``kt``: stiffness of rotation and translation; Q, d: pose of B in A.
+    """
     S = product(columns_scaled(Q, kt), transposed(Q))
     P = scaled(0.5, plus(times_skew(S, d), scaled(-1.0, skew(times(S, d)))))
     oo = plus(trace_minus(columns_scaled(Q, co_stiffness(ko))), scaled(-1.0, skew_times(d, P)))
@@ -65,7 +72,7 @@ def spring_tangent(Q: Nine, d: Three, ko: Three, kt: Three) -> Six:
 
 @inlined
 def coupling_tangent(N: Nine, d: Three) -> Six:
-    """Contribution of the coupling stiffness to K, with N = Q G_c."""
+    """Return the contribution to K of the stiffness that couples rotation with translation, with N = Q G_c."""
     L = trace_minus(N)
     turned = plus(outer(d, axial(N)), times_skew(transposed(N), d))
     return scaled(-1.0, turned), transposed(L), L, scaled(0.0, L)
@@ -73,13 +80,19 @@ def coupling_tangent(N: Nine, d: Three) -> Six:
 
 @inlined
 def twist_tangent(g: Three, omega: Three, turning: Three) -> Six:
-    """The matrix B; frame B has velocity g and angular velocity ``turning``, A turns at ``omega`` (in A's axes)."""
+    """Return the matrix B: derivative of the relative twist by the displacement eta.
+
+    ``g``, ``turning``: velocity and angular velocity of frame B; ``omega``: angular velocity of A, all in A's axes.
+    """
     return (scaled(-1.0, skew(turning)), scaled(0.0, skew(g)), scaled(-1.0, skew(g)), scaled(-1.0, skew(omega)))
 
 
 @inlined
 def damper_tangent(B: Six, omega: Three, v: Three, arm: Three, do: Three, dt: Three) -> Six:
-    """D (B - B_k) for a body turning with ``omega`` and moving with v, ``arm`` from its centre to o_B, in A's axes."""
+    """Return D (B - B_k) for body k, which turns with ``omega`` and moves with ``v``; D = diag(do, dt).
+
+    ``arm``: vector from the body's centre to o_B; all vectors are in A's axes.
+    """
     oo = plus(B[0], scaled(0.5, skew(omega)))
     to = plus(B[2], plus(skew(v), scaled(-0.5, skew_times(arm, skew(omega)))))
     return rows_scaled(do, oo), B[1], rows_scaled(dt, to), rows_scaled(dt, B[3])
@@ -87,13 +100,13 @@ def damper_tangent(B: Six, omega: Three, v: Three, arm: Three, do: Three, dt: Th
 
 @inlined
 def sum_of(A: Six, B: Six) -> Six:
-    """A + B."""
+    """Return A + B."""
     return plus(A[0], B[0]), plus(A[1], B[1]), plus(A[2], B[2]), plus(A[3], B[3])
 
 
 @inlined
 def complete(A: Six, length: float, do: Three, dt: Three) -> Six:
-    """D + ``length`` A."""
+    """Return D + ``length`` A, with D = diag(do, dt)."""
     return (
         with_diagonal(scaled(length, A[0]), do),
         scaled(length, A[1]),
@@ -104,21 +117,24 @@ def complete(A: Six, length: float, do: Three, dt: Three) -> Six:
 
 @inlined
 def moved(e: Three, A: Six, g: Three) -> Six:
-    """E(e) A E(g)^T: A with both sides transferred to other points."""
+    """Return E(e) A E(g)^T: A transferred from o_B to the centres of two bodies.
+
+    ``e`` (for the rows) and ``g`` (for the columns) lead from the centres to o_B.
+    """
     a, c = plus(A[0], skew_times(e, A[2])), plus(A[1], skew_times(e, A[3]))
     return (plus(a, scaled(-1.0, times_skew(c, g))), c, plus(A[2], scaled(-1.0, times_skew(A[3], g))), A[3])
 
 
 @inlined
 def turned_left(sign: float, Q: Nine, A: Six) -> Six:
-    """``sign`` Q^T A."""
+    """Return ``sign`` Q^T A, with Q applied to both halves of each column."""
     T = scaled(sign, transposed(Q))
     return product(T, A[0]), product(T, A[1]), product(T, A[2]), product(T, A[3])
 
 
 @inlined
 def turned_right(sign: float, A: Six, Q: Nine) -> Six:
-    """``sign`` A Q."""
+    """Return ``sign`` A Q, with Q applied to both halves of each row."""
     T = scaled(sign, Q)
     return product(A[0], T), product(A[1], T), product(A[2], T), product(A[3], T)
 
@@ -128,9 +144,10 @@ def start_blocks(
     mass: Array, inertia: Array, damping: Array, R: Array, V: Array, gravity: float, length: float, fill: Index,
     blocks: Array,
 ) -> None:  # fmt: skip
-    """Set the diagonal to the bodies' own part of S: inertia, gyroscopic terms, gravity, the air's normal damping.
+    """Set the diagonal ``blocks`` to the bodies' own part of S: inertia, gyroscopic terms, gravity, damping by the air.
 
-    ``damping`` [N, W] (N s/m) acts along each body's normal. Blocks that no connector sets, ``fill``, become zero.
+    ``damping`` [N, W] (N s/m) acts along each body's normal; ``length``: l = h gamma, s. The blocks numbered ``fill``,
+    which no connector sets, become zero.
     """
     for k in fill:
         for i in range(36):
@@ -157,7 +174,10 @@ def start_blocks(
 def add_own_terms(
     mass: Array, inertia: Array, damping: Array, V: Array, factor: float, lead: Array, X: Array, wrench: Array
 ) -> None:
-    """Add M (lead + ``factor`` X) - dW/dV X to the wrenches, W being the bodies' own as in :func:`start_blocks`."""
+    """Add M (lead + ``factor`` X) - dW/dV X to ``wrench``, for the bodies' own wrenches W as in :func:`start_blocks`.
+
+    ``lead``, X [N+2, 6, W]: vectors of the equation of a stage (:func:`wingfit.sim.kernels.integrate.solve_stage`).
+    """
     for n in range(len(mass)):
         m, own, omega = mass[n], load_inertia(inertia, n), load_vector(V, n, 0)
         x, y, u, w = load_vector(X, n, 0), load_vector(X, n, 3), load_vector(lead, n, 0), load_vector(lead, n, 3)
@@ -174,10 +194,11 @@ def add_connectors(
 ) -> None:  # fmt: skip
     """Add the connectors' part of S to its diagonal blocks, and set its off-diagonal blocks.
 
-    ``lower`` and ``upper`` number the blocks (second, first) and (first, second); upper is -1 where ``first`` is a
-    driving rod, whose motion is known: its own row is not needed, its column is applied to the right-hand side.
-    ``more`` as in :func:`wingfit.sim.kernels.connectors.connect`, ``more_k`` and ``more_d`` [C, 6, W] minus its
-    derivatives by displacement and twist along its own axes, or empty.
+    ``lower`` and ``upper`` [C] are the numbers of the blocks (second, first) and (first, second); upper is -1 where
+    ``first`` is a driving rod, whose motion is known: there is no row for it, and its column is applied to the
+    right-hand side. ``more``: additional wrench as in :func:`wingfit.sim.kernels.connectors.connect`; ``more_k``,
+    ``more_d`` [C, 6, W]: minus its derivatives by displacement and twist along its own axes; all three may be empty.
+    ``length``: l = h gamma, s; other arguments as in :func:`wingfit.sim.kernels.connectors.connect`.
     """
     for c in range(len(first)):
         i, j = first[c], second[c]

@@ -13,7 +13,7 @@ from wingfit.sim.kernels.lanes.vector import Vector, load1, store1
 
 @allocating
 def angle(y: Vector, x: Vector) -> Vector:
-    """atan2(y, x), rad."""
+    """Return atan2(y, x) in rad."""
     scratch = np.empty((2, LANES))
     store1(scratch, 0, y)
     store1(scratch, 1, x)
@@ -24,7 +24,7 @@ def angle(y: Vector, x: Vector) -> Vector:
 
 @allocating
 def cosine_and_sine(x: Vector) -> tuple[Vector, Vector]:
-    """Cosine and sine."""
+    """Return the cosine and the sine of ``x`` (rad)."""
     scratch = np.empty((2, LANES))
     store1(scratch, 0, x)
     for w in range(LANES):
@@ -35,7 +35,7 @@ def cosine_and_sine(x: Vector) -> tuple[Vector, Vector]:
 
 @allocating
 def exponential(x: Vector) -> Vector:
-    """e to the x."""
+    """Return e to the power of ``x``."""
     scratch = np.empty((1, LANES))
     store1(scratch, 0, x)
     for w in range(LANES):
@@ -45,7 +45,7 @@ def exponential(x: Vector) -> Vector:
 
 @allocating
 def power(x: Vector, exponent: Vector) -> Vector:
-    """x to the power of ``exponent``, for x >= 0."""
+    """Return ``x`` to the power of ``exponent``, for x >= 0."""
     scratch = np.empty((2, LANES))
     store1(scratch, 0, x)
     store1(scratch, 1, exponent)

@@ -1,6 +1,7 @@
-"""3 x 3 matrices and 3-vectors of lanes, as tuples in registers: the algebra of frames inside kernels.
+"""Algebra of 3-vectors and 3 x 3 matrices inside kernels, for eight individuals at a time.
 
-A matrix is nine lane vectors, row by row; e~ is the matrix of the cross product, e~ x = e x x.
+An element is a vector of eight lanes, one for each individual (``Vector``). A 3-vector is a tuple of three elements, a
+matrix a tuple of nine, row by row; both stay in registers. e~ is the matrix of the cross product, e~ x = e x x.
 """
 
 from __future__ import annotations
@@ -16,19 +17,19 @@ Six = tuple[Nine, Nine, Nine, Nine]  # 6 x 6: moment-rotation, moment-translatio
 
 @inlined
 def load_vector(array: Array, n: int, k: int) -> Three:
-    """Elements k, k + 1, k + 2 of row n."""
+    """Load elements k, k + 1, k + 2 of row ``n`` of ``array`` [., ., W]."""
     return load(array, n, k), load(array, n, k + 1), load(array, n, k + 2)
 
 
 @inlined
 def load_matrix(array: Array, n: int) -> Nine:
-    """The nine elements of row n."""
+    """Load the nine elements of row ``n`` of ``array`` [., 9, W]."""
     return load_vector(array, n, 0) + load_vector(array, n, 3) + load_vector(array, n, 6)
 
 
 @inlined
 def store_vector(array: Array, n: int, k: int, x: Three) -> None:
-    """Put x into the elements k, k + 1, k + 2 of row n."""
+    """Store ``x`` as the elements k, k + 1, k + 2 of row ``n`` of ``array`` [., ., W]."""
     store(array, n, k, x[0])
     store(array, n, k + 1, x[1])
     store(array, n, k + 2, x[2])
@@ -36,7 +37,7 @@ def store_vector(array: Array, n: int, k: int, x: Three) -> None:
 
 @inlined
 def store_matrix(array: Array, n: int, A: Nine) -> None:
-    """Put A into row n."""
+    """Store A as row ``n`` of ``array`` [., 9, W]."""
     store_vector(array, n, 0, A[:3])
     store_vector(array, n, 3, A[3:6])
     store_vector(array, n, 6, A[6:])
@@ -51,31 +52,31 @@ def add_wrench(wrench: Array, n: int, t: Three, f: Three) -> None:
 
 @inlined
 def added(a: Three, b: Three) -> Three:
-    """a + b."""
+    """Return a + b."""
     return a[0] + b[0], a[1] + b[1], a[2] + b[2]
 
 
 @inlined
 def less(a: Three, b: Three) -> Three:
-    """a - b."""
+    """Return a - b."""
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
 @inlined
 def negative(a: Three) -> Three:
-    """-a."""
+    """Return -a."""
     return -a[0], -a[1], -a[2]
 
 
 @inlined
 def extended(a: Three, factor: float, b: Three) -> Three:
-    """a + ``factor`` b."""
+    """Return a + ``factor`` b."""
     return a[0] + factor * b[0], a[1] + factor * b[1], a[2] + factor * b[2]
 
 
 @inlined
 def load_inertia(inertia: Array, n: int) -> Nine:
-    """The inertia of body n, [N, 9], as a matrix of numbers that are the same in all lanes."""
+    """Load the inertia of body ``n`` from ``inertia`` [N, 9], whose numbers are the same for all individuals."""
     return (
         inertia[n, 0], inertia[n, 1], inertia[n, 2],
         inertia[n, 3], inertia[n, 4], inertia[n, 5],
@@ -85,13 +86,13 @@ def load_inertia(inertia: Array, n: int) -> Nine:
 
 @inlined
 def gyroscopic(inertia: Nine, omega: Three) -> Nine:
-    """Derivative of omega x (I omega) by omega: omega~ I - (I omega)~."""
+    """Return the derivative of omega x (I omega) by omega: omega~ I - (I omega)~."""
     return plus(skew_times(omega, inertia), scaled(-1.0, skew(times(inertia, omega))))
 
 
 @inlined
 def plus(A: Nine, B: Nine) -> Nine:
-    """A + B."""
+    """Return A + B."""
     return (
         A[0] + B[0], A[1] + B[1], A[2] + B[2],
         A[3] + B[3], A[4] + B[4], A[5] + B[5],
@@ -101,7 +102,7 @@ def plus(A: Nine, B: Nine) -> Nine:
 
 @inlined
 def scaled(factor: float, A: Nine) -> Nine:
-    """``factor`` A."""
+    """Return ``factor`` A."""
     return (
         factor * A[0], factor * A[1], factor * A[2],
         factor * A[3], factor * A[4], factor * A[5],
@@ -111,13 +112,13 @@ def scaled(factor: float, A: Nine) -> Nine:
 
 @inlined
 def transposed(A: Nine) -> Nine:
-    """A^T."""
+    """Return A^T."""
     return A[0], A[3], A[6], A[1], A[4], A[7], A[2], A[5], A[8]
 
 
 @inlined
 def product(A: Nine, B: Nine) -> Nine:
-    """A B."""
+    """Return A B."""
     return (
         A[0] * B[0] + A[1] * B[3] + A[2] * B[6], A[0] * B[1] + A[1] * B[4] + A[2] * B[7],
         A[0] * B[2] + A[1] * B[5] + A[2] * B[8],
@@ -130,7 +131,7 @@ def product(A: Nine, B: Nine) -> Nine:
 
 @inlined
 def times(A: Nine, x: Three) -> Three:
-    """A x."""
+    """Return A x."""
     return (
         A[0] * x[0] + A[1] * x[1] + A[2] * x[2],
         A[3] * x[0] + A[4] * x[1] + A[5] * x[2],
@@ -140,7 +141,7 @@ def times(A: Nine, x: Three) -> Three:
 
 @inlined
 def columns_scaled(A: Nine, s: Three) -> Nine:
-    """A diag(s)."""
+    """Return A diag(s)."""
     return (
         A[0] * s[0], A[1] * s[1], A[2] * s[2],
         A[3] * s[0], A[4] * s[1], A[5] * s[2],
@@ -150,7 +151,7 @@ def columns_scaled(A: Nine, s: Three) -> Nine:
 
 @inlined
 def rows_scaled(s: Three, A: Nine) -> Nine:
-    """diag(s) A."""
+    """Return diag(s) A."""
     return (
         s[0] * A[0], s[0] * A[1], s[0] * A[2],
         s[1] * A[3], s[1] * A[4], s[1] * A[5],
@@ -160,26 +161,26 @@ def rows_scaled(s: Three, A: Nine) -> Nine:
 
 @inlined
 def cross(a: Three, b: Three) -> Three:
-    """a x b."""
+    """Return a x b."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 @inlined
 def times_six(M: Six, x: Three, y: Three) -> tuple[Three, Three]:
-    """M (x, y): the two halves of a 6-vector; M is four 3 x 3 quarters, row by row."""
+    """Return M (x, y), where ``x`` and ``y`` are the halves of a 6-vector, and M is four 3 x 3 quarters."""
     return added(times(M[0], x), times(M[1], y)), added(times(M[2], x), times(M[3], y))
 
 
 @inlined
 def skew(e: Three) -> Nine:
-    """e~."""
+    """Return e~, the matrix of the cross product with ``e``."""
     zero = e[0] - e[0]
     return zero, -e[2], e[1], e[2], zero, -e[0], -e[1], e[0], zero
 
 
 @inlined
 def skew_times(e: Three, A: Nine) -> Nine:
-    """e~ A."""
+    """Return e~ A."""
     return (
         e[1] * A[6] - e[2] * A[3], e[1] * A[7] - e[2] * A[4], e[1] * A[8] - e[2] * A[5],
         e[2] * A[0] - e[0] * A[6], e[2] * A[1] - e[0] * A[7], e[2] * A[2] - e[0] * A[8],
@@ -189,7 +190,7 @@ def skew_times(e: Three, A: Nine) -> Nine:
 
 @inlined
 def times_skew(A: Nine, e: Three) -> Nine:
-    """A e~."""
+    """Return A e~."""
     return (
         A[1] * e[2] - A[2] * e[1], A[2] * e[0] - A[0] * e[2], A[0] * e[1] - A[1] * e[0],
         A[4] * e[2] - A[5] * e[1], A[5] * e[0] - A[3] * e[2], A[3] * e[1] - A[4] * e[0],
@@ -199,7 +200,7 @@ def times_skew(A: Nine, e: Three) -> Nine:
 
 @inlined
 def trace_minus(A: Nine) -> Nine:
-    """tr(A) I - A."""
+    """Return tr(A) I - A."""
     return (
         A[4] + A[8], -A[1], -A[2],
         -A[3], A[0] + A[8], -A[5],
@@ -209,13 +210,13 @@ def trace_minus(A: Nine) -> Nine:
 
 @inlined
 def axial(A: Nine) -> Three:
-    """The vector a with a~ = A - A^T."""
+    """Return the vector a with a~ = A - A^T."""
     return A[7] - A[5], A[2] - A[6], A[3] - A[1]
 
 
 @inlined
 def outer(a: Three, b: Three) -> Nine:
-    """a b^T."""
+    """Return a b^T."""
     return (
         a[0] * b[0], a[0] * b[1], a[0] * b[2],
         a[1] * b[0], a[1] * b[1], a[1] * b[2],
@@ -225,32 +226,32 @@ def outer(a: Three, b: Three) -> Nine:
 
 @inlined
 def with_diagonal(A: Nine, s: Three) -> Nine:
-    """A + diag(s)."""
+    """Return A + diag(s)."""
     return A[0] + s[0], A[1], A[2], A[3], A[4] + s[1], A[5], A[6], A[7], A[8] + s[2]
 
 
 @inlined
 def co_stiffness(k: Three) -> Three:
-    """Diagonal of G = tr(K) / 2 - K (thesis Eq. 5)."""
+    """Return the diagonal of G = tr(K) / 2 - K for a diagonal stiffness K = diag(k) (thesis Eq. 5)."""
     return 0.5 * (k[1] + k[2] - k[0]), 0.5 * (k[2] + k[0] - k[1]), 0.5 * (k[0] + k[1] - k[2])
 
 
 @inlined
 def co_stiffness_matrix(K: Nine) -> Nine:
-    """G = tr(K) / 2 - K of a full matrix."""
+    """Return G = tr(K) / 2 - K for a full stiffness matrix K."""
     half = 0.5 * (K[0] + K[4] + K[8])
     return half - K[0], -K[1], -K[2], -K[3], half - K[4], -K[5], -K[6], -K[7], half - K[8]
 
 
 @inlined
 def _quarter(blocks: Array, m: int, at: int) -> Nine:
-    """The 3 x 3 quarter of block m [36, W] that starts at element ``at``."""
+    """Load the 3 x 3 quarter of block ``m`` of ``blocks`` [NB, 36, W] that starts at element ``at``."""
     return load_vector(blocks, m, at) + load_vector(blocks, m, at + 6) + load_vector(blocks, m, at + 12)
 
 
 @inlined
 def load_block(blocks: Array, m: int) -> Six:
-    """The 6 x 6 matrix of block m of ``blocks`` [NB, 36, W]."""
+    """Load the 6 x 6 matrix of block ``m`` of ``blocks`` [NB, 36, W]."""
     return _quarter(blocks, m, 0), _quarter(blocks, m, 3), _quarter(blocks, m, 18), _quarter(blocks, m, 21)
 
 
@@ -265,7 +266,7 @@ def add_to_block(blocks: Array, m: int, A: Six) -> None:
 
 @inlined
 def _set_quarter(blocks: Array, m: int, at: int, A: Nine) -> None:
-    """Put A into the quarter of block m that starts at element ``at``."""
+    """Store A as the 3 x 3 quarter of block ``m`` of ``blocks`` [NB, 36, W] that starts at element ``at``."""
     store_vector(blocks, m, at, A[:3])
     store_vector(blocks, m, at + 6, A[3:6])
     store_vector(blocks, m, at + 12, A[6:])

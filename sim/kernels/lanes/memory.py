@@ -1,4 +1,7 @@
-"""Arrays in which every group of lanes fills one cache line; loading one that spans two lines takes twice as long."""
+"""Allocate arrays in which the eight values of a group of individuals fill one cache line of the processor.
+
+Loading a group that spans two lines takes twice as long.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +16,7 @@ _LINE = 8 * LANES
 
 
 def zeros(shape: tuple[int, ...]) -> Array:
-    """Zeros [..., LANES] that start on a cache line."""
+    """Return zeros of ``shape`` [..., LANES] whose first element lies at the start of a cache line."""
     count = math.prod(shape)
     whole = np.zeros(count + LANES)
     start = -whole.__array_interface__["data"][0] % _LINE // 8
@@ -21,7 +24,7 @@ def zeros(shape: tuple[int, ...]) -> Array:
 
 
 def aligned(array: ArrayLike) -> Array:
-    """A copy of an array [..., LANES] that starts on a cache line."""
+    """Return a copy of ``array`` [..., LANES] whose first element lies at the start of a cache line."""
     values = np.asarray(array, float)
     out = zeros(values.shape)
     out[...] = values
@@ -29,7 +32,10 @@ def aligned(array: ArrayLike) -> Array:
 
 
 def several(shapes: dict[str, tuple[int, ...]]) -> dict[str, Array]:
-    """Zeros [..., LANES] of many shapes [...] by name, as parts of one array, since a group of lanes needs dozens."""
+    """Return arrays of zeros [..., LANES], by name, for the ``shapes`` [...] given by name.
+
+    They are parts of one allocation, because a group of individuals needs dozens of arrays.
+    """
     sizes = {name: LANES * math.prod(shape) for name, shape in shapes.items()}
     whole, start, found = zeros((sum(sizes.values()),)), 0, {}
     for name, size in sizes.items():

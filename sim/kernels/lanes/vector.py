@@ -1,4 +1,4 @@
-"""A group of lanes as one value inside kernels, so that arithmetic on eight individuals is written as for one.
+"""Vectors of eight lanes as values inside kernels, so that arithmetic on eight individuals is written as for one.
 
 Inside a compiled kernel ``load(array, i, j)`` gives the lanes of ``array[i, j, :]`` as a vector of the processor
 (LLVM's ``<8 x double>``); ``+ - *`` and ``/`` work on vectors and on a vector with a float; ``store`` writes one back.
@@ -28,7 +28,7 @@ _FUSED = ("contract",)
 
 
 class VectorType(types.Type):
-    """Numba's type of a group of lanes."""
+    """Numba's type of a vector of LANES floats, one for each individual."""
 
     def __init__(self) -> None:
         super().__init__(name=f"Vector{LANES}")
@@ -44,7 +44,7 @@ class _VectorModel(models.PrimitiveModel):
 
 
 def _splat(builder: Any, value: Any) -> Any:
-    """A float as a vector of equal lanes."""
+    """Return a vector whose lanes all equal the float ``value``."""
     zero = ir.Constant(ir.IntType(32), 0)
     first = builder.insert_element(ir.Constant(_LLVM, ir.Undefined), value, zero)
     mask = ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES)
@@ -52,7 +52,10 @@ def _splat(builder: Any, value: Any) -> Any:
 
 
 def _binary(op: Any, method: str) -> None:
-    """Register ``op`` with numba for two vectors, and for a vector and a float in either order."""
+    """Register the operator ``op`` with numba for two vectors, and for a vector and a float in either order.
+
+    ``method``: name of the instruction in llvmlite's ``builder``.
+    """
 
     class Template(ConcreteTemplate):
         cases = [  # noqa: RUF012
@@ -96,9 +99,9 @@ def _negate(context: Any, builder: Any, sig: Any, args: Any) -> Any:  # noqa: AR
 
 
 def _address(context: Any, builder: Any, kind: Any, array: Any, indices: Any) -> Any:
-    """Pointer to the lanes of a C-contiguous array at all but the last index.
+    """Return a pointer to the lanes ``array[*indices, :]`` of a C-contiguous array of the numba type ``kind``.
 
-    The stride of the last index is that of one group of lanes, a constant for the compiler.
+    The stride of the last of the ``indices`` is that of one group of lanes, a constant for the compiler.
     """
     proxy = context.make_array(kind)(context, builder, array)
     strides = cgutils.unpack_tuple(builder, proxy.strides)[: len(indices)]
@@ -115,7 +118,10 @@ def _indices(builder: Any, args: Any, kinds: Any) -> list[Any]:
 
 
 def _accessors(count: int) -> tuple[Callable[..., Any], Callable[..., None]]:
-    """Load and store of the lanes of an array at ``count`` indices; numba needs one function per count."""
+    """Return the functions that load and store the lanes of an array at ``count`` indices.
+
+    Numba needs separate functions for each number of indices.
+    """
 
     def read(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         indices = _indices(builder, args[1:], sig.args[1:])
