@@ -1,1 +1,1 @@
-"""Computes the periodic motion of a batch of individuals to a requested accuracy."""
+"""Compute the periodic motion of a batch of individuals (parameter sets of one wing) to a requested accuracy."""

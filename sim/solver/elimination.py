@@ -1,7 +1,8 @@
-"""Order in which the bodies are eliminated from the step's linear system, and the operations that follow from it.
+"""Choose the order in which the bodies are eliminated from the step's linear system, and list the operations.
 
 Minimum degree (Rose 1972): the next body is the one with the fewest remaining neighbours and, among these, with the
-least fill. With four bodies along the chord this saves a fifth of the products of an elimination strip by strip.
+least fill (new blocks in the matrix). With four bodies along the chord this saves a fifth of the products of an
+elimination strip by strip.
 """
 
 from __future__ import annotations
@@ -17,17 +18,18 @@ _NONE: frozenset[tuple[int, int]] = frozenset()
 
 @dataclass(frozen=True)
 class Elimination:
-    """Blocks and products of the factorisation, numbered as in ``wingfit.sim.kernels.linear``.
+    """Blocks and products of a block LU factorisation, numbered as in ``wingfit.sim.kernels.linear``.
 
     Attributes:
-        order: bodies in the order of elimination.
-        start: below[start[k]:start[k + 1]] are the blocks under the diagonal of order[k].
+        order: [N] bodies in the order of elimination.
+        start: [N + 1]; below[start[k]:start[k + 1]] are the blocks under the diagonal of order[k].
         below: numbers of the blocks below the diagonal.
-        row: body whose row of the matrix holds each block of ``below``.
-        products: (target, left, right) of products to subtract.
-        product_start: rows product_start[k]:product_start[k + 1] of ``products`` follow the elimination of order[k].
-        fill: blocks that do not belong to a connector.
-        position: number of the block (row, column).
+        row: for each block of ``below``, the body whose row of the matrix it is in.
+        products: [., 3] numbers of the blocks (target, left, right): left times right is subtracted from the target.
+        product_start: [N + 1]; rows product_start[k]:product_start[k + 1] of ``products`` follow the elimination of
+            order[k].
+        fill: numbers of the off-diagonal blocks that do not belong to a connector.
+        position: number of the block at (row, column), each a body.
     """
 
     order: Index
@@ -43,7 +45,11 @@ class Elimination:
 def eliminate(
     n: int, pairs: set[tuple[int, int]], extra: frozenset[tuple[int, int]] | set[tuple[int, int]] = _NONE
 ) -> Elimination:
-    """Elimination of n bodies with blocks for the ``pairs`` joined by connectors and for the pairs in ``extra``."""
+    """Return the elimination of ``n`` bodies from a matrix with off-diagonal blocks for some pairs of bodies.
+
+    These are the ``pairs`` joined by connectors, and the pairs in ``extra``, such as bodies of a strip that added mass
+    couples.
+    """
     columns = _minimum_degree(n, pairs | extra)
     count = sum(len(rows) for _, rows in columns)
     position = {(k, k): k for k in range(n)}
@@ -67,7 +73,7 @@ def eliminate(
 
 
 def _minimum_degree(n: int, pairs: set[tuple[int, int]]) -> list[tuple[int, list[int]]]:
-    """Bodies in the order of elimination, each with its neighbours at that point."""
+    """Return the bodies in the order of elimination, each with its neighbours that are then still to be eliminated."""
     neighbours: dict[int, set[int]] = {k: set() for k in range(n)}
     for a, b in pairs:
         neighbours[a].add(b)

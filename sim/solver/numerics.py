@@ -25,10 +25,11 @@ class Numerics:
     Attributes:
         accuracy: largest error (m) of any marker at any instant, relative to the exact periodic motion of the model.
             The number of steps is raised, for each individual, until the estimated error is smaller.
-        steps: per beat. If given, it is not changed and no error is estimated.
+        steps: number of steps per beat. If given, it is not changed and no error is estimated.
         ramp_beats: number of beats over which the amplitude of the drive grows from zero.
         max_beats: number of beats after which a motion that is not periodic counts as failed.
-        periodic: distance (m) to the periodic motion at which a beat counts as periodic; None: a quarter of accuracy.
+        periodic: distance (m) to the periodic motion at which a beat counts as periodic; None: a quarter of
+            ``accuracy``.
         window: number of past beats that Anderson acceleration uses; 0: no acceleration.
     """
 
@@ -54,7 +55,7 @@ class Numerics:
             raise ValueError(f"window is {self.window} beats; it must be at least 0 (no acceleration)")
 
     def ladder(self, condition: Condition) -> tuple[int, ...]:
-        """Numbers of steps per beat to try under a condition, smallest first."""
+        """Return the numbers of steps per beat to try in turn under ``condition``, smallest first."""
         if self.steps is not None:
             return (self.steps,)
         least = STEPS_PER_HZ * condition.flap_frequency
@@ -68,10 +69,11 @@ class Numerics:
 
 
 def estimated_error(changes: list[float]) -> float:
-    """Estimated error (m) at the finest step, by Richardson extrapolation of the ``changes`` (m) of refinements.
+    """Estimate the error (m) of the motion at the finest step by Richardson extrapolation.
 
-    The order is estimated from the last two changes and limited to 2...5; with one change it is taken as 2. Changes
-    below KINKS may come from the kinks in the law of the air, where convergence is of order 2 only.
+    ``changes`` (m): largest change of a marker at each refinement of the step, coarsest first. The order of convergence
+    is estimated from the last two changes and limited to 2...5; with one change it is taken as 2. Changes below KINKS
+    may come from the kinks in the law of the air, where convergence is of order 2 only.
     """
     least = _GROWTH**2
     ratio = least

@@ -28,8 +28,10 @@ _SIGNIFICANT = 1e-2  # relative to the largest singular value, for the estimatio
 class Secants:
     """The latest beats of one individual, and the secants (differences of successive beats) between them.
 
-    At most ``window`` secants are stored. Coordinates are relative to the pose ``about`` and in metres: rotations are
-    multiplied by a length, and velocities are divided by ``angular_rate`` (rad/s) of the beat.
+    At most ``window`` secants are stored. The coordinates of a state are relative to the pose of the state ``about``
+    and in metres (:func:`wingfit.sim.kernels.chart.coordinates`); velocities are divided by ``angular_rate`` (rad/s), 2
+    pi times the flap frequency. ``starts`` and ``ends`` hold the coordinates of the latest beat, ``columns`` the
+    secants: changes from one beat to the next of the end and of the change over the beat.
     """
 
     about: State
@@ -44,10 +46,11 @@ class Secants:
     target: Array | None = None  # coordinates of the latest start returned by :meth:`add`
 
     def add(self, start: State, end: State) -> tuple[State, float]:
-        """Add one beat; returns the start of the next and the distance (m) of this one's start to the periodic motion.
+        """Add one beat; return the start of the next beat, and the distance (m) of ``start`` to the periodic motion.
 
-        The distance is estimated by the extrapolation; before a second beat, or with a window of 0, it is the change
-        over the beat.
+        ``start`` and ``end``: states at the start and end of the beat. The distance is estimated by the extrapolation;
+        before a second beat, or with a window of 0, it is the change over the beat; inf after an extrapolation that is
+        reverted.
         """
         x = self._coordinates(start) if self.target is None else self.target
         arrived = self._coordinates(end)
@@ -69,7 +72,10 @@ class Secants:
         return (self._state(self.target, end) if self.extrapolated else end), distance
 
     def step_back(self) -> State:
-        """Revert an extrapolation that made the change larger: the end of the best beat, without any secants."""
+        """Revert an extrapolation that made the change over a beat larger: return the end of the best beat so far.
+
+        All secants are removed. ValueError if the latest start was not extrapolated.
+        """
         if self.best is None or not self.extrapolated:
             raise ValueError("there is no extrapolation to revert")
         _, state = self.best
@@ -78,9 +84,9 @@ class Secants:
 
     @property
     def growth(self) -> float:
-        """Growth of a disturbance in a beat: magnitude of the largest Floquet multiplier, estimated from the secants.
+        """Factor by which a disturbance grows in a beat: magnitude of the largest Floquet multiplier.
 
-        The map is restricted to the span of the significant secants; 0 without any.
+        It is estimated from the map of a beat restricted to the span of the significant secants; 0 without any.
         """
         if not self.columns:
             return 0.0
@@ -95,11 +101,14 @@ class Secants:
         return float(np.abs(np.linalg.eigvals(reduced)).max())
 
     def restart(self) -> None:
-        """Keep the secants for another step size, but do not compare its beats with earlier ones."""
+        """Prepare for another step size: keep the secants, but do not compare its beats with earlier ones."""
         self.starts, self.ends, self.best, self.extrapolated = [], [], None, False
 
     def _correction(self, change: Array) -> Array:
-        """Coordinates [12 N + Z] of the estimated fixed point relative to the end of a beat with this ``change``."""
+        """Estimate the step [12 N + Z] from the end of a beat with this ``change`` [12 N + Z] to the fixed point.
+
+        N bodies, Z states of effects; zeros without secants.
+        """
         if not self.columns or not np.all(np.isfinite(change)):
             return np.zeros_like(change)
         moved, changed = (np.array(part).T for part in zip(*self.columns, strict=True))
@@ -114,7 +123,7 @@ class Secants:
         return found
 
     def _state(self, x: Array, rods: State) -> State:
-        """The state at the coordinates ``x``, the driving rods as in ``rods``."""
+        """Return the state at the coordinates ``x`` [12 N + Z], with the driving rods of the state ``rods``."""
         found = State(*(array.copy() for array in rods))
         displaced(self.about, x, self.angular_rate, self.sizes, found)
         return found

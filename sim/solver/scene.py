@@ -1,4 +1,4 @@
-"""Inputs of the kernels for a condition: drive, initial state and setting; and arrays for the results of a beat."""
+"""Build the inputs of the kernels for a condition (drive, initial state, setting) and arrays for the results."""
 
 from __future__ import annotations
 
@@ -21,11 +21,12 @@ from wingfit.sim.wing.structure import Structure
 def drive_table(
     rods: RodDrive, frequency: float, numerics: Numerics, n: int, beat: int, *, compliant: bool = False
 ) -> Array:
-    """Angle, rate, acceleration (rad, s) [n, STAGES, 2, 3, W] of both rods at the stages of n steps of a beat.
+    """Return the motion of both rods [n, STAGES, 2, 3, W] at the stages of ``n`` steps of beat number ``beat``.
 
-    ``beat`` is its number: the amplitude grows over the first ones. The acceleration includes the Rosenbrock method's
-    term for the explicit dependence on time. For a compliant drive (``compliant``) the fourth axis has six entries
-    instead of three: two more derivatives, and that term by itself. Tables are cached and must not be changed.
+    The fourth axis is angle (rad), rate and acceleration (by s); W individuals. The amplitude grows over the first
+    ``numerics.ramp_beats`` beats. The acceleration includes the Rosenbrock method's term for the explicit dependence on
+    time. For a ``compliant`` drive the fourth axis has six entries instead of three: angle, four derivatives, and that
+    term by itself. ``frequency``: of the beat, Hz. Tables are cached and must not be changed.
     """
     ramp = numerics.ramp_beats
     return _table(rods.series.tobytes(), rods.series.shape, frequency, ramp, n, min(beat, ramp), compliant)
@@ -54,9 +55,9 @@ def _table(
 
 
 def _ramped(angle: Array, x: Array, rate: float) -> Array:
-    """First four columns of ``angle`` (value and derivatives) times a smooth step from 0 at x = 0 to 1 at x = 1.
+    """Multiply the angle and its first three derivatives by a smooth step from 0 at x = 0 to 1 at x = 1.
 
-    x grows at ``rate`` (1/s).
+    ``angle`` [..., 5, W]: angle and four time derivatives; returns [..., 4, W]. ``x`` grows at ``rate`` (1/s).
     """
     x = np.minimum(x, 1.0)
     e = x**3 * (10 - 15 * x + 6 * x**2)
@@ -70,7 +71,10 @@ def _ramped(angle: Array, x: Array, rate: float) -> Array:
 
 
 def at_rest(structure: Structure, states: int = 0) -> State:
-    """Initial state: bodies in their rest pose, rods horizontal, no motion, ``states`` effects' states of zero."""
+    """Return the initial state: bodies in their rest pose, rods horizontal, no motion, and ``states`` zeros.
+
+    ``states``: number of internal states of effects.
+    """
     n = len(structure.bodies)
     motion = (zeros((n + 2, 9, LANES)), zeros((n + 2, 3, LANES)), zeros((n + 2, 6, LANES)))
     state = State(*motion, zeros((states, LANES)))
@@ -82,7 +86,7 @@ def at_rest(structure: Structure, states: int = 0) -> State:
 
 
 def setting(condition: Condition, steps: int) -> Setting:
-    """Air density, wind, gravity and step of a condition as input of the kernels, with ``steps`` per beat."""
+    """Return density, wind, gravity and step of a condition as input of the kernels, with ``steps`` per beat."""
     a = condition.angle_of_attack
     wind = condition.airspeed * np.array([np.cos(a), 0.0, np.sin(a)])
     step = 1.0 / (condition.flap_frequency * steps)
@@ -91,7 +95,10 @@ def setting(condition: Condition, steps: int) -> Setting:
 
 
 def new_trace(structure: Structure, steps: int, *, with_motion: bool = False, states: int = 0) -> Trace:
-    """Arrays for the results of one beat; those of the motion are empty unless ``with_motion``."""
+    """Allocate arrays for the results of one beat of ``steps`` steps, without the motion unless ``with_motion``.
+
+    ``states``: number of effects' states in the motion.
+    """
     rows, bodies = steps if with_motion else 0, len(structure.bodies) + 2
     shapes: dict[str, tuple[int, ...]] = {
         "tracks": (steps, len(structure.wing.markers), 3), "rods": (steps, 2, 6), "air": (steps, 3),

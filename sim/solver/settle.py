@@ -1,4 +1,4 @@
-"""Runs a group of individuals side by side, beat after beat, until each is periodic."""
+"""Simulate a group of individuals at the same time, beat after beat, until the motion of each is periodic."""
 
 from __future__ import annotations
 
@@ -30,18 +30,18 @@ class Course:
     """Progress of the solution for one individual, over increasing numbers of steps per beat.
 
     Attributes:
-        genome: [G].
-        state: at the start of the next beat; None at rest.
+        genome: [G] values of the genes.
+        state: motion at the start of the next beat; None at rest.
         secants: past beats, from which the periodic motion is extrapolated; None before the first.
-        tracks: [n, M, 3] with the previous number of steps, m.
-        changes: of the tracks from each number of steps to the next, m.
+        tracks: [n, M, 3] positions of the markers in the periodic beat with the previous number of steps, m.
+        changes: largest change of a marker from each number of steps to the next, m.
         beats: total number of simulated beats.
         failures: how many numbers of steps failed.
-        trace: of the periodic beat with the present number of steps.
+        trace: results of the periodic beat with the present number of steps; None before it is reached.
         reason: why the present number of steps failed, or None.
-        distance: to the periodic motion, m.
+        distance: estimated distance to the periodic motion, m.
         growth: factor by which a disturbance of the periodic motion grows in a beat.
-        error: estimated error, m.
+        error: estimated error of the markers, m.
         done: whether the motion is accurate, or has failed finally.
         before: this object at the previous number of steps.
     """
@@ -62,13 +62,16 @@ class Course:
     before: Course | None = None
 
     def copy(self) -> Course:
-        """A copy; the arrays are shared, since they are never modified."""
+        """Return a copy, whose arrays are shared with this object, since they are never modified."""
         known = self.secants and replace(self.secants, columns=list(self.secants.columns), target=None)
         return replace(self, secants=known, changes=list(self.changes), before=None)
 
 
 class Subject(NamedTuple):
-    """What is simulated: a structure, a condition, and a function from up to LANES genomes to the kernels' inputs."""
+    """What is simulated: a structure, a condition, and a function that makes the kernels' inputs.
+
+    ``scene`` takes up to LANES genomes [., G].
+    """
 
     structure: Structure
     condition: Condition
@@ -76,7 +79,7 @@ class Subject(NamedTuple):
 
 
 class _Group:
-    """Up to LANES individuals side by side under a condition, all starting from rest or all from a known state."""
+    """Up to LANES individuals simulated together under a condition, all starting from rest or all from given states."""
 
     def __init__(self, subject: Subject, courses: list[Course], steps: int, with_motion: bool = False) -> None:
         structure, self.courses = subject.structure, courses
@@ -92,18 +95,22 @@ class _Group:
         self.alive = np.ones(LANES, bool)
 
     def table(self, numerics: Numerics, steps: int, beat: int) -> Array:
-        """The rods' motion in beat number ``beat``, see :func:`wingfit.sim.solver.scene.drive_table`."""
+        """Return the rods' motion in beat number ``beat``, see :func:`wingfit.sim.solver.scene.drive_table`."""
         frequency, compliant = self.angular_rate / (2 * np.pi), len(self.lanes.laws.motor) > 0
         return drive_table(self.scene.rods, frequency, numerics, steps, beat, compliant=compliant)
 
     def beat(self, table: Array) -> State:
-        """Simulate one beat; returns the state at its start."""
+        """Simulate one beat with the drive ``table``; return a copy of the state at its start."""
         start = State(*(array.copy() for array in self.state))
         advance(self.wiring, self.here, self.lanes, table, self.work, self.state, self.trace, self.alive)
         return start
 
     def evaluate(self, lane: int, start: State, beat: int, numerics: Numerics) -> None:
-        """Evaluate the beat of one individual: failed, periodic, or to be continued from an improved start."""
+        """Decide on the individual ``lane`` after a beat: failed, periodic, or to continue from an extrapolated start.
+
+        ``start``: state of the group at the start of beat number ``beat``. The decision is stored in the individual's
+        course, and the start of its next beat in the group's state.
+        """
         course = self.courses[lane]
         course.beats += 1
         if not self.alive[lane]:
@@ -122,9 +129,10 @@ class _Group:
 
 
 def warm_start(near: Course, genome: Array, states: int) -> Course:
-    """A course for ``genome`` that starts at the periodic motion of ``near``, with its secants.
+    """Return a course for ``genome`` that starts at the periodic motion of ``near``, with the secants of ``near``.
 
-    If the number of effects' ``states`` differs, they start at zero and the secants are not used.
+    If the number of effects' ``states`` differs, these states start at zero and the secants are not used. ValueError if
+    ``near`` has no periodic motion.
     """
     if near.state is None or near.secants is None:
         raise ValueError("a warm start needs an individual with a periodic motion")
@@ -137,7 +145,11 @@ def warm_start(near: Course, genome: Array, states: int) -> Course:
 
 
 def settle(subject: Subject, courses: list[Course], numerics: Numerics, steps: int, with_motion: bool) -> None:
-    """Run up to LANES individuals with ``steps`` per beat until each is periodic or has failed."""
+    """Simulate up to LANES individuals with ``steps`` per beat until the motion of each is periodic or has failed.
+
+    Results are stored in ``courses``; ``with_motion``: whether the motion of all bodies is stored too. Either all
+    courses or none of them start from rest.
+    """
     group = _Group(subject, courses, steps, with_motion)
     first = 0 if courses[0].state is None else numerics.ramp_beats
     tables = {beat: group.table(numerics, steps, beat) for beat in range(first, numerics.ramp_beats + 1)}
@@ -161,9 +173,10 @@ def settle(subject: Subject, courses: list[Course], numerics: Numerics, steps: i
 
 
 def measure_growth(subject: Subject, courses: list[Course], steps: int) -> None:
-    """Measure the growth of the transients of up to LANES periodic individuals over GROWTH_BEATS more beats.
+    """Measure how fast disturbances of up to LANES periodic motions grow, over GROWTH_BEATS more beats.
 
-    The secants' estimate is less reliable: it includes beats on which the motion was far from periodic.
+    The growth of each course is set; infinite if the motion diverges. The estimate from the secants is less reliable,
+    because it includes beats on which the motion was far from periodic.
     """
     group, numerics = _Group(subject, courses, steps), Numerics(steps=steps)
     table = group.table(numerics, steps, numerics.ramp_beats)
@@ -177,7 +190,7 @@ def measure_growth(subject: Subject, courses: list[Course], steps: int) -> None:
 
 
 def _recover(course: Course, lane: int, state: State) -> bool:
-    """Revert the extrapolation that made an individual diverge; False if there was none."""
+    """Revert the extrapolation that made individual ``lane`` of ``state`` diverge; return False if there was none."""
     if course.secants is None or not course.secants.extrapolated:
         return False
     _put(state, lane, course.secants.step_back())
@@ -194,12 +207,15 @@ def _put(into: State, lane: int, state: State) -> None:
 
 
 def _mean_growth(distances: Array) -> float:
-    """Growth factor per beat of the latter half of ``distances`` [beats], by a straight line through the logarithm."""
+    """Return the growth factor per beat over the latter half of ``distances`` [beats] (m).
+
+    It is the slope of a straight line through their logarithms.
+    """
     tail = np.log(np.maximum(distances[len(distances) // 2 :], ROUND_OFF))
     return float(np.exp(np.polyfit(np.arange(len(tail)), tail, 1)[0]))
 
 
 def _stacked(states: list[State]) -> State:
-    """States of single individuals as one state with lanes; spare lanes repeat the last individual."""
+    """Return states of single individuals as the state of a group; if they are too few, the last is repeated."""
     filled = [states[min(k, len(states) - 1)] for k in range(LANES)]
     return State(*(aligned(np.stack(parts, axis=-1)) for parts in zip(*filled, strict=True)))

@@ -1,4 +1,7 @@
-"""Periodic motion of a batch of wings to a requested accuracy. Only this module runs the kernels of the wing."""
+"""Compute the periodic motion of a batch of wings to a requested accuracy.
+
+No other module runs the kernels of the wing.
+"""
 
 from __future__ import annotations
 
@@ -21,11 +24,11 @@ _MAX_FAILURES = 4  # numbers of steps that may fail before an individual counts 
 
 @dataclass(frozen=True)
 class Beat:
-    """One periodic beat of an individual, at n equal steps from drive phase 0; NaN where it failed.
+    """One periodic beat of an individual, at n equal steps from drive phase 0; arrays are NaN if it failed.
 
     Attributes:
-        tracks: [n, M, 3] marker positions in the world, m.
-        rods: [n, 2, 6] wrench (moment, force) of the wing on the front and rear driving rod, rod frame at the hinge.
+        tracks: [n, M, 3] positions of M markers in the world, m.
+        rods: [n, 2, 6] moment and force (N m, N) of the wing on the front and rear driving rod, rod frame at the hinge.
         air: [n, 3] force of the air on the wing in the world, N; without the inertia of added mass.
         energy: [n, 3] kinetic, elastic, gravitational, J.
         power: [n, 4] into the wing through dampers, front motor, rear motor and air, W.
@@ -33,8 +36,8 @@ class Beat:
         error: estimated largest error of a marker, m, from the steps and from the distance to the periodic motion; NaN
             if the steps were given.
         growth: estimated growth of a disturbance of the periodic motion in a beat; below 1 it decays.
-        reason: of a failure, else None.
-        motion: pose and twist of all bodies and the two rods [n, N+2, .], if requested.
+        reason: why the individual failed, or None.
+        motion: pose and twist of the N bodies and the two rods [n, N+2, .], if requested, else None.
     """
 
     tracks: Array
@@ -52,10 +55,11 @@ class Beat:
 def periodic_beats(
     subject: Subject, genomes: Array, numerics: Numerics, *, with_motion: bool = False, near: Course | None = None
 ) -> tuple[Beat, ...]:
-    """Simulate ``genomes`` [B, G] until each is periodic and accurate, in groups of LANES.
+    """Simulate ``genomes`` [B, G] (B individuals, G genes) until each is periodic and accurate, in groups of LANES.
 
     The results of an individual do not depend on the others: each has its own steps and number of beats. With ``near``,
-    the individuals start at the motion of that one, with as many steps, and its error is taken as theirs.
+    the solution for a similar individual, the individuals start at its motion, with as many steps, and its error is
+    taken as theirs. ``with_motion``: also return the motion of all bodies.
     """
     if near is not None and near.trace is not None:
         return _beats_near(subject, genomes, numerics, near, len(near.trace.tracks), with_motion)
@@ -64,9 +68,9 @@ def periodic_beats(
 
 
 def settled_course(subject: Subject, genome: Array, numerics: Numerics) -> Course | None:
-    """The solution for one individual, as a warm start for others; None if it fails.
+    """Return the solution for one individual, ``genome`` [G], as a warm start for others; None if it fails.
 
-    It is the solution at the previous number of steps if that turns out to be accurate enough.
+    The solution at the previous, smaller number of steps is returned if its error turns out to be small enough.
     """
     course = Course(genome)
     _settled(subject, [course], numerics, with_motion=False)
@@ -83,7 +87,7 @@ def settled_course(subject: Subject, genome: Array, numerics: Numerics) -> Cours
 def _beats_near(
     subject: Subject, genomes: Array, numerics: Numerics, near: Course, steps: int, with_motion: bool
 ) -> tuple[Beat, ...]:
-    """Beats of individuals that start at the motion of ``near``; those that fail start again from rest."""
+    """Simulate individuals from the motion of ``near`` with ``steps`` per beat; those that fail restart from rest."""
     states = len(subject.scene(genomes[:1]).frozen().laws.size)
     courses = [warm_start(near, genome, states) for genome in genomes]
     for group in _groups(courses):
@@ -97,7 +101,7 @@ def _beats_near(
 
 
 def _from_rest(subject: Subject, genomes: Array, numerics: Numerics, steps: int, with_motion: bool) -> list[Course]:
-    """Solve from rest with ``steps`` per beat, and once more with more steps for those that fail."""
+    """Solve from rest with ``steps`` per beat, and once more with RETRY_FACTOR times as many where that fails."""
     courses = [Course(genome) for genome in genomes]
     for tried in (steps, round(RETRY_FACTOR * steps)):
         again = [k for k, course in enumerate(courses) if not course.done or course.reason is not None]
@@ -127,13 +131,16 @@ def _settled(subject: Subject, courses: list[Course], numerics: Numerics, with_m
 
 
 def _groups(courses: list[Course]) -> list[list[Course]]:
-    """Groups of up to LANES, those that start from rest separate from the others."""
+    """Split ``courses`` into groups of up to LANES, in which either all or none start from rest."""
     parts = [[c for c in courses if (c.state is None) == resting] for resting in (True, False)]
     return [part[k : k + LANES] for part in parts for k in range(0, len(part), LANES)]
 
 
 def _judge(course: Course, numerics: Numerics, steps: int, *, last: bool) -> None:
-    """Set in ``course`` whether an individual is accurate, needs more steps, or has failed."""
+    """Set in ``course`` whether its individual is accurate, needs more steps, or has failed, after ``steps`` per beat.
+
+    ``last``: whether no larger number of steps remains to be tried.
+    """
     if course.reason is not None:
         course.failures += 1
         course.tracks, course.changes, course.error = None, [], np.nan  # one that diverged starts again from rest
