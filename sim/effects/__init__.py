@@ -1,1 +1,4 @@
-"""Physics and measurement faults that a recording may contain and a model may lack: one file each, and a contract."""
+"""Effects: physics and measurement faults that a recording may contain and a model may be missing.
+
+Each effect has a file in ``library``; ``contract`` defines what it declares.
+"""

@@ -1,4 +1,4 @@
-"""Apply effects on an observation to the individuals for which they are on."""
+"""Apply the faults of a measurement to simulated beats, and find the individuals in which an effect is on."""
 
 from __future__ import annotations
 
@@ -16,7 +16,10 @@ from wingfit.sim.effects.ports.observation import Sampling
 def by_active(
     effects: Sequence[Effect], genes: tuple[Gene, ...], genomes: Array
 ) -> list[tuple[tuple[Effect, ...], list[int]]]:
-    """Groups of ``genomes`` [B, G] in which the same of ``effects`` are on: these effects, and the genomes' indices."""
+    """Group ``genomes`` [B, G] by the ``effects`` that are on in them.
+
+    B individuals with the values of G ``genes``. Each group: the effects that are on, and the indices of its genomes.
+    """
     on = np.array([effect.on(genes, genomes) for effect in effects], bool).reshape(len(effects), len(genomes))
     groups: dict[bytes, list[int]] = {}
     for k, active in enumerate(on.T):
@@ -25,13 +28,20 @@ def by_active(
 
 
 def affected(effects: Iterable[Effect], genes: tuple[Gene, ...], genomes: Array) -> Index:
-    """Indices of those of ``genomes`` [B, G] in which at least one of the effects on the observation is on."""
+    """Return the indices of the ``genomes`` [B, G] in which at least one fault of the measurement is on.
+
+    ``genes``: the G genes of the columns; effects that change the wing or vehicle instead of the observation are
+    ignored.
+    """
     on = [effect.on(genes, genomes) for effect in effects if effect.observe]
     return np.flatnonzero(np.any(on, axis=0)) if on else np.empty(0, np.intp)
 
 
 def apply(effects: Iterable[Effect], genes: tuple[Gene, ...], genomes: Array, sampling: Sampling) -> None:
-    """Change ``sampling`` by each effect in turn, only for those of ``genomes`` [B, G] in which it is on."""
+    """Change ``sampling`` by each fault of the measurement in turn, only for the ``genomes`` [B, G] in which it is on.
+
+    ``genes``: the G genes of the columns; other effects are ignored.
+    """
     for effect in effects:
         if effect.observe is None or not len(on := np.flatnonzero(effect.on(genes, genomes))):
             continue

@@ -1,8 +1,8 @@
-"""What every effect declares, and the three places where it may act: a wing, a vehicle, an observation.
+"""What every effect declares, and where it may act: on a wing, on a vehicle, or on an observation.
 
-An effect has sizes: parameters that switch it off exactly where all of them are zero. Its other parameters say where it
-acts and how; they have no meaning while the effect is off. All become genes, which a calibration searches like any
-other.
+An effect has sizes: parameters that switch it off exactly where all of them are zero. Its other parameters describe
+where on the wing it acts and how; they have no meaning while the effect is off. All parameters become genes, which a
+calibration searches like any other.
 """
 
 from __future__ import annotations
@@ -40,19 +40,20 @@ FAMILIES: dict[Port, tuple[Family, ...]] = {
     "air": ("aerodynamics",),
     "observation": ("measurement",),
 }
-"""Families of effects that each port takes. A load of the air belongs on the air's ports, where it counts as such."""
+"""Families of effects that each port takes; loads of the air act through "air" or "inertia", to be counted as such."""
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """One number of an effect.
+    """One parameter of an effect.
 
     Attributes:
-        name: short; the gene is called EFFECT.NAME.
-        unit: of the gene; "1" without dimension.
+        name: short name; the gene is called EFFECT.NAME.
+        unit: unit of the gene; "1" without dimension.
         lower, upper: bounds, in ``unit`` or, where ``of`` is given, as multiples of that measure of the rig.
-        typical: a size met in practice; for the other parameters, their nominal value. In the unit of the bounds.
-        description: what it is, for users.
+        typical: a value met in practice if it is a size; for the other parameters, the nominal value. In the unit of
+            the bounds.
+        description: its meaning, for users.
         of: the measure of the rig that scales bounds and typical value: its span (m), its mean chord (m) or the mass of
             the wing (kg).
         place: whether the parameter is a position on the wing where the effect acts.
@@ -74,7 +75,8 @@ class Parameter:
 class Effect:
     """One piece of physics, or one fault of a measurement.
 
-    ValueError if its port does not take its family (:data:`FAMILIES`), or if its law names none of its sizes.
+    ValueError if its port does not take its family (:data:`FAMILIES`), if ``observe`` or ``observed`` does not fit the
+    port, or if its law names none of its sizes.
 
     Attributes:
         name: identifier; also the name of its file, and of its page docs/effects/NAME.md.
@@ -84,14 +86,16 @@ class Effect:
         size: parameters that switch it off exactly where all are zero.
         shape: the other parameters.
         power: energy exchange of its own law: "conservative": none is gained or lost over a beat; "dissipative": some
-            is lost at every instant; "any": neither is guaranteed. In a stream no law of the air guarantees either.
+            is lost at every instant; "any": neither is guaranteed. In a stream, none of these is guaranteed for a law
+            of the air.
         memory: its internal states in words; empty where it has none.
         law: its equations, one a line, with the names of its parameters; at least one of the sizes is among them.
-        source: where the law is from (author, year, equation).
-        signature: one line: what it looks like in a recording.
-        confused_with: names of effects that look alike.
-        wing, vehicle: changes a scene before it is simulated; None where the effect does not apply.
-        observe: changes a simulated beat on its way into the recording; for the port "observation" alone.
+        source: the publication of the law (author, year, equation).
+        signature: one line: how it shows in a recording.
+        confused_with: names of effects with a similar signature.
+        wing, vehicle: functions that change the input of a simulation, a scene; None where the effect does not apply.
+        observe: function that changes a simulated beat before it is compared with a recording; only for the port
+            "observation".
         observed: kinds of recording that ``observe`` acts on.
     """
 
@@ -137,31 +141,31 @@ class Effect:
 
     @property
     def rigs(self) -> tuple[RigKind, ...]:
-        """Kinds of rig that it applies to."""
+        """Kinds of rig (wing, vehicle) that the effect applies to."""
         on_wing = self.wing is not None or "tracks" in self.observed
         on_vehicle = self.vehicle is not None or "forces" in self.observed
         both: tuple[tuple[RigKind, bool], ...] = (("wing", on_wing), ("vehicle", on_vehicle))
         return tuple(rig for rig, acts in both if acts)
 
     def applies_to(self, rig: Wing | Vehicle) -> bool:
-        """Whether it applies to ``rig``."""
+        """Return whether the effect applies to ``rig``."""
         return ("wing" if isinstance(rig, Wing) else "vehicle") in self.rigs
 
     def genes(self, rig: Wing | Vehicle) -> tuple[Gene, ...]:
-        """Genes for ``rig``: sizes nominally zero, the others at their typical values."""
+        """Return the genes of all parameters for ``rig``: sizes nominally zero, the others at their typical values."""
         return tuple(self._gene(parameter, rig) for parameter in self.parameters)
 
     def typical(self, rig: Wing | Vehicle) -> dict[str, float]:
-        """Typical values of all genes for ``rig``, in their units."""
+        """Return the typical values of all genes for ``rig``, in their units, by the names of the genes."""
         return {f"{self.name}.{p.name}": p.typical * measure(rig, p.of) for p in self.parameters}
 
     def values(self, genes: tuple[Gene, ...], genomes: Array) -> dict[str, Array]:
-        """Parameters by their short names [B], from ``genomes`` [B, G] in the order of ``genes``."""
+        """Return the parameters [B] by their short names, from ``genomes`` [B, G], whose columns are ``genes``."""
         column = {gene.name: k for k, gene in enumerate(genes)}
         return {p.name: genomes[:, column[f"{self.name}.{p.name}"]] for p in self.parameters}
 
     def on(self, genes: tuple[Gene, ...], genomes: Array) -> Mask:
-        """Whether any size of the effect is nonzero in each of ``genomes`` [B, G]."""
+        """Return True [B] where any size of the effect is nonzero in ``genomes`` [B, G]; their columns are ``genes``."""
         values = self.values(genes, genomes)
         return np.asarray(np.any([values[p.name] != 0.0 for p in self.size], axis=0))
 
@@ -182,7 +186,10 @@ fault_of_recordings = partial(Effect, family="measurement", port="observation", 
 
 
 def place(station: float, chord: float) -> tuple[Parameter, Parameter]:
-    """Two parameters for the position of an effect on the wing, with typical fractions of the span and of the chord."""
+    """Return the two parameters "station" and "chord" for the position of an effect on the wing.
+
+    Their typical values are given as fractions of the span and of the chord.
+    """
     along = "position along the span, as a fraction of the span from root to tip"
     across = "position along the chord, as a fraction of the chord from the leading edge"
     return (
@@ -192,7 +199,7 @@ def place(station: float, chord: float) -> tuple[Parameter, Parameter]:
 
 
 def measure(rig: Wing | Vehicle, of: Measure | None) -> float:
-    """The measure ``of`` the rig by which bounds of parameters are scaled: length (m) or mass (kg); 1 for None."""
+    """Return the measure ``of`` the rig that scales bounds of parameters: a length (m) or mass (kg); 1 for None."""
     if of is None:
         return 1.0
     if of == "mass":

@@ -1,7 +1,7 @@
-"""A given load on the wing, by its position along the span and its phase, or a given motion of its drive.
+"""Apply a given load to the wing, by its position along the span and its phase, or a given motion to its drive.
 
-The response of the tracks to this load shows which load or motion is missing where model and recording differ. It is
-not in the registry, because a search for missing physics must not propose it.
+The response of the tracks to this load shows which load or motion is missing where model and recording differ. The load
+is not in the registry of effects, because a search for missing physics must not propose it.
 """
 
 from __future__ import annotations
@@ -32,11 +32,12 @@ _CUTS = 1200  # pieces of the span over which the hat functions are averaged
 class Probe:
     """A force per metre of span (N/m): hat functions over ``stations`` times Fourier series of the drive phase.
 
-    ``stations`` are fractions of the span, increasing from 0 (root) to 1 (tip); ``harmonics`` of the flap frequency.
-    The force acts upward along the normal of the wing and is spread over the chord. ``turning`` adds a moment about the
-    span, nose up, N m/m. ``driving`` adds such a series to the angle of each rod, deg, later by its lag for the rear
-    one. The genes of the effects (:meth:`effects`) are ordered station by station, forces first, rods last, each as
-    constant, cosines, sines (:meth:`terms`).
+    A hat function is 1 at its station, 0 at all others, and linear between. ``stations`` are fractions of the span,
+    increasing from 0 (root) to 1 (tip); ``harmonics``: number of harmonics of the flap frequency. The force acts upward
+    along the normal of the wing and is spread over the chord. If ``turning``, a moment about the span (nose up, N m/m)
+    is added. If ``driving``, the angle of each rod has an additional Fourier series (deg), for the rear rod later by
+    its lag. The genes of the effects (:meth:`effects`) are ordered forces, moments, front rod, rear rod; loads station
+    by station; each as constant, cosines, sines (:meth:`terms`).
     """
 
     stations: tuple[float, ...] = (0.0, 0.25, 0.5, 0.75, 1.0)
@@ -53,7 +54,11 @@ class Probe:
 
     @property
     def size(self) -> int:
-        """Number of genes: S (1 + 2 H) forces at S stations, H harmonics, as many moments, 2 (1 + 2 H) for rods."""
+        """Number of genes of forces, moments and motions of the rods.
+
+        With S stations and H harmonics these are S (1 + 2 H), as many again if ``turning``, and 2 (1 + 2 H) if
+        ``driving``.
+        """
         return self.loads + (2 * (1 + 2 * self.harmonics) if self.driving else 0)
 
     @property
@@ -67,19 +72,20 @@ class Probe:
         return len(self.stations) * (1 + 2 * self.harmonics)
 
     def terms(self, phase: ArrayLike) -> Array:
-        """Constant, cosines and sines [..., 1 + 2 harmonics] at drive ``phase`` [...] in beats."""
+        """Return constant, cosines and sines [..., 1 + 2 H] at the drive ``phase`` [...] in beats, for H harmonics."""
         turn = 2 * np.pi * np.asarray(phase, float)[..., None] * np.arange(1, self.harmonics + 1)
         return np.concatenate([np.ones((*turn.shape[:-1], 1)), np.cos(turn), np.sin(turn)], axis=-1)
 
     def hats(self, span: ArrayLike) -> Array:
-        """Hat functions [..., stations] at fractions of the ``span`` [...]."""
+        """Return the hat functions [..., stations] at fractions ``span`` [...] of the span."""
         y = np.asarray(span, float)
         return np.stack([np.interp(y, self.stations, row) for row in np.eye(len(self.stations))], axis=-1)
 
     def on_strips(self, structure: Structure) -> tuple[Array, Array]:
-        """Force on each strip per size of each hat [S, stations], m, and its moment about the strip's middle, m^2.
+        """Return force (m) and moment (m^2) on each strip per 1 N/m of each hat function, [S, stations] each.
 
-        The moment is about the chord, tip up. Each piece of load acts on the strip under it.
+        S strips. The moment is that about the chord at the strip's middle, tip up. Each piece of load acts on the strip
+        under it.
         """
         edges = structure.planform.strips(structure.division)
         span = (np.arange(_CUTS) + 0.5) / _CUTS
@@ -91,12 +97,12 @@ class Probe:
         return np.asarray(lies @ hats), np.asarray((lies * lever) @ hats)
 
     def effects(self) -> tuple[Effect, ...]:
-        """Load and motion as effects of a :class:`wingfit.sim.wing.flexible_wing.FlexibleWing` with this probe."""
+        """Return load and motion as effects of a :class:`~wingfit.sim.wing.flexible_wing.FlexibleWing` with this probe."""
         return (self._load(), self._motion()) if self.driving else (self._load(),)
 
     @property
     def _series(self) -> dict[str, str]:
-        """Names of the terms, and what they are."""
+        """Short names of the terms of a Fourier series, each with its description."""
         kinds = {"c": "cosine", "s": "sine"}
         terms = {f"{kind}{k}": f"{word} {k}" for kind, word in kinds.items() for k in range(1, self.harmonics + 1)}
         return {"0": "constant", **terms}
@@ -139,7 +145,7 @@ class Probe:
 
 
 def strip_middles(structure: Structure) -> Array:
-    """Fractions of the span [S] at which loads that are spread evenly over the strips act."""
+    """Return the fractions of the span [S] at which loads that are spread evenly over S strips act."""
     edges, wiring = structure.planform.strips(structure.division), structure.wiring
     y = np.array([body.centroid[1] for body in structure.bodies])
     middle = np.add.reduceat(wiring.weight * y, wiring.strip_start[:-1])
@@ -147,25 +153,26 @@ def strip_middles(structure: Structure) -> Array:
 
 
 def _push(frame: Any, moment: int) -> None:
-    """Add the normal force on each strip."""
+    """Add to each strip the normal forces, which are the parameters of the law; for ``frame``, see :func:`_series`."""
     _series(frame, PUSH_N)
 
 
 def _roll(frame: Any, moment: int) -> None:
-    """Add the moment, about the strip's middle, of the forces on each strip."""
+    """Add to each strip the moment of the normal forces on it about the strip's middle, tip up."""
     _series(frame, PUSH_L)
 
 
 def _turn(frame: Any, moment: int) -> None:
-    """Add the moment about the span on each strip."""
+    """Add to each strip a moment about the span, nose up."""
     _series(frame, PUSH_M)
 
 
 @inlined
 def _series(frame: Any, which: int) -> None:
-    """Add sum_k a_k cos k psi + b_k sin k psi to row ``which`` of the strips' loads, psi being the drive phase.
+    """Add sum_k a_k cos k psi + b_k sin k psi to column ``which`` of the strips' loads, psi being the drive phase.
 
-    The parameters a_k, b_k are in N or N m; the integrator's term for explicit dependence on time is included.
+    The law's parameters a_k, then b_k, are in N or N m; ``frame``: see :mod:`wingfit.sim.kernels.laws`. The
+    integrator's term for explicit dependence on time is included.
     """
     port = strip_port(frame)
     harmonics = len(port.parameters) // 2
@@ -187,7 +194,7 @@ def _series(frame: Any, which: int) -> None:
 
 @inlined
 def _further(turned: Any, by: Any) -> Any:
-    """(Cosine, sine) of the sum of two angles, from those of the angles."""
+    """Return (cosine, sine) of the sum of two angles, from (cosine, sine) of each."""
     return turned[0] * by[0] - turned[1] * by[1], turned[1] * by[0] + turned[0] * by[1]
 
 

@@ -1,4 +1,4 @@
-"""All effects, in the order in which they act on a scene."""
+"""List all effects, in the order in which they are applied to a simulation."""
 
 from __future__ import annotations
 
@@ -35,7 +35,10 @@ EFFECTS: dict[str, Effect] = {
 
 
 def chosen(names: Iterable[str], rig: Wing | Vehicle) -> tuple[Effect, ...]:
-    """Effects by ``names``, in the order of the registry; ValueError if unknown, repeated or not for ``rig``."""
+    """Return the effects with these ``names``, in the order of the registry.
+
+    ValueError if a name is unknown or repeated, or its effect does not apply to ``rig``.
+    """
     wanted = list(names)
     for name in wanted:
         if name not in EFFECTS:

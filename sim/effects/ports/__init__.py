@@ -1,1 +1,1 @@
-"""Where an effect may act: on a wing, on a vehicle, or on an observation."""
+"""What an effect may change: the input of a wing or vehicle simulation, or an observation."""

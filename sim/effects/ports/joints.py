@@ -1,4 +1,4 @@
-"""Direction, length and place of the connectors of a wing, for effects of the structure."""
+"""Direction, length and position of a wing's connectors (springs between its bodies), for effects of the structure."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ class Joints:
     """Geometry of C connectors.
 
     Attributes:
-        along_span: [C]: joins neighbours along the span (or the root with its drive), bends about the chord and twists
-            about the span; otherwise neighbours along the chord, with the axes exchanged.
-        part: [C]: length of wing that the connector represents, as a fraction of the span: an angle divided by it is a
-        curvature
-            in radians over the span, which is the same in every discretisation.
-        within: [C]: joins two bodies of the wing; the others join the root to a driving rod. Effects do not act on
-            their bending, because a law in parallel would bridge the play of ``backlash``.
+        along_span: [C]: True if it joins neighbours along the span (or the root with its drive): it then bends about
+            the chord (x) and twists about the span (y). False for neighbours along the chord, with these axes
+            exchanged.
+        part: [C]: length of wing that the connector represents, as a fraction of the span. An angle divided by it is a
+            curvature in radians over the span, which is the same in every discretisation.
+        within: [C]: True if it joins two bodies of the wing, False if it joins the root to a driving rod. Effects do
+            not act on the bending of the latter, because a law in parallel would bridge the play of ``backlash``.
         reach: [C, 2]: where that length of wing begins and ends, as fractions of the span from root to tip.
     """
 
@@ -32,7 +32,7 @@ class Joints:
 
     @classmethod
     def of(cls, structure: Structure) -> Joints:
-        """Geometry of the connectors of a wing."""
+        """Return the geometry of the connectors of ``structure``."""
         edges = structure.planform.strips(structure.division)
         root, span = edges[0], edges[-1] - edges[0]
         along = np.array([c.modulus == SPANWISE_MODULUS for c in structure.connectors])
@@ -47,11 +47,14 @@ class Joints:
         return cls(along, part, within, reach)
 
     def out_of_plane(self, stiffness: Array) -> tuple[Array, Array]:
-        """Stiffness about x and y [C, W] from ``stiffness`` [C, 6, W]; zero for the bending of the root about x."""
+        """Return the stiffness about x and about y [C, W] from ``stiffness`` [C, 6, W] (W individuals).
+
+        At the connectors of the root to a driving rod, that about x (bending) is set to zero.
+        """
         return np.where(self.within[:, None], stiffness[:, 0], 0.0), stiffness[:, 1]
 
     def bending(self, stiffness: Array) -> tuple[Array, Array]:
-        """As :meth:`out_of_plane`, but zero also about the axis of torsion."""
+        """Return the bending stiffness about x and about y [C, W]: :meth:`out_of_plane` with torsion set to zero."""
         about_x, about_y = self.out_of_plane(stiffness)
         along = self.along_span[:, None]
         return np.where(along, about_x, 0.0), np.where(along, 0.0, about_y)

@@ -1,4 +1,4 @@
-"""The marker nearest to a place, and the tangents of the wing at a marker, for faults of single markers."""
+"""Find the markers nearest to a position, and the tangents of the wing at a marker, for faults of single markers."""
 
 from __future__ import annotations
 
@@ -13,10 +13,11 @@ _NEAR = 0.05  # of the span: distance at which a neighbour has the weight exp(-1
 
 
 def nearest(wing: Wing, values: Values) -> Index:
-    """Indices [B, M] of the markers of ``wing``, sorted by their distance at rest from the position in ``values``.
+    """Return the indices [B, M] of the M markers of ``wing``, sorted by distance at rest from a position.
 
-    A fault affects only the nearest marker, so the observation jumps where the position comes nearer to another one.
-    A gradient search therefore stays at a marker; only a trial of several positions finds the right one.
+    The position of each of B individuals is in ``values``: "station" (fraction of the span) and "chord" (of the chord).
+    A fault affects only the nearest markers, so the observation jumps where the position comes nearer to another one. A
+    gradient search therefore stays at a marker; only a trial of several positions finds the right one.
     """
     y, leading, chord = (np.array([getattr(s, a) for s in wing.stations]) for a in ("y", "leading_edge", "chord"))
     at = y[0] + values["station"] * (y[-1] - y[0])
@@ -27,10 +28,10 @@ def nearest(wing: Wing, values: Values) -> Index:
 
 
 def tangents(wing: Wing, marker: int) -> Array:
-    """Weights [2, M] of the markers' positions that give the derivatives along x and y at rest at ``marker``.
+    """Return weights [2, M] with which the positions of M markers sum up to the wing's tangents at ``marker``.
 
-    They follow from a weighted least-squares plane through the markers around it: exact for a uniform rotation and
-    strain.
+    The tangents are the derivatives of the position by x and by y at rest. The weights follow from a weighted
+    least-squares plane through the markers around ``marker``: exact for a uniform rotation and strain.
     """
     rest = np.array([m.position[:2] for m in wing.markers])
     apart = rest - rest[marker]

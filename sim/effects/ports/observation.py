@@ -1,4 +1,4 @@
-"""A simulated beat on its way into a recording, which faults of cameras, clocks and balances change."""
+"""A simulated beat before it is compared with a recording; faults of cameras, clocks and balances change it."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from wingfit.records.dataset import STANDARD_GRAVITY
 
 @dataclass
 class Sampling:
-    """One beat of B individuals and the instants at which it is sampled. Effects change it in place.
+    """One simulated beat of B individuals and the instants at which it is sampled. Effects change it in place.
 
     Attributes:
         rig: the wing or vehicle that was recorded.
-        recording: its conditions and instants.
-        beat: the measured quantity at n equal steps over one beat from drive phase 0. Tracks [B, n, M, 3], in m, of all
-            markers of the wing in its order; forces [B, n, 2], in N, along body x and z, both even if the recording has
-            one of them, as a tilted balance mixes them.
-        times: [B, T], s: instants at which it is sampled, initially those of the recording.
-        added: [B, T, C], added after sampling; C channels as in the recording. Initially zero.
+        recording: the recording to compare with, whose conditions and instants apply.
+        beat: the measured quantity at n equal steps over one beat from drive phase 0. Tracks: [B, n, M, 3], in m, of
+            all M markers of the wing in its order. Forces: [B, n, 2], in N, along body x and z; both, even if the
+            recording has one of them, as a tilted balance mixes them.
+        times: [B, T], s: T instants at which the beat is sampled, initially those of the recording.
+        added: [B, T, C]: values to add after sampling to the C channels of the recording. Initially zero.
     """
 
     rig: Wing | Vehicle
@@ -34,20 +34,23 @@ class Sampling:
 
     @property
     def wing(self) -> Wing:
-        """The wing; ValueError for a vehicle."""
+        """The recorded wing; ValueError if the rig is a vehicle."""
         if not isinstance(self.rig, Wing):
             raise ValueError(f"vehicle {self.rig.name!r} has recordings of forces, not of tracks: remove the fault")
         return self.rig
 
     @property
     def vehicle(self) -> Vehicle:
-        """The vehicle; ValueError for a wing."""
+        """The recorded vehicle; ValueError if the rig is a wing."""
         if not isinstance(self.rig, Vehicle):
             raise ValueError(f"wing {self.rig.name!r} has recordings of tracks, not of forces: remove the fault")
         return self.rig
 
     def along_axes(self, x: Array, z: Array) -> Array:
-        """Forces [B, C] in N along the axes of the recording, from ``x`` and ``z`` [B] in weights of the vehicle."""
+        """Return forces [B, C] (N) in the C channels of the recording, from ``x`` and ``z`` [B].
+
+        ``x`` and ``z`` are forces along the body's axes in units of the vehicle's weight.
+        """
         weight = self.vehicle.mass * STANDARD_GRAVITY
         return weight * np.stack([x if axis == "x" else z for axis in self.recording.forces], axis=1)
 
@@ -57,7 +60,7 @@ class Sampling:
         return self.recording.kind
 
     def filtered(self, gain: Complex) -> None:
-        """Multiply harmonic k of the beat by ``gain`` [B, K + 1] (K + 1 = n // 2 + 1); gain[:, 0] acts on the mean."""
+        """Multiply harmonic k of the beat by the complex ``gain[:, k]``, of [B, n // 2 + 1]; k = 0 is the mean."""
         n = self.beat.shape[1]
         spectrum = np.fft.rfft(self.beat, axis=1)
         spectrum *= gain.reshape(*gain.shape, *(1,) * (self.beat.ndim - 2))
@@ -65,15 +68,15 @@ class Sampling:
 
     @property
     def harmonics(self) -> Array:
-        """Frequencies (Hz) of the harmonics of the beat [n // 2 + 1]."""
+        """Frequencies [n // 2 + 1] (Hz) of the harmonics of the beat, from 0."""
         return np.arange(self.beat.shape[1] // 2 + 1) * self.recording.condition.flap_frequency
 
 
 def between(beat: Array) -> Callable[[Array], Array]:
-    """Interpolator of a periodic ``beat`` [n, M, I]: takes delays [n, M] in beats and returns [n, M, I].
+    """Return an interpolator of a periodic ``beat`` [n, M, I]: a function of delays [n, M] (beats) to values [n, M, I].
 
-    Element [j, m] is marker m at the time of step j plus its delay. Cubic Hermite interpolation with spectral slopes:
-    the error is (2 pi k / n)^4 / 384 of harmonic k.
+    n steps, M markers, I coordinates. Element [j, m] of the result is marker m at the time of step j plus its delay.
+    Cubic Hermite interpolation with spectral slopes: the error is (2 pi k / n)^4 / 384 of harmonic k.
     """
     n, columns = len(beat), np.arange(beat.shape[1])
     turn = (2j * np.pi / n * np.arange(n // 2 + 1))[:, None, None]

@@ -24,12 +24,12 @@ PLACES = (
 
 @dataclass(frozen=True)
 class Stereo:
-    """Two cameras of each of B individuals.
+    """Two cameras for each of B individuals.
 
     Attributes:
-        x, y: point of the plane z = 0 that both aim at, m [B, 1, 1].
+        x, y: point of the plane z = 0 that both cameras aim at, m [B, 1, 1].
         distance: height of the cameras above that plane, m [B, 1, 1].
-        base: distance between them, m [B, 1, 1].
+        base: distance between the cameras, m [B, 1, 1].
     """
 
     x: Array
@@ -39,14 +39,15 @@ class Stereo:
 
     @classmethod
     def of(cls, values: Values) -> Stereo:
-        """The pairs of cameras of B individuals, from the values [B] of the parameters PLACES."""
+        """Return the cameras of B individuals, from the ``values`` [B] of the parameters PLACES by name."""
         x, y, distance, base = (values[p.name][:, None, None] for p in PLACES)
         return cls(x, y, distance, base * distance)
 
     def image(self, points: Array, side: float) -> tuple[Array, Array]:
-        """Images [B, n, M] of ``points`` [B, n, M, 3], in focal lengths from the image of the point aimed at.
+        """Return the image coordinates (u along x, v along y) [B, n, M] of ``points`` [B, n, M, 3] (m) in one camera.
 
-        ``side`` is -1 for the camera nearer the root and 1 for the other.
+        Coordinates are in focal lengths from the image of the point aimed at; n instants, M markers. ``side`` is -1 for
+        the inner camera, nearer the root, and 1 for the outer one.
         """
         depth = self.distance - points[..., 2]
         camera = self.y + 0.5 * side * self.base
@@ -55,9 +56,10 @@ class Stereo:
         return u, v
 
     def points(self, inner: tuple[Array, Array], outer: tuple[Array, Array]) -> Array:
-        """Points [B, n, M, 3] with the images ``inner`` and ``outer``; half-way between rays that do not meet.
+        """Triangulate points [B, n, M, 3] (m) from their images (u, v) in the ``inner`` and ``outer`` camera.
 
-        Distance = base / disparity (Hartley and Zisserman 2004, Multiple View Geometry; parallel cameras).
+        Depth = base / disparity (Hartley and Zisserman 2004, Multiple View Geometry; parallel cameras). Where the rays
+        do not meet, the point is half-way between them.
         """
         disparity = inner[1] - outer[1] + self.base / self.distance
         depth = self.base / disparity

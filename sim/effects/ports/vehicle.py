@@ -1,4 +1,4 @@
-"""Input of the simulation of a vehicle, which effects change."""
+"""The scene of a vehicle: the input of its simulation, which effects change."""
 
 from __future__ import annotations
 
@@ -28,9 +28,12 @@ Change = Callable[["VehicleScene", Mapping[str, Array]], None]
 
 @dataclass(frozen=True)
 class Setting:
-    """What all individuals share: the vehicle, its condition, and the resolution of a beat.
+    """Inputs that all individuals share: the vehicle, its condition, and the resolution of a beat.
 
-    ``motion`` is the recording's or, without one, the vehicle's; ``r`` [E] are the middles of the elements, m.
+    ``terms``: names of the model's terms that are on (:mod:`wingfit.sim.vehicle.terms`); ``motion``: that of the
+    recording or, without one, of the vehicle; ``instants``: number n of instants in a beat; ``peel_width``: time
+    (beats) in which rotational circulation replaces fling circulation; ``r`` [E]: middles of the wing's elements, m
+    from the flapping axis.
     """
 
     vehicle: Vehicle
@@ -43,16 +46,17 @@ class Setting:
 
 
 def deferred(stage: Stage, change: Change) -> Change:
-    """``change`` of a scene, deferred to ``stage``, after all effects have made their immediate changes."""
+    """Return the ``change`` of a scene, deferred to ``stage``, after all effects have made their immediate changes."""
     return lambda scene, values: scene.after(stage, lambda: change(scene, values))
 
 
 @dataclass
 class VehicleScene:
-    """B individuals of one vehicle in one condition. Effects change it in place.
+    """B individuals of one vehicle in one condition. Effects change this object in place.
 
     Effects set drive, stream, mass and loading at once, in the order of the registry. Changes that depend on these or
-    on the flow are deferred to their stage (:meth:`after`).
+    on the flow are deferred to their stage (:meth:`after`). A beat has n instants, a wing E elements; t* is the time in
+    beats.
 
     Attributes:
         setting: shared by all individuals.
@@ -62,9 +66,10 @@ class VehicleScene:
         density: [B] of the air, kg/m^3.
         mass_factor: [B], factor on the mass of the wings.
         inflow: [B, n], m/s: added to the stream along body x over the beat.
-        loading: [B, E + 8]: factor on circulation at the elements, then at the stations.
-        fling: [B]: coefficient of circulation 1/2 C c^2 (-theta_w') while the wings peel, beyond that of the terms.
-        added: [B, 2, n]: forces of all wings along body x and z besides those of the terms, N.
+        loading: [B, E + 8]: factor on the circulation at the E elements, then at the eight stations.
+        fling: [B]: coefficient C of an additional circulation 1/2 C c^2 (-theta_w') while the wings peel apart (chord
+            c, wing pitch theta_w).
+        added: [B, 2, n]: forces of all wings along body x and z besides those of the model's terms, N.
     """
 
     setting: Setting
@@ -82,7 +87,7 @@ class VehicleScene:
 
     @classmethod
     def of(cls, setting: Setting, genes: Mapping[str, Array], count: int) -> VehicleScene:
-        """``count`` vehicles without effects; ``genes`` [count] as far as there are any."""
+        """Return the scene of ``count`` individuals without effects, from their ``genes`` [count] by name."""
         air, n = setting.condition, setting.instants
         flap = flap_series(setting.motion.flap, genes, count, n)
         if len(flap) < count:
@@ -106,7 +111,7 @@ class VehicleScene:
         self._waiting.setdefault(stage, []).append(action)
 
     def settle(self) -> None:
-        """Run the deferred actions, stage by stage."""
+        """Run the deferred actions, stage by stage in the order of ``Stage``."""
         for stage in get_args(Stage):
             for action in self._waiting.pop(stage, []):
                 action()
@@ -114,14 +119,14 @@ class VehicleScene:
     # -- for effects of the drive ------------------------------------------------------------------------------
 
     def add_harmonic(self, k: int, coefficient: Complex) -> None:
-        """Add Re coefficient exp(2 pi i k t*), ``coefficient`` [B] in rad, to the flap angle."""
+        """Add Re coefficient exp(2 pi i k t*) to the flap angle; ``coefficient`` [B], rad."""
         if self.flap.shape[1] <= k:
             self.flap = np.pad(self.flap, ((0, 0), (0, k + 1 - self.flap.shape[1])))
         self.flap[:, k] += coefficient
 
     @cached_property
     def angles(self) -> Angles:
-        """Motion of the wings; the flap angle is read-only after the first access."""
+        """Motion of the wings (flap angle, pitch, peeling); the flap angle is read-only after the first access."""
         self.flap.setflags(write=False)
         own, frequency = self.setting, self.setting.condition.flap_frequency
         return angles_of(self.flap, own.motion, self.genes, frequency, own.instants, own.vehicle.claps, own.peel_width)
@@ -130,18 +135,21 @@ class VehicleScene:
 
     @cached_property
     def stations(self) -> Stations:
-        """Eight stations along the wing."""
+        """The eight stations along each wing at which effects of the flow act."""
         return stations(self.setting.vehicle, self.setting.motion)
 
     def load(self, law: Callable[[Array], Array]) -> None:
-        """Multiply circulation by ``law``, a function of distances [m] from the flapping axis that returns [B, m]."""
+        """Multiply the circulation by ``law``, a function of distances [m] (in m) from the flapping axis.
+
+        It returns a factor [B, m] for each individual and distance.
+        """
         self.loading *= law(np.concatenate([self.setting.r, self.stations.r]))
 
     # -- for effects of the flow -------------------------------------------------------------------------------
 
     @cached_property
     def wings(self) -> StationedWings:
-        """The wings at eight stations; motion, stream and loading are read-only after the first access."""
+        """The wings at eight stations; flap angle, airspeed, density, loading and fling are read-only afterwards."""
         own = self.setting.vehicle
         for read in (self.airspeed, self.density, self.loading, self.fling):
             read.setflags(write=False)
@@ -163,19 +171,26 @@ class VehicleScene:
         return flow
 
     def follow(self, share: Array, target: Array) -> Array:
-        """Periodic solution x of x' = share speed (target - x); ``share`` [B, 8] in 1/m, ``target`` as in the flow."""
+        """Return the periodic solution x of x' = share V (target - x), where V is the speed of the flow.
+
+        ``share`` [B, 8], 1/m; ``target`` and x [sides, B, n, 8] as in the flow.
+        """
         out = np.empty_like(target)
         followed(self.flow.speed, share, target, self.step, out)
         return out
 
     def over_span(self, values: Array, weight: Array) -> Array:
-        """Sum [B, n] of ``values`` [B, n, 8] times ``weight`` [8]."""
+        """Return the sum over eight stations [B, n] of ``values`` [B, n, 8] times ``weight`` [8]."""
         out = np.empty(values.shape[:2])
         span_sums(values, weight, out)
         return out
 
     def push(self, x: Array, z: Array) -> None:
-        """Add a force of every wing: ``x`` [B, n] along body x, ``z`` along its side's z before the dihedral, N."""
+        """Add a force (N) of every wing to the vehicle.
+
+        ``x`` [B, n]: along body x; ``z`` [B, n]: along z of the wing's side (lower or upper), projected by the
+        dihedral.
+        """
         for rows, side in self.wings.sides:
             self.added[:, 0] += self.wings.alike * x
             self.added[:, 1] += self.wings.alike * side.sign * rows[:, PROJECTION] * z
@@ -183,39 +198,43 @@ class VehicleScene:
     # -- for the model -----------------------------------------------------------------------------------------
 
     def rows(self, half_step: float) -> Array:
-        """Motion [B, 14, n] of the wing's elements, as the kernels read it.
+        """Return the motion [B, 14, n] of the wing's elements, in the rows of :mod:`wingfit.sim.vehicle.elements`.
 
         The first element has the fraction ``half_step`` of the twist at the pitch station.
         """
         return motion_rows(self.angles, self.forward(self.inflow), self.setting.motion.root_pitch, half_step)
 
     def each_side(self, rows: Array) -> Iterator[Side]:
-        """Yield each side of the vehicle, after setting the motion ``rows`` [B, 14, n] to that side, in place."""
+        """Yield each side (lower wings, then upper ones, if there are any) of the vehicle.
+
+        The motion ``rows`` [B, 14, n] is changed in place to that of the side.
+        """
         below = self.airspeed * np.sin(self.setting.condition.angle_of_attack)
         for upper in uppers(self.setting.vehicle):
             yield set_side(rows, self.setting.vehicle, self._flap, below, upper)
 
     def finish(self) -> Array:
-        """Forces beyond those of the terms [B, 2, n], N: added by effects, and from their changes of the flow."""
+        """Return the forces [B, 2, n] (N, body x and z) that effects add: directly, and by changing the flow."""
         if self._base is None:
             return self.added
         return np.asarray(self.added + (self.wings.forces(self.flow) - self._base))
 
     def forward(self, inflow: Array) -> Array:
-        """Speed of the stream [B, n] along body x with an ``inflow`` [B, n], m/s."""
+        """Return the speed of the stream [B, n] (m/s) along body x, including an ``inflow`` [B, n] (m/s)."""
         return np.asarray((self.airspeed * np.cos(self.setting.condition.angle_of_attack))[:, None] + inflow)
 
     @cached_property
     def _flap(self) -> tuple[Array, Array, Array]:
-        """Cosine and sine of the flap angle, and its rate, [B, n]."""
+        """Cosine and sine of the flap angle, and its rate (rad/s), [B, n] each."""
         flap = self.angles.flap
         return np.cos(flap[:, 0]), np.sin(flap[:, 0]), flap[:, 1]
 
     def _turning(self) -> tuple[Array, Array]:
-        """Rates [B, n] in rad/s that replace C_R theta_w' in Eq. 2 at the pitch station: of rotation and of fling.
+        """Return two rates [B, n] (rad/s) that replace C_R theta_w' in Eq. 2 of Armanini et al. (2016).
 
-        The term of the model replaces C_R by C_F while the wings peel (Eqs. 4, 7). Here C_R continues and C_F + C_R is
-        added, which is the same unless rotation lags or stalls; fling between two wings does neither.
+        They are those of rotation and of fling, at the pitch station. The term of the model replaces C_R by C_F while
+        the wings peel (Eqs. 4, 7). Here C_R continues and C_F + C_R is added, which is the same unless rotation lags or
+        stalls; fling between two wings does neither.
         """
         on, rate = float("clap_and_peel" in self.setting.terms), self.angles.pitch[:, 1]
         rotation, fling = self._coefficients("C_r", "C_F").T[:, :, None]
@@ -224,5 +243,5 @@ class VehicleScene:
         return np.asarray(turn * rate), np.asarray(-more * self.angles.peel * rate)
 
     def _coefficients(self, *names: str) -> Array:
-        """Values of genes [B, names]; zero for terms that are off."""
+        """Return the values [B, names] of the genes called ``names``; zero for terms that are off."""
         return np.stack([self.genes.get(name, np.zeros(len(self))) for name in names], axis=1)

@@ -1,4 +1,4 @@
-"""Input of the simulation of a wing, eight individuals at a time, which effects change."""
+"""The scene of a wing: the input of its simulation, eight individuals at a time, which effects change."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ _LEAST_STROKE = 0.01  # rad, for a drive that does not move
 
 @dataclass
 class WingScene:
-    """Input of the kernels for one group of lanes under a condition. Effects change it in place.
+    """Input of the kernels for one group of W individuals of a wing under a condition. Effects change it in place.
 
-    Every lane is an individual in which the effect is on. ``lanes``: stiffness, damping, coefficients, shares and
-    ``hinge`` (:class:`wingfit.sim.kernels.arrays.Lanes`); change their values. ``density`` [W] and ``wind`` [3, W] of
-    the stream. ``rods``: their drive; ``motor`` [MOTOR, W] or empty: a compliant drive
-    (:mod:`wingfit.sim.kernels.motor`). The methods add masses and laws.
+    In each individual of the group the same effects are on. ``lanes``: stiffness, damping, coefficients, distribution
+    of lift and drag, and hinge (:class:`wingfit.sim.kernels.arrays.Lanes`), whose values effects may change.
+    ``density`` [W] (kg/m^3) and ``wind`` [3, W] (m/s) of the stream. ``rods``: motion of the driving rods; ``motor``
+    [MOTOR, W] or empty: a compliant drive (:mod:`wingfit.sim.kernels.motor`). The methods add masses and laws.
     """
 
     structure: Structure
@@ -52,7 +52,7 @@ class WingScene:
 
     @classmethod
     def of(cls, structure: Structure, condition: Condition, lanes: Lanes) -> WingScene:
-        """The scene of a wing without effects."""
+        """Return the scene of a wing without effects."""
         here = setting(condition, 1)
         rods = RodDrive.of(structure.wing.drive, condition.phase_lag, LANES)
         return cls(structure, condition, lanes, rods, here.density, here.wind)
@@ -63,9 +63,9 @@ class WingScene:
         return 2 * np.pi * self.condition.flap_frequency
 
     def body_at(self, station: Array, fraction: Array) -> tuple[Index, Array]:
-        """Bodies [W] at positions on the wing, and the positions [W, 3] relative to the bodies' centres of mass, m.
+        """Return the bodies [W] at positions on the wing, and the positions [W, 3] (m) from the bodies' centres of mass.
 
-        ``station``: fraction of the span from root to tip, ``fraction``: of the chord from the leading edge.
+        ``station`` [W]: fraction of the span from root to tip; ``fraction`` [W]: of the chord from the leading edge.
         """
         planform, wing = self.structure.planform, self.structure.wing
         y = wing.stations[0].y + station * wing.span
@@ -75,9 +75,10 @@ class WingScene:
         return body, np.stack([x, y, np.zeros_like(x)], axis=1) - centre
 
     def add_mass(self, body: int, mass: Array, first_moment: Array, second_moment: Array) -> None:
-        """Add to a body ``mass`` [W] (kg), a first moment [3, W] (kg m) and an inertia [3, 3, W] (kg m^2).
+        """Add to body number ``body`` a ``mass`` [W] (kg) with its first moment [3, W] and its inertia [3, 3, W].
 
-        Both about the body's centre of mass, in its frame. To shift mass within a body, give a ``mass`` of zero.
+        Both moments (kg m, kg m^2) are about the body's centre of mass, in its frame. To shift mass within a body, give
+        a ``mass`` of zero.
         """
         block = np.zeros((6, 6, LANES))
         skew = np.zeros((3, 3, LANES))
@@ -89,26 +90,28 @@ class WingScene:
         self._weights[body] = self._weights.get(body, 0.0) + block
 
     def add_point_mass(self, body: int, mass: Array, place: Array) -> None:
-        """Add a point of ``mass`` [W] (kg) at ``place`` [3, W] (m) relative to a body's centre of mass."""
+        """Add a point of ``mass`` [W] (kg) to body number ``body``, at ``place`` [3, W] (m) from its centre of mass."""
         square = np.eye(3)[:, :, None] * (place**2).sum(axis=0) - place[:, None] * place[None]
         self.add_mass(body, mass, mass * place, mass * square)
 
     def add_air(self, first: int, second: int, block: Array) -> None:
-        """Add [6, 6, W] to the matrix of added mass between two bodies: (moment, force) by (rotation, translation).
+        """Add ``block`` [6, 6, W] to the matrix of added mass between the bodies ``first`` and ``second`` of one strip.
 
-        Bodies of one strip only; for two different bodies add both orders, each the transpose of the other. Air moves
-        along the normal: only the rows and columns of rotation about x and y and of translation along z are used.
+        Rows are moment and force on ``first``, columns rotation and translation of ``second``. For two different bodies
+        add both orders, each the transpose of the other. Air moves along the normal: only the rows and columns of
+        rotation about x and y and of translation along z are used.
         """
         self._air[first, second] = self._air.get((first, second), 0.0) + block
 
     def add_strip_law(
         self, law: Law, parameters: list[Array], states: list[float] | None = None, *, before: bool = False
     ) -> None:
-        """Let a law of the air act on every strip, ``before`` the flow of the strips is known as well as after it.
+        """Let the compiled ``law`` of the air act on each of S strips, after their flow is known.
 
-        ``parameters``: of the law in its order, [W] or [S, W] each. ``states``: for each of its states a factor that
-        makes it comparable with metres of motion (in the search for the periodic motion) at sea level; in thinner air
-        it is reduced in proportion to the density.
+        ``parameters``: those of the law in its order, [W] or [S, W] each. ``states``: for each internal state of the
+        law a factor that converts it to metres of motion at sea level, for the search for the periodic motion; in
+        thinner air the factor is reduced in proportion to the density. With ``before`` the law is also called before
+        the flow is known.
         """
         scale = max(density(self.condition.pressure, self.condition.temperature) / _SEA_LEVEL, _LEAST_SCALE)
         sizes = [size * min(scale, 1.0) for size in states or []]
@@ -118,19 +121,19 @@ class WingScene:
     def add_connector_law(
         self, law: Law, parameters: list[Array], axes: list[int] | None = None, states: list[float] | None = None
     ) -> None:
-        """Let a law act on every connector; ``parameters`` [W] or [C, W].
+        """Let the compiled ``law`` act on each of C connectors; ``parameters``: [W] or [C, W] each.
 
         ``axes``: for each state, the axis of its wrench: 0 to 2 rotation about x, y, z of the first body, 3 to 5
-        translation; ``states`` as for a strip.
+        translation; ``states``: for each state, a factor that converts it to metres.
         """
         self._add(self._connector, len(self.structure.connectors), law, parameters, states or [])
         self._connector[-1][5] = len(self._axes)
         self._axes += axes or []
 
     def add_point_law(self, law: Law, station: Array, fraction: Array, parameters: list[Array]) -> None:
-        """Let a law apply a wrench at a place of the wing, given as in :meth:`body_at`; ``parameters`` [W] each.
+        """Let ``law`` apply a wrench at a position on the wing, given as in :meth:`body_at`; ``parameters`` [W] each.
 
-        Where the place lies on different bodies in different individuals, each of these bodies has a point, with
+        Where the position lies on different bodies in different individuals, each of these bodies has a point, with
         parameters of zero in the other individuals.
         """
         found, arms = self.body_at(station, fraction)
@@ -142,7 +145,7 @@ class WingScene:
         self._arms += [np.where(lanes, arms.T, 0.0) for lanes in here]
 
     def at_rest(self, station: Array, fraction: Array) -> Array:
-        """World coordinates [3, W] (m) at rest of positions on the wing, given as in :meth:`body_at`."""
+        """Return the world coordinates [3, W] (m) at rest of positions on the wing, given as in :meth:`body_at`."""
         found, arms = self.body_at(station, fraction)
         return np.asarray((arms + np.array([self.structure.bodies[n].centre for n in found])).T)
 
@@ -154,14 +157,17 @@ class WingScene:
 
     @property
     def _motor_sizes(self) -> Array:
-        """Factors from the states of a compliant motor to metres: a lead (s) times the speed of the tip."""
+        """Factors that convert the three states of a compliant motor to metres, or empty without one.
+
+        For the lead (s) it is the speed of the tip.
+        """
         wing = self.structure.planform.wing
         stroke = np.abs(RodDrive.of(wing.drive, 0.0, 1).series[1:]).sum()  # as described: the same for every individual
         lead = wing.stations[-1].y * self.angular_rate * max(stroke, _LEAST_STROKE)
         return np.array([lead, lead / self.angular_rate, 1e-3] if len(self.motor) else [])
 
     def frozen(self) -> Lanes:
-        """Lanes with all added masses and laws, for the kernels."""
+        """Return the inputs of the kernels, with all added masses and laws."""
         solid = sorted(self._weights)
         pairs = [(n, n, n) for n in solid]
         pairs += [(i, j, self.structure.position[i, j]) for i, j in sorted(self._air)]
@@ -185,5 +191,5 @@ class WingScene:
         )
 
     def setting(self, steps: int) -> Setting:
-        """The condition for the kernels, with ``steps`` per beat."""
+        """Return the condition as input of the kernels, with ``steps`` per beat and this scene's density and wind."""
         return setting(self.condition, steps)._replace(density=aligned(self.density), wind=aligned(self.wind))
