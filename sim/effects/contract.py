@@ -165,7 +165,7 @@ class Effect:
         return {p.name: genomes[:, column[f"{self.name}.{p.name}"]] for p in self.parameters}
 
     def on(self, genes: tuple[Gene, ...], genomes: Array) -> Mask:
-        """Return True [B] where any size of the effect is nonzero in ``genomes`` [B, G]; their columns are ``genes``."""
+        """Return True [B] where any size of the effect is nonzero in ``genomes`` [B, G] with the columns ``genes``."""
         values = self.values(genes, genomes)
         return np.asarray(np.any([values[p.name] != 0.0 for p in self.size], axis=0))
 

@@ -97,7 +97,7 @@ class Probe:
         return np.asarray(lies @ hats), np.asarray((lies * lever) @ hats)
 
     def effects(self) -> tuple[Effect, ...]:
-        """Return load and motion as effects of a :class:`~wingfit.sim.wing.flexible_wing.FlexibleWing` with this probe."""
+        """Return load and motion as effects of a FlexibleWing (:mod:`wingfit.sim.wing.flexible_wing`)."""
         return (self._load(), self._motion()) if self.driving else (self._load(),)
 
     @property

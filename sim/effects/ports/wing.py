@@ -63,7 +63,7 @@ class WingScene:
         return 2 * np.pi * self.condition.flap_frequency
 
     def body_at(self, station: Array, fraction: Array) -> tuple[Index, Array]:
-        """Return the bodies [W] at positions on the wing, and the positions [W, 3] (m) from the bodies' centres of mass.
+        """Return the bodies [W] at positions on the wing, and the positions [W, 3] (m) from the bodies' mass centres.
 
         ``station`` [W]: fraction of the span from root to tip; ``fraction`` [W]: of the chord from the leading edge.
         """

@@ -1,4 +1,4 @@
-"""Play where the driving rods hold the wing, which turns freely between two stops."""
+"""Effect: play where the driving rods hold the wing, which turns freely between two stops."""
 
 from __future__ import annotations
 
@@ -21,11 +21,12 @@ def _law(frame: Any, moment: int) -> None:
     """Add a pin about x, free to turn by half the play, b / 2, to either side, in series with the spring of rotation.
 
     Q is the rotation of the second body in the first; g_0, g_1, g_2 are the spring's constants G (thesis Eq. 5). The
-    spring stores -g_0 Q_00 - r cos(phi), with p = r cos(phi) = g_1 Q_11 + g_2 Q_22 and q = r sin(phi) =
-    g_1 Q_21 - g_2 Q_12. With the pin turned by psi, it stores -g_0 Q_00 - r cos(phi - psi). This energy is least at
-    psi = phi within the play, and at the stop beyond it. The effect thus replaces cos(phi) by C(phi), and the moment
-    about x, -r sin(phi), by -r S with S = -C': S is zero within the play and the sine of phi -+ b / 2 beyond it. The
-    law adds the difference. From h before a stop to h behind it, S is a parabola.
+    spring stores -g_0 Q_00 - r cos(phi), with p = r cos(phi) = g_1 Q_11 + g_2 Q_22 and q = r sin(phi) = g_1 Q_21 - g_2
+    Q_12. With the pin turned by psi, it stores -g_0 Q_00 - r cos(phi - psi). This energy is least at psi = phi within
+    the play, and at the stop beyond it. The effect thus replaces cos(phi) by C(phi), and the moment about x, -r
+    sin(phi), by -r S with S = -C': S is zero within the play and the sine of phi -+ b / 2 beyond it. The law adds the
+    difference. From h before a stop to h behind it, S is a parabola. ``frame`` and ``moment``: see
+    :mod:`wingfit.sim.kernels.laws`.
     """
     port = connector_port(frame)
     for c in range(port.places):
@@ -52,7 +53,7 @@ def _law(frame: Any, moment: int) -> None:
 
 
 def _wing(scene: WingScene, values: Values) -> None:
-    """Let the springs at the root have play; the damper (foam glued to the rod) still acts as before."""
+    """Let the springs at the root have play; the damper there (foam glued to the rod) still acts as before."""
     k = np.moveaxis(scene.lanes.stiffness[:, :3], 1, 0)
     half, root = 0.5 * values["b"], ~Joints.of(scene.structure).within[:, None]
     g1, g2 = 0.5 * (k[2] + k[0] - k[1]), 0.5 * (k[0] + k[1] - k[2])

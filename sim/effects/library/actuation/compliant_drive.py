@@ -1,4 +1,4 @@
-"""A drive whose speed drops under load, so that the rods are late where the wing needs power."""
+"""Effect: a drive whose speed drops under load, so that the rods are late where the wing needs power."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The drive adds second, third and fourth harmonics to the described stroke."""
+"""Effect: the drive adds second, third and fourth harmonics to the stroke described in the dataset."""
 
 from __future__ import annotations
 

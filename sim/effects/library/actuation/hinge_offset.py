@@ -1,4 +1,4 @@
-"""The axis about which the drive turns the rods is displaced from the described one."""
+"""Effect: the axis about which the drive turns the rods is displaced from the one described in the dataset."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The axis about which the drive turns the rods is not parallel to the body."""
+"""Effect: the axis about which the drive turns the rods is not parallel to the body's x axis."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The lag of the rear driving rod is larger than described."""
+"""Effect: the lag of the rear driving rod behind the front one is larger than described in the dataset."""
 
 from __future__ import annotations
 

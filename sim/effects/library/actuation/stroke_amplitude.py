@@ -1,4 +1,4 @@
-"""The stroke amplitude is larger than described."""
+"""Effect: the stroke amplitude is larger than described in the dataset."""
 
 from __future__ import annotations
 

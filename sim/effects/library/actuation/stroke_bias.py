@@ -1,4 +1,4 @@
-"""The mean flap angle differs from the described one."""
+"""Effect: the mean flap angle differs from the one described in the dataset."""
 
 from __future__ import annotations
 

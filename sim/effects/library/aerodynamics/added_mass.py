@@ -1,4 +1,4 @@
-"""Inertia of the air that a wing accelerates together with itself."""
+"""Effect: inertia of the air that a wing accelerates together with itself (added mass)."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ def _wing(scene: WingScene, values: Values) -> None:
 
 
 def strip_matrix(structure: Structure, strip: int) -> Array:
-    """Added-mass matrix [6 n, 6 n] (m^3 to m^5) of a strip of n bodies in air of density one.
+    """Return the added-mass matrix [6 n, 6 n] (m^3 to m^5) of the n bodies of ``strip``, in air of density one.
 
     Its quadratic form in the twists of the bodies is twice the kinetic energy of the air. The points of a section of
-    chord c = 2 b move along its normal with w(x), x = cos t from edge to edge. This causes the jump sqrt(1 - x^2)
-    sum_k W_k U_k(x) of the velocity potential, with U_k(x) = sin((k + 1) t) / sin t. For w = sum_k w_k U_k, W_k is
-    2 b w_k / (k + 1), and the energy per span is rho / 2 times the integral of the jump times w. A section that heaves
-    thus moves rho pi c^2 / 4 of air; one that pitches about its middle, rho pi c^4 / 128 (Bisplinghoff, Ashley and
-    Halfman, Aeroelasticity (1955), ch. 5).
+    chord c = 2 b move along its normal with the velocity w(x), x = cos t from edge to edge (-1 to 1). This causes the
+    jump sqrt(1 - x^2) sum_k W_k U_k(x) of the velocity potential, with U_k(x) = sin((k + 1) t) / sin t. For w = sum_k
+    w_k U_k, W_k is 2 b w_k / (k + 1), and the energy per span is rho / 2 times the integral of the jump times w. A
+    section that heaves thus moves rho pi c^2 / 4 of air; one that pitches about its middle, rho pi c^4 / 128
+    (Bisplinghoff, Ashley and Halfman, Aeroelasticity (1955), ch. 5).
     """
     panel = structure.panels[structure.division.index(strip, 0)]
     first, count = structure.division.index(strip, 0), structure.division.bodies[strip]
@@ -49,9 +49,9 @@ def strip_matrix(structure: Structure, strip: int) -> Array:
 def _strip_matrix(
     stations: tuple[Station, ...], y0: float, y1: float, centres: tuple[tuple[float, float], ...]
 ) -> Array:
-    """The matrix of :func:`strip_matrix`, for the strip from ``y0`` to ``y1`` (m); cached and read-only.
+    """Return the matrix of :func:`strip_matrix`, for the strip from ``y0`` to ``y1`` (m); cached and read-only.
 
-    ``centres`` [n]: x and y of the centres of mass of the strip's bodies, m.
+    ``stations``: the outline of the wing; ``centres`` [n]: x and y (m) of the centres of mass of the strip's n bodies.
     """
     count = len(centres)
     total = np.zeros((6 * count, 6 * count))
@@ -72,24 +72,26 @@ def _strip_matrix(
 
 
 def _normal_motion(y: float, middle: float, centre: tuple[float, float]) -> list[tuple[int, float, float]]:
-    """Normal velocity of a wing section at span ``y`` for a unit of each twist component of its body.
+    """Return the normal velocity of a wing section at span ``y`` (m) for a unit of each twist component of a body.
 
-    Returns (index of the component, velocity at mid-chord ``middle``, its change per metre along x); ``centre``: of
-    mass, x and y (m).
+    Each entry: index of the component, velocity at mid-chord, its change per metre along x. ``middle``: x of mid-chord
+    (m); ``centre``: x and y of the body's centre of mass (m). Components that do not move the section along its normal
+    are left out.
     """
     return [(0, y - centre[1], 0.0), (1, centre[0] - middle, -1.0), (5, 1.0, 0.0)]
 
 
 def _modes(s0: float, s1: float, constant: float, slope: float) -> Array:
-    """Coefficients w_k of w(x) = constant + slope x between two fractions of the chord, zero elsewhere; x in -1..1.
+    """Return the coefficients w_k [_MODES] of w(x) = constant + slope x between two fractions of the chord.
 
-    w_k is 2 / pi times the integral of w U_k sqrt(1 - x^2) dx, which with x = cos t is that of w sin((k + 1) t) sin t.
+    w is zero outside ``s0`` to ``s1``; x is -1 at the leading edge and 1 at the trailing edge. w_k is 2 / pi times the
+    integral of w U_k sqrt(1 - x^2) dx, which with x = cos t is that of w sin((k + 1) t) sin t.
     """
     t0, t1 = math.acos(max(min(2 * s1 - 1, 1.0), -1.0)), math.acos(max(min(2 * s0 - 1, 1.0), -1.0))
     m = np.arange(1, _MODES + 1)
 
     def cosines(n: npt.NDArray[np.int64]) -> Array:
-        """Integral of cos(n t) over t from t0 to t1."""
+        """Return the integral of cos(n t) over t from t0 to t1."""
         safe = np.where(n == 0, 1, n)
         return np.where(n == 0, t1 - t0, (np.sin(safe * t1) - np.sin(safe * t0)) / safe)
 

@@ -1,4 +1,4 @@
-"""The stream is faster than described, because of tunnel blockage or a wrong anemometer."""
+"""Effect: the stream is faster than described in the dataset, by tunnel blockage or a wrong anemometer."""
 
 from __future__ import annotations
 

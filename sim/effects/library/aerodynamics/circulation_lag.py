@@ -1,4 +1,4 @@
-"""Circulation lags behind the wing's motion while the shed vortices are near (Wagner)."""
+"""Effect: circulation lags behind the wing's motion while the vortices that it has shed are near (Wagner)."""
 
 from __future__ import annotations
 
@@ -22,15 +22,16 @@ _SCALE = 0.1  # motion of the wing over the integral of a lagging circulation, a
 
 
 def wagner(s: npt.ArrayLike) -> Array:
-    """Fraction of the final circulation that a wing has ``s`` half chords after a step (Jones 1940)."""
+    """Return the fraction of the final circulation ``s`` half chords after a step of the angle (Jones 1940)."""
     travelled = np.asarray(s, float)
     return np.asarray(1.0 - sum(a * np.exp(-b * travelled) for a, b in zip(DEFICIT, RATE, strict=True)))
 
 
 def _lag(scene: VehicleScene, values: Values) -> None:
-    """Replace the circulation Gamma by Gamma - share sum_i DEFICIT_i (Gamma - x_i).
+    """Replace the circulation Gamma of a vehicle's wings by Gamma - share sum_i DEFICIT_i (Gamma - x_i).
 
-    The states follow x_i' = RATE_i rate (2 V / c) (Gamma - x_i): V is the speed of the flow, c the chord.
+    The two states follow x_i' = RATE_i rate (2 V / c) (Gamma - x_i): V is the speed of the flow, c the chord; share and
+    rate are the effect's parameters.
     """
     flow = scene.flow
     per_metre = values["rate"][:, None] * (2.0 / scene.stations.chord)
@@ -44,7 +45,10 @@ def _lag(scene: VehicleScene, values: Values) -> None:
 
 
 def _law(frame: Any, moment: int) -> None:
-    """Change the loads of strips as :func:`_lag` does; 2 Gamma / c, speed times lift coefficient, replaces Gamma."""
+    """Change the loads of a wing's strips as :func:`_lag` does; Gamma is represented by 2 Gamma / c.
+
+    This is the speed times the lift coefficient. ``frame`` and ``moment``: see :mod:`wingfit.sim.kernels.laws`.
+    """
     port = strip_port(frame)
     for s in range(port.places):
         share = load(port.parameters, 0, s)

@@ -1,4 +1,4 @@
-"""Wings that touch and peel apart produce circulation (fling)."""
+"""Effect: wings that touch each other and peel apart produce circulation (fling)."""
 
 from __future__ import annotations
 
@@ -19,11 +19,12 @@ _PHASES = 360  # at which the top of the stroke is looked for
 
 
 def fling_near(distance: Array) -> Array:
-    """Circulation of fling at ``distance`` (in chords) from the mirror plane, as a fraction of that of touching wings.
+    """Return the circulation of fling at ``distance`` (chords) from the mirror plane, over that of touching wings.
 
     Two plates that open side by side suck air into the gap. For a narrow gap, Gamma = omega c^2 / (8 distance)
-    (Lighthill 1973). With a coefficient of 2.7, this function agrees with it within a tenth of omega c^2 from 0.15 to
-    1 chord, and it stays finite where the wings touch.
+    (Lighthill 1973), with the opening rate omega (rad/s) and the chord c. With a coefficient of 2.7, the circulation
+    2.7 / 2 c^2 omega times this function agrees with it within a tenth of omega c^2 from 0.15 to 1 chord, and it stays
+    finite where the wings touch.
     """
     return np.asarray(1.0 / (1.0 + (distance / NEAR) ** 2))
 
@@ -36,11 +37,13 @@ def _vehicle(scene: VehicleScene, values: Values) -> None:
 
 
 def _law(frame: Any, moment: int) -> None:
-    """Add the circulation Gamma = C c^2 omega / 2 to a strip that turns nose down at the rate omega.
+    """Add to each strip the circulation Gamma = C c^2 omega / 2 while it turns nose down at the rate omega (rad/s).
 
-    The mirror image of the wing lies beyond a plane above it. C is the coefficient, c the chord. Gamma falls with the
-    distance of mid-chord from the plane, and with the angle between the two: from 45 degrees on, two plates have no
-    more circulation than each by itself.
+    C is the coefficient, c the chord. A plane above the wing mirrors it: a strip that turns nose down opens the gap
+    between the wing and its mirror image. Gamma falls with the distance of mid-chord from the plane, and with the angle
+    between chord and plane: from 45 degrees on, two plates have no more circulation than each by itself. The parameters
+    are C, the sine and cosine of the plane's angle, and its distance from the world's origin (m). ``frame`` and
+    ``moment``: see :mod:`wingfit.sim.kernels.laws`.
     """
     port = strip_port(frame)
     for s in range(port.places):
@@ -56,7 +59,10 @@ def _law(frame: Any, moment: int) -> None:
 
 
 def _wing(scene: WingScene, values: Values) -> None:
-    """Add the law, with a mirror plane through the flapping axis at ``clearance`` above the top of the mean stroke."""
+    """Add the law, with a mirror plane through the flapping axis.
+
+    It is inclined by ``clearance`` (rad) beyond the largest value over the beat of the mean angle of both rods.
+    """
     phases = 2 * np.pi * np.arange(_PHASES) / _PHASES
     top = scene.rods.angles(phases)[:, :, 0].mean(axis=1).max(axis=0)
     sine, cosine = np.sin(top + values["clearance"]), np.cos(top + values["clearance"])

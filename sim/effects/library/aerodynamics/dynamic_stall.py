@@ -1,4 +1,4 @@
-"""The flow separates from the upper surface late and reattaches late: dynamic stall with one state."""
+"""Effect: the flow separates from the upper surface late and reattaches late (dynamic stall)."""
 
 from __future__ import annotations
 
@@ -21,10 +21,11 @@ _METRES = 0.01  # m of motion of the wing per unit of either state
 
 
 def _stall(scene: VehicleScene, values: Values) -> None:
-    """Multiply the circulation of the angle of attack by 1 - share (1 - ((1 + sqrt X) / 2)^2).
+    """Multiply the circulation due to the angle of attack alpha by 1 - share (1 - ((1 + sqrt X) / 2)^2).
 
     X, the attached fraction of the chord, follows delay X' + X = X_0(alpha - advance alpha') with time in chords
-    travelled; X_0 is that of steady flow (:func:`wingfit.sim.vehicle.states.steady_attachment`).
+    travelled; X_0 is that of steady flow (:func:`wingfit.sim.vehicle.states.steady_attachment`); share, delay and
+    advance are parameters of the effect.
     """
     flow, chord = scene.flow, scene.stations.chord
     stall = np.stack([values["angle"], values["width"], values["advance"]], axis=1)
@@ -35,10 +36,10 @@ def _stall(scene: VehicleScene, values: Values) -> None:
 
 
 def _law(frame: Any, moment: int) -> None:
-    """Change strips' loads as :func:`_stall` does; states: 1 - X (the separated fraction) and a delayed alpha.
+    """Change the loads of a wing's strips as :func:`_stall` does; states: 1 - X (separated fraction), delayed alpha.
 
-    The delayed alpha follows alpha within _RECENT chords travelled. The difference of the two gives alpha' without
-    accelerations.
+    The delayed alpha follows alpha within _RECENT chords travelled. Its difference from alpha gives alpha' without
+    accelerations. ``frame`` and ``moment``: see :mod:`wingfit.sim.kernels.laws`.
     """
     port = strip_port(frame)
     for s in range(port.places):

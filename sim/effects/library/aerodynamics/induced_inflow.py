@@ -1,4 +1,4 @@
-"""The force on the wings accelerates the air, and the wings meet this induced inflow."""
+"""Effect: the wings push air through the disc that they sweep, and move through the stream this causes (inflow)."""
 
 from __future__ import annotations
 
@@ -19,21 +19,28 @@ _SCALE = 0.1  # motion of the wing over the motion of the air that causes it
 
 
 def apparent_mass(density: Array, area: Array) -> Array:
-    """Mass of the air (kg) that a disc of ``area`` (m^2) moves: 8/3 rho R^3 (Tuckerman 1925; Pitt and Peters 1981)."""
+    """Return the mass of air (kg) that a disc of ``area`` (m^2) moves: 8/3 rho R^3 for a disc of radius R.
+
+    ``density``: rho, kg/m^3 (Tuckerman 1925; Pitt and Peters 1981).
+    """
     return np.asarray(8.0 / 3.0 * density * (area / np.pi) ** 1.5)
 
 
 def swept_area(span: float, stroke: Array, wings: int) -> Array:
-    """Area (m^2) that ``wings`` of ``span`` (m) sweep with a ``stroke`` (rad) from end to end (Ellington 1984, III)."""
+    """Return the area (m^2) that ``wings`` wings of ``span`` (m) sweep, at most a full disc (Ellington 1984, III).
+
+    ``stroke``: angle (rad) from end to end.
+    """
     return np.asarray(span**2 * np.minimum(0.5 * wings * stroke, np.pi))
 
 
 def _induce(scene: VehicleScene, values: Values) -> None:
-    """Add the periodic inflow v along body x, through the disc that the wings sweep, to the scene.
+    """Add the periodic inflow v along body x, through the disc that the vehicle's wings sweep, to the scene.
 
-    It solves m v' + 2 rho A V_T v = share T(v), V_T^2 = (U_x + mean v)^2 + U_z^2. T is taken as linear in v between
-    zero and the inflow of hover, then once more about the solution. It is computed at every second instant, because
-    the inflow is smooth. The added mass does not include the rate of change of the inflow.
+    It solves m v' + 2 rho A V_T v = share T(v), V_T^2 = (U_x + mean v)^2 + U_z^2, with the air's apparent mass m and
+    density rho, the disc's area A, the stream (U_x, U_z) and the thrust T of the wings. T is taken as linear in v
+    between zero and the inflow of hover, then once more about the solution. v is computed at every second instant,
+    because it is smooth. The force of added mass in the model does not include the rate of change of the inflow.
     """
     vehicle, air, wings = scene.setting.vehicle, scene.setting.condition, scene.wings.every(2)
     flap, share = scene.angles.flap[:, 0], values["share"][:, None]
@@ -57,19 +64,20 @@ def _induce(scene: VehicleScene, values: Values) -> None:
 
 
 def slices(edges: Array) -> Array:
-    """Areas (m^2) that strips between ``edges`` [S + 1] (m from the centre) cut from a disc of radius edges[-1].
+    """Return the areas (m^2) that strips between the ``edges`` cut from a disc whose radius is the last edge.
 
-    With an elliptic load, the inflow is the same at all strips, as on a lifting line (Prandtl 1918; Glauert 1926).
+    ``edges`` [S + 1] of S strips: m from the disc's centre. If the load is elliptic, the inflow is the same at all
+    strips, as on a lifting line (Prandtl 1918; Glauert 1926).
     """
     x, tip = edges / edges[-1], edges[-1]
     return np.asarray(tip**2 * np.diff(x * np.sqrt(1.0 - x**2) + np.arcsin(x)))
 
 
 def _law(frame: Any, moment: int) -> None:
-    """Add the inflow v of each strip: v' = -share L / m - 2 rho A |U + v| v / m in world axes.
+    """Add the inflow v of each strip to the air: v' = -share L / m - 2 rho A |U + v| v / m in world axes.
 
-    L is the lift of the strip (N), U the wind, A and m area and air mass of the strip's slice of the disc
-    (:func:`slices`).
+    v (m/s) is the state of the strip, L its lift (N, a vector), U the wind, A and m the area and the air mass of its
+    slice of the disc (:func:`slices`). ``frame`` and ``moment``: see :mod:`wingfit.sim.kernels.laws`.
     """
     port = strip_port(frame)
     for s in range(port.places):
@@ -94,7 +102,7 @@ def _law(frame: Any, moment: int) -> None:
 
 
 def _wing(scene: WingScene, values: Values) -> None:
-    """Induce inflow through the disc whose diameter is the span of the wing and its mirror image."""
+    """Let a wing induce inflow through the disc whose diameter is the span of the wing and its mirror image."""
     structure = scene.structure
     edges = structure.planform.strips(structure.division)
     depth = apparent_mass(np.array(1.0), np.array(np.pi * edges[-1] ** 2)) / (np.pi * edges[-1] ** 2)

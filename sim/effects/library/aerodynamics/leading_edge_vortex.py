@@ -1,4 +1,4 @@
-"""At large angles of attack a vortex stays over the leading edge, and the force is normal to the wing."""
+"""Effect: at large angles of attack a vortex stays over the leading edge; the force is then normal to the wing."""
 
 from __future__ import annotations
 
@@ -25,12 +25,15 @@ _BLEND = math.radians(10.0)  # over which the vortex takes over
 
 
 def _law(frame: Any, moment: int) -> None:
-    """Replace the fraction w of the affine laws of strips by C_L = C_l sin 2 alpha and C_D = 2 C_l sin^2 alpha.
+    """Blend lift and drag coefficients of strips from the affine laws to those of a wing with a leading-edge vortex.
 
-    Together they are C_N = 2 C_l sin alpha along the normal and nothing along the chord, because without suction at
-    the leading edge the pressure on a thin wing acts along its normal. w grows smoothly from 0 at the angle where
-    attached flow ends. This form has one coefficient, is valid up to 90 degrees, and agrees with measurements on
-    flapping wings; the suction analogy (Polhamus 1966) is for slender wings in steady flow.
+    A fraction w of C_L and C_D is replaced by C_L = C_l sin 2 alpha and C_D = 2 C_l sin^2 alpha, where C_l is the
+    effect's coefficient and alpha the angle of attack. Together these are C_N = 2 C_l sin alpha along the normal and
+    nothing along the chord, because without suction at the leading edge the pressure on a thin wing acts along its
+    normal. w grows smoothly with |alpha|, from 0 at the angle where attached flow ends to the parameter ``part`` 10
+    degrees later. This form has one coefficient, is valid up to 90 degrees, and agrees with measurements on flapping
+    wings; the suction analogy (Polhamus 1966) is for slender wings in steady flow. The parameters are part, C_l, that
+    angle, and the four coefficients of the affine laws. ``frame`` and ``moment``: see :mod:`wingfit.sim.kernels.laws`.
     """
     port = strip_port(frame)
     P, flow, loads = port.parameters, port.flow, port.loads

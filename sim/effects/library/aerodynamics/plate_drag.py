@@ -1,4 +1,4 @@
-"""Pressure drag of a plate from the component of the stream along its normal."""
+"""Effect: additional pressure drag of the wing, as of a plate, from the component of the stream along its normal."""
 
 from __future__ import annotations
 
@@ -15,10 +15,13 @@ _POINTS = ((-0.430568, 0.173927), (-0.169991, 0.326073), (0.169991, 0.326073), (
 
 
 def _law(frame: Any, moment: int) -> None:
-    """Add the pressure rho / 2 C |w| w at every point x of the chord; w = u_n + theta' x is the flow along the normal.
+    """Add the pressure rho / 2 C |w| w along the normal at every point x of the chord.
 
-    A strip that does not pitch has C_N = C |sin alpha| sin alpha (the cross-flow principle). A strip that only pitches
-    about its middle is held back by the moment rho / 2 C |theta'| theta' c^4 / 32 per span.
+    w = u_n + theta' x is the flow along the normal (m/s) there: u_n at mid-chord, where x = 0, theta' the pitch rate; C
+    is the effect's coefficient. A strip that does not pitch thus has the additional normal force coefficient C |sin
+    alpha| sin alpha at the angle of attack alpha (the cross-flow principle). A strip that only pitches about its middle
+    is held back by the moment rho / 2 C |theta'| theta' c^4 / 32 per span (chord c). ``frame`` and ``moment``: see
+    :mod:`wingfit.sim.kernels.laws`.
     """
     port = strip_port(frame)
     for s in range(port.places):

@@ -1,4 +1,4 @@
-"""The air is denser than its described pressure and temperature imply, as where a vacuum gauge reads too low."""
+"""Effect: the air is denser than its described pressure and temperature imply, as if a vacuum gauge reads too low."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Circulation that a wing has because it pitches (Kramer effect)."""
+"""Effect: circulation that a wing has because it pitches (Kramer effect)."""
 
 from __future__ import annotations
 
@@ -14,11 +14,12 @@ _LEVER = 0.75 - 0.5  # of a chord: from where the strip's angle of attack is tak
 
 
 def _law(frame: Any, moment: int) -> None:
-    """Add Gamma = C_r (3/4 - x_0) c^2 theta' / 2, as 2 Gamma / c, to the product of speed and lift coefficient.
+    """Add the circulation Gamma = C_r (3/4 - x_0) c^2 theta' / 2 of the pitch rate theta' to each strip.
 
-    x_0 is 1/2, because the flow of a strip is taken at its middle. In flow from behind, the point that sets the
-    circulation is at 1/4 and the flow is reversed: Gamma is the same, and the force, Gamma times the stream, changes
-    its sign.
+    C_r is the effect's coefficient, c the chord. Gamma is represented by 2 Gamma / c, speed times lift coefficient. x_0
+    is 1/2, because the flow of a strip is taken at mid-chord. In flow from behind, the point that sets the circulation
+    is at 1/4 of the chord and the flow is reversed: Gamma is the same, and the force, Gamma times the stream, changes
+    its sign. ``frame`` and ``moment``: see :mod:`wingfit.sim.kernels.laws`.
     """
     port = strip_port(frame)
     for s in range(port.places):

@@ -1,4 +1,4 @@
-"""Circulation falls to zero at the tip, where the trailing vortex leaves the wing."""
+"""Effect: circulation falls to zero at the tip, where the trailing vortex leaves the wing."""
 
 from __future__ import annotations
 
@@ -18,16 +18,19 @@ _PIECES = 64  # of a strip
 
 
 def prandtl(to_tip: Array, spacing: Array) -> Array:
-    """Prandtl's factor F on the circulation ``to_tip`` (m) from the tip, for vortex sheets ``spacing`` (m) apart.
+    """Return Prandtl's factor F on the circulation at ``to_tip`` (m) from the tip.
 
-    F = 2 / pi arccos exp(-pi to_tip / spacing) (Prandtl in Betz 1919; Glauert 1935, division L, chapter VII); the
-    arguments broadcast.
+    F = 2 / pi arccos exp(-pi to_tip / spacing), where the vortex sheets of successive strokes are ``spacing`` (m) apart
+    (Prandtl in Betz 1919; Glauert 1935, division L, chapter VII); the arguments broadcast.
     """
     return np.asarray(2.0 / np.pi * np.arccos(np.exp(-np.pi * to_tip / spacing)))
 
 
 def strip_factors(structure: Structure, spacing: Array) -> Array:
-    """Mean of Prandtl's factor over the area of every strip, [S, W]."""
+    """Return the mean of Prandtl's factor over the area of every strip, [S, W], for the ``spacing`` [W] (m).
+
+    S strips, W individuals.
+    """
     edges = structure.planform.strips(structure.division)
     u = (np.arange(_PIECES) + 0.5) / _PIECES  # pieces grow with u^2: near the tip the factor is as a root
     y = edges[1:, None] - np.diff(edges)[:, None] * u**2
@@ -37,7 +40,7 @@ def strip_factors(structure: Structure, spacing: Array) -> Array:
 
 
 def _law(frame: Any, moment: int) -> None:
-    """Multiply the circulation of each strip by its factor of :func:`strip_factors`."""
+    """Multiply the circulation of each strip by its factor of :func:`strip_factors`, the law's parameter."""
     port = strip_port(frame)
     for s in range(port.places):
         factor = load(port.parameters, 0, s)

@@ -1,4 +1,4 @@
-"""Coefficients of circulation that change with the flight condition."""
+"""Effect: coefficients of circulation that change with flap frequency and body pitch."""
 
 from __future__ import annotations
 
@@ -13,16 +13,17 @@ LIFT = ("C_l", "K_l")  # circulation of the angle of attack, by either law
 
 
 def factor(frequency: float, pitch: float, by_frequency: Array, by_pitch: Array) -> Array:
-    """Factor [B] on a coefficient at a flap frequency (Hz) and body pitch (rad); never below zero.
+    """Return a factor [B] on a coefficient at a flap ``frequency`` (Hz) and body ``pitch`` (rad); never below zero.
 
-    ``by_frequency`` [B]: change per relative change of frequency; ``by_pitch`` [B]: change per rad.
+    ``by_frequency`` [B]: change per relative change of frequency from REFERENCE_FREQUENCY; ``by_pitch`` [B]: change per
+    rad from REFERENCE_PITCH; B individuals.
     """
     more = by_frequency * (frequency / REFERENCE_FREQUENCY - 1.0) + by_pitch * (pitch - REFERENCE_PITCH)
     return np.asarray(np.maximum(1.0 + more, 0.0))
 
 
 def _vary(scene: VehicleScene, values: Values) -> None:
-    """Scale the coefficients of the scene, and the fling of the effect clap_and_peel, for the flight condition."""
+    """Scale the coefficients C_l, K_l and C_F of the scene, and the fling of the effect clap_and_peel."""
     here = scene.setting.condition
 
     def changed(kind: str) -> Array:

@@ -1,4 +1,4 @@
-"""Friction of the air along the wing's skin, in a laminar boundary layer."""
+"""Effect: friction of the air along the wing's skin, in a laminar boundary layer."""
 
 from __future__ import annotations
 
@@ -17,12 +17,16 @@ _BLASIUS = 2 * 1.328  # both faces
 
 
 def viscosity(temperature: float) -> float:
-    """Dynamic viscosity of air, Pa s, at ``temperature`` in K, whatever its pressure (Sutherland 1893)."""
+    """Return the dynamic viscosity of air (Pa s) at ``temperature`` (K), whatever its pressure (Sutherland 1893)."""
     return 1.458e-6 * temperature * math.sqrt(temperature) / (temperature + 110.4)
 
 
 def _law(frame: Any, moment: int) -> None:
-    """Add the friction C_D = 2.656 / sqrt(Re) along the chord of strips; Re is that of chord and stream."""
+    """Add to each strip a friction force along the chord, with the coefficient part 2.656 / sqrt(Re) for both faces.
+
+    Re = |u_c| c / nu is the Reynolds number of the chord c and the velocity u_c of the stream along it; ``part`` is the
+    effect's size, nu the kinematic viscosity. ``frame`` and ``moment``: see :mod:`wingfit.sim.kernels.laws`.
+    """
     port = strip_port(frame)
     for s in range(port.places):
         along = load(port.flow, s, STREAM_C)

@@ -1,4 +1,4 @@
-"""After each reversal the wing meets the air that its previous stroke set in motion."""
+"""Effect: after each reversal the wing meets the air that its previous stroke set in motion."""
 
 from __future__ import annotations
 
@@ -21,13 +21,14 @@ _SCALE = 0.1  # motion of the wing over the motion of the air that causes it
 
 
 def _meet_wake(scene: VehicleScene, values: Values) -> None:
-    """Let the air move at share (w - k u) along the flapping direction, with the wake's velocity w.
+    """Let the air at a vehicle's wings move at share (w - k u) along the flapping direction.
 
-    w' = V / (chords c) (u - w), with the wing's velocity u = r zeta', the speed V of the flow and the chord c.
-    k, in 0 to 1, is the fraction of u that the wake shares: air that the wing has just set in motion is no gust for it.
-    The air is thus at rest at a start from rest (Birch and Dickinson 2003) and in steady motion, moves at share (w - u)
-    while the wing slows down, and at share w after the reversal. The memory decays with the chords travelled, so that
-    it lasts through the reversal, where the wing hardly moves.
+    u = r zeta' is the velocity of the wing (flap angle zeta) and w that of its wake (m/s), which follows the wing with
+    delay: w' = V / (chords c) (u - w), with the speed V of the flow and the chord c; share and chords are the effect's
+    parameters. k, in 0 to 1, makes k u the part of w that lies between 0 and u: air that the wing has just set in
+    motion is no gust for it. The air is thus at rest at a start from rest (Birch and Dickinson 2003) and in steady
+    motion, moves at share (w - u) while the wing slows down, and at share w after the reversal. The memory decays with
+    the chords travelled, so that it lasts through the reversal, where the wing hardly moves.
     """
     flow, places = scene.flow, scene.stations
     own = np.broadcast_to(scene.angles.flap[:, 1, :, None] * places.r, flow.speed.shape).copy()
@@ -37,10 +38,11 @@ def _meet_wake(scene: VehicleScene, values: Values) -> None:
 
 
 def _law(frame: Any, moment: int) -> None:
-    """Move the air of strips as :func:`_meet_wake` does; states: y, z of wake's and of the wing's delayed velocity.
+    """Move the air of a wing's strips as :func:`_meet_wake` does, in the plane of y and z.
 
-    The velocity of the wing is not known before the flow is computed. A state that follows it within _RECENT replaces
-    it. k is w.u / u^2, limited to 0..1.
+    The four states of a strip are y and z of the wake's velocity w, then y and z of the strip's delayed velocity u,
+    which follows its velocity within _RECENT beats: the velocity itself is not known before the flow is computed. k is
+    w.u / u^2, limited to 0..1. ``frame`` and ``moment``: see :mod:`wingfit.sim.kernels.laws`.
     """
     port = strip_port(frame)
     for s in range(port.places):

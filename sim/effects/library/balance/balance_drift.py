@@ -1,4 +1,4 @@
-"""The zero of the balance drifts steadily, and also while the gauges warm up."""
+"""Measurement fault: the zero of the balance drifts steadily, and also while its gauges warm up."""
 
 from __future__ import annotations
 

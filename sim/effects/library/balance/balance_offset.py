@@ -1,4 +1,4 @@
-"""The balance indicates a force where there is none."""
+"""Measurement fault: the balance indicates a force where there is none."""
 
 from __future__ import annotations
 

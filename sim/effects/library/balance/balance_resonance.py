@@ -1,4 +1,4 @@
-"""Vehicle and balance oscillate on their mount, and the resonance distorts the forces."""
+"""Measurement fault: vehicle and balance oscillate on their mount, and the resonance distorts the forces."""
 
 from __future__ import annotations
 

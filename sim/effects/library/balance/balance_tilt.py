@@ -1,4 +1,4 @@
-"""The axes of the balance are rotated relative to those of the body."""
+"""Measurement fault: the axes of the balance are rotated relative to those of the body."""
 
 from __future__ import annotations
 

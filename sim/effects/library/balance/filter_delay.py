@@ -1,4 +1,4 @@
-"""The amplifier of the balance is a causal low-pass filter, which delays the forces."""
+"""Measurement fault: the amplifier of the balance is a causal low-pass filter, which delays the forces."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One camera of the pair takes its images later than the other."""
+"""Measurement fault: one camera of the pair takes its images later than the other."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The cameras' frame is rotated relative to the frame of the wing."""
+"""Measurement fault: the cameras' frame is rotated relative to the frame of the wing."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _TINY = 1e-8  # rad: below, (1 - cos a) / a^2 is 1/2 to the last digit, and woul
 
 
 def rotation(turn: Array) -> Array:
-    """Rotation matrices [B, 3, 3] of the rotation vectors ``turn`` [B, 3] in rad (Rodrigues 1840)."""
+    """Return the rotation matrices [B, 3, 3] of the rotation vectors ``turn`` [B, 3] in rad (Rodrigues 1840)."""
     angle = np.sqrt((turn * turn).sum(axis=1))
     safe = np.maximum(angle, _TINY)
     first = np.sin(safe) / safe

@@ -1,4 +1,4 @@
-"""The origin of the cameras' frame is not where the description says."""
+"""Measurement fault: the origin of the cameras' frame is not where the dataset describes it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Lens distortion that the calibration of the cameras has not removed."""
+"""Measurement fault: lens distortion that the calibration of the cameras has not removed."""
 
 from __future__ import annotations
 
@@ -8,9 +8,10 @@ from wingfit.sim.effects.ports.stereo import PLACES, Stereo
 
 
 def distorted(u: Array, v: Array, values: Values) -> tuple[Array, Array]:
-    """Image coordinates ``u``, ``v`` [B, n, M] in focal lengths from the principal point, distorted (Brown 1971).
+    """Return the image coordinates ``u``, ``v`` [B, n, M] after distortion by the lens (Brown 1971).
 
-    u' = u (1 + k1 r^2 + k2 r^4) + 2 p1 u v + p2 (r^2 + 2 u^2); v' is the same with u and v, and p1 and p2, exchanged.
+    u' = u (1 + k1 r^2 + k2 r^4) + 2 p1 u v + p2 (r^2 + 2 u^2), r^2 = u^2 + v^2; v' is the same with u and v, and p1 and
+    p2, exchanged. Coordinates are in focal lengths from the principal point; ``values``: k1, k2, p1, p2 [B] by name.
     """
     k1, k2, p1, p2 = (values[name][:, None, None] for name in ("k1", "k2", "p1", "p2"))
     r2 = u * u + v * v

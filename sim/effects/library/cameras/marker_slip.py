@@ -1,4 +1,4 @@
-"""A marker is not at its described place on the wing."""
+"""Measurement fault: a marker is not at its described place on the wing."""
 
 from __future__ import annotations
 

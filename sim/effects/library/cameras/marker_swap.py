@@ -1,4 +1,4 @@
-"""The tracker exchanges two neighbouring markers."""
+"""Measurement fault: the tracker exchanges two neighbouring markers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The rows of an image are read one after the other while the wing moves, in both cameras of a pair."""
+"""Measurement fault: cameras read the rows of an image one after the other while the wing moves."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ def _observe(sampling: Sampling, values: Values) -> None:
 
 
 def _cameras(sampling: Sampling, span: float) -> Stereo:
-    """A pair of cameras at its typical position, aimed at the middle of the span.
+    """Return a pair of cameras at their typical position, aimed at the middle of the span.
 
-    The position hardly matters: a read-out of T along the span makes a height wrong by T z v / b, where v is the speed
-    along the span, for any distance between the cameras.
+    The position hardly matters: if reading an image takes T along the span, a marker's height is wrong by T z v / b for
+    any distance b between the cameras, v being the marker's speed along the span.
     """
     typical = {place.name: place.typical for place in PLACES}
     wing, distance = sampling.wing, typical["distance"] * span

@@ -1,4 +1,4 @@
-"""The tracker, a Kalman filter of constant acceleration, smooths the marker positions from frame to frame."""
+"""Measurement fault: the tracker, a Kalman filter of constant acceleration, smooths marker positions over frames."""
 
 from __future__ import annotations
 
@@ -12,11 +12,12 @@ _BISECTIONS = 60
 
 
 def steady_gains(smoothing: Array) -> tuple[Array, Array, Array]:
-    """Steady gains alpha, beta, gamma [B] of the filter, for ``smoothing`` = sigma_w / (sigma_v T^2) > 0 [B].
+    """Return the steady gains alpha, beta, gamma [B] of the tracker's filter.
 
-    Position, velocity per frame and acceleration per frame^2 are corrected by alpha, beta and gamma times the
-    innovation. With s^2 = 1 - alpha: beta = 2 (1 - s)^2, gamma = beta^2 / (2 alpha), and the tracking index
-    sigma_v T^2 / sigma_w = gamma / s (Kalata 1984; Bar-Shalom, Li and Kirubarajan 2001, section 6.5).
+    They correct position, velocity per frame and acceleration per frame^2 by multiples of the innovation (measured
+    minus predicted position). ``smoothing`` [B] = sigma_w / (sigma_v T^2) > 0: position noise sigma_w over acceleration
+    noise sigma_v times the frame time T squared. With s^2 = 1 - alpha: beta = 2 (1 - s)^2, gamma = beta^2 / (2 alpha),
+    and 1 / smoothing = gamma / s (Kalata 1984; Bar-Shalom, Li and Kirubarajan 2001, section 6.5).
     """
     low, high = np.zeros(len(smoothing)), np.ones(len(smoothing))
     for _ in range(_BISECTIONS):  # of 2 (1 - s)^3 x smoothing = s (1 + s), whose one root lies in (0, 1)
@@ -28,9 +29,10 @@ def steady_gains(smoothing: Array) -> tuple[Array, Array, Array]:
 
 
 def response(smoothing: Array, angle: Array) -> npt.NDArray[np.complex128]:
-    """Gain and phase [B, K] of the filtered position for a sine that turns by ``angle`` [K] rad from frame to frame.
+    """Return the complex gain [B, K] of the filtered position for a sine that turns by ``angle`` [K] rad per frame.
 
-    N / (N + (1 - alpha) d^3) with d = 1 - q, q = exp(-i angle) and N = alpha d^2 + beta q d + gamma q (q + d / 2).
+    It is N / (N + (1 - alpha) d^3) with d = 1 - q, q = exp(-i angle), N = alpha d^2 + beta q d + gamma q (q + d / 2)
+    and the gains of :func:`steady_gains` for ``smoothing`` [B].
     """
     alpha, beta, gamma = (gain[:, None] for gain in steady_gains(smoothing))
     q = np.exp(-1j * angle)
@@ -40,10 +42,10 @@ def response(smoothing: Array, angle: Array) -> npt.NDArray[np.complex128]:
 
 
 def apparent_step(times: Array, frequency: float) -> float:
-    """Angle (rad) by which a beat of ``frequency`` (Hz) seems to advance from frame to frame, in [-pi, pi].
+    """Return the angle (rad) by which a beat of ``frequency`` (Hz) seems to advance per frame, in [-pi, pi].
 
-    Each strobed frame is from another beat. If the strobe is slightly faster than the wing, the beat seems to run
-    backwards.
+    ``times`` [T]: instants of the frames, s. Each strobed frame is from another beat; if the strobe is slightly faster
+    than the wing, the beat seems to run backwards.
     """
     beats = float(np.median(np.diff(times))) * frequency
     return 2.0 * np.pi * (beats - round(beats))

@@ -1,4 +1,4 @@
-"""A point mass that the description does not contain, such as a drop of glue or a marker."""
+"""Effect: a point mass that the dataset does not describe, such as a drop of glue or a marker."""
 
 from __future__ import annotations
 

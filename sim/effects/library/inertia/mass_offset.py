@@ -1,4 +1,4 @@
-"""The mass of the wing lies behind the axis about which it pitches."""
+"""Effect: the mass of the wing lies further aft than described (for a vehicle: behind its pitch axis)."""
 
 from __future__ import annotations
 
@@ -20,9 +20,10 @@ def _wing(scene: WingScene, values: Values) -> None:
 
 
 def _shift_mass(scene: VehicleScene, values: Values) -> None:
-    """Add the force -m times the acceleration of the position -e (sin theta, cos theta) of the mass m behind the axis.
+    """Add the force -m a of wings whose mass m lies at e behind the pitch axis, to the vehicle.
 
-    e is ``distance``, theta the wing's pitch; the model itself has the mass on the axis.
+    a is the acceleration of the vector -e (sin theta, cos theta) from the axis to the mass in body x and z; e is the
+    parameter ``distance``, theta the wing's pitch. The model itself has the mass on the axis.
     """
     places, (cosine, sine) = scene.stations, scene.wings.turns
     rate, acceleration = scene.angles.pitch[:, 1], scene.angles.pitch[:, 2]

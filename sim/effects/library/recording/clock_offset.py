@@ -1,4 +1,4 @@
-"""The clock of the recording is offset by a constant time."""
+"""Measurement fault: the clock of the recording is offset by a constant time."""
 
 from __future__ import annotations
 

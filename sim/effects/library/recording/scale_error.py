@@ -1,4 +1,4 @@
-"""All lengths, or all forces, are too large by a constant factor."""
+"""Measurement fault: all recorded lengths, or all forces, are too large by a constant factor."""
 
 from __future__ import annotations
 

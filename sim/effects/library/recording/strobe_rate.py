@@ -1,4 +1,4 @@
-"""The ratio of flap frequency to frame rate differs from the recorded one."""
+"""Measurement fault: the ratio of flap frequency to frame rate differs from the recorded one."""
 
 from __future__ import annotations
 

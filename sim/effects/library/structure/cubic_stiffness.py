@@ -1,4 +1,4 @@
-"""Bending stiffness that grows or falls as the wing bends further."""
+"""Effect: bending stiffness that increases or decreases as the wing bends further."""
 
 from __future__ import annotations
 
@@ -16,11 +16,14 @@ _SOFTEST = 0.7  # part of the stiffness that softening takes at most; the tangen
 
 
 def _law(frame: Any, moment: int) -> None:
-    """Add the moment of a potential V of s, the sine of the bending angle, from the antisymmetric part of Q.
+    """Add to each connector the moment of a nonlinear spring, whose potential V depends on its bending.
 
-    Q is the rotation of the second body in the first, k the stiffness. V = k u^2 / (4 b (1 + c u)) with u = b s^2, so
-    that V_s = k s (u + c u^2 / 2) / (1 + c u)^2. This is cubic for c = 0 and otherwise levels off at k s / (2 c). A
-    relative angular rate r gives s' = (tr Q - Q) r / 2, so that the moment is -(tr Q - Q^T) V_s / 2.
+    s is the sine of the bending angle, from the antisymmetric part of Q, the rotation of the second body in the first;
+    k is the linear bending stiffness times the parameter E. V = k u^2 / (4 b (1 + c u)) with u = b s^2, so that dV/ds =
+    k s (u + c u^2 / 2) / (1 + c u)^2. This is cubic for c = 0 and otherwise levels off at k s / (2 c). b = 1 / p^2,
+    where p is the length that the connector represents as a fraction of the span; E and c: see :func:`shape`. A
+    relative angular rate r gives s' = (tr Q - Q) r / 2, so that the moment is -(tr Q - Q^T) (dV/ds) / 2. ``frame`` and
+    ``moment``: see :mod:`wingfit.sim.kernels.laws`.
     """
     port = connector_port(frame)
     stored = load0(port.stored)
@@ -55,9 +58,10 @@ def _wing(scene: WingScene, values: Values) -> None:
 
 
 def shape(change: Array) -> tuple[Array, Array]:
-    """E and c of the relative change of stiffness E (u + c u^2 / 2) / (1 + c u)^2, which is ``change`` at u = 1.
+    """Return E and c of the relative change of stiffness E (u + c u^2 / 2) / (1 + c u)^2, which is ``change`` at u = 1.
 
-    Hardening is cubic. Softening starts as a cubic law and levels off at -E / (2 c) = _SOFTEST.
+    A positive ``change`` (hardening) gives a cubic law, c = 0. A negative one (softening) starts as a cubic law and
+    levels off at E / (2 c) = -_SOFTEST.
     """
     level = 1.0 / np.sqrt(1.0 - np.maximum(-change, 0.0) / _SOFTEST) - 1.0
     return np.where(change > 0.0, change, -2.0 * _SOFTEST * level), level

@@ -1,4 +1,4 @@
-"""A place along the span where the wing has lost stiffness, or where a repair has added some."""
+"""Effect: a place along the span where the wing has lost stiffness, or where a repair has added some."""
 
 from __future__ import annotations
 
@@ -18,10 +18,11 @@ def _wing(scene: WingScene, values: Values) -> None:
 
 
 def remaining(joints: Joints, values: Values) -> Array:
-    """Fraction [C, W] of the stiffness that remains in each connector.
+    """Return the fraction [C, W] of the stiffness that remains in each connector (C connectors, W individuals).
 
-    At the position s of the span, 1 - loss exp(-((s - station) / width)^2 / 2) remains. Along the span, the pieces of
-    a connector are in series, so that their compliances add; along the chord, they are in parallel.
+    At the position s of the span, 1 - loss exp(-((s - station) / width)^2 / 2) remains. For a connector along the span,
+    the pieces of its length are in series, so that their compliances add; for one along the chord, they are in
+    parallel.
     """
     s = joints.reach[:, :1] + (np.arange(_POINTS) + 0.5) / _POINTS * np.diff(joints.reach)
     away = (s[:, :, None] - values["station"]) / values["width"]

@@ -1,4 +1,4 @@
-"""Hysteresis of bending and torsion after Bouc and Wen."""
+"""Effect: hysteresis of bending and torsion by the law of Bouc and Wen."""
 
 from __future__ import annotations
 
@@ -16,9 +16,12 @@ _TINY = 1e-30
 
 
 def _law(frame: Any, moment: int) -> None:
-    """Add the moment -k z about x and y, with z' = r - beta |r| |q|^(n - 1) q - gamma r |q|^n, beta + gamma = 1.
+    """Add to each connector the moment -k z about x and y.
 
-    r is the relative angular rate of the two bodies, q is z over its largest value.
+    z, the elastic part of the angle, is a state: z' = r - beta |r| |q|^(n - 1) q - gamma r |q|^n, beta + gamma = 1. r
+    is the relative angular rate of the two bodies (rad/s), q is z over its largest value. The parameters are k about x
+    and about y, the inverse of the largest z, gamma and n. ``frame`` and ``moment``: see
+    :mod:`wingfit.sim.kernels.laws`.
     """
     port = connector_port(frame)
     stored, lost = load0(port.stored), load0(port.lost)

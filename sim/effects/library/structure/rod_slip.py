@@ -1,4 +1,4 @@
-"""Carbon rods in straws: loose within a clearance, held by dry friction beyond it."""
+"""Effect: carbon rods in straws that are loose within a clearance and held by dry friction beyond it."""
 
 from __future__ import annotations
 
@@ -19,11 +19,12 @@ _SHAKE = 0.1  # keeps what rods carry from wandering: without it the periodic mo
 
 
 def _law(frame: Any, moment: int) -> None:
-    """Add the moment -k h about x, where h is the part of the state w beyond the play.
+    """Add to each connector with rods the moment -k h about x, where h is the part of the state w beyond the play.
 
-    w' = r - (r |h| + |r| h) / (2 h_max) - e |r| w / w_max, r being the relative angular rate of the bodies. This is
-    Dahl's friction: under increasing load, the rods slip more the nearer h is to h_max; under decreasing load, they act
-    as springs. The last term returns them to their unloaded place, by e per sweep of w_max = play + h_max.
+    w' = r - (r |h| + |r| h) / (2 h_max) - e |r| w / w_max, r being the relative angular rate of the bodies (rad/s).
+    This is Dahl's friction: under increasing load, the rods slip more the nearer h is to h_max; under decreasing load,
+    they act as springs. The last term returns the rods to their unloaded position: a bend by w_max = play + h_max
+    reduces w by the fraction e = _SHAKE. ``frame`` and ``moment``: see :mod:`wingfit.sim.kernels.laws`.
     """
     port = connector_port(frame)
     state, rate, decay, drive, pull = port.state[0], port.rate[0], port.decay[0], port.drive[0], port.pull[0]
@@ -61,10 +62,10 @@ def _wing(scene: WingScene, values: Values) -> None:
 
 
 def of_rods(scene: WingScene) -> Array:
-    """Bending stiffness [C, W] (N m/rad) that the rods add to their connectors.
+    """Return the bending stiffness [C, W] (N m/rad) that rods add to each connector (C connectors, W individuals).
 
-    It is the bending stiffness minus that of the foam, whose modulus follows from the stiffness in stretching along
-    the span. In its plane the wing is too stiff for rods to slip.
+    It is the bending stiffness minus that of the foam, whose modulus follows from the stiffness in stretching along the
+    span. The bending is out of the wing's plane; in its plane the wing is too stiff for rods to slip.
     """
     connectors, stiffness = scene.structure.connectors, scene.lanes.stiffness
     found = np.zeros_like(stiffness[:, 0])

@@ -1,4 +1,4 @@
-"""A spring and a damper between one place of the wing and the ground, such as a cable or a hose."""
+"""Effect: a spring and a damper between one place of the wing and the ground, such as a cable or a hose."""
 
 from __future__ import annotations
 
@@ -11,7 +11,11 @@ from wingfit.sim.kernels.laws import point_port
 
 
 def _law(frame: Any, moment: int) -> None:
-    """Add the force -k (x - x_0) - c v on the point, in the world; the parameters are k, c and x_0 (three)."""
+    """Add the force -k (x - x_0) - c v on the tethered point, in the world.
+
+    x is its position (m), v its velocity. The parameters of the law are k (N/m), c (N s/m) and the three coordinates of
+    x_0, the position at rest (m). ``frame`` and ``moment``: see :mod:`wingfit.sim.kernels.laws`.
+    """
     port = point_port(frame)
     stored, lost = load0(port.stored), load0(port.lost)
     for p in range(port.places):

@@ -1,4 +1,4 @@
-"""Foam that relaxes, as a standard linear solid: its second spring is in series with a dashpot."""
+"""Effect: foam that relaxes, as a standard linear solid: a second spring acts in series with a dashpot."""
 
 from __future__ import annotations
 
@@ -14,9 +14,12 @@ _METRES = [0.1, 0.1]  # m/rad: one radian moves a point one chord away
 
 
 def _law(frame: Any, moment: int) -> None:
-    """Add a Maxwell element about x and y, parallel to spring and damper: z' = r - z / tau, moment -k z.
+    """Add to each connector, parallel to its spring and damper, a Maxwell element about x and about y.
 
-    r is the relative angular rate of the two bodies.
+    This is a spring of stiffness k (N m/rad) in series with a dashpot: its moment is -k z, and the strain z of its
+    spring follows z' = r - z / tau, with the relative angular rate r of the two bodies (rad/s) and the relaxation time
+    tau (s). The parameters are k about x and about y, and 1 / tau; the states are z about x and about y. ``frame`` and
+    ``moment``: see :mod:`wingfit.sim.kernels.laws`.
     """
     port = connector_port(frame)
     stored, lost = load0(port.stored), load0(port.lost)
@@ -38,7 +41,7 @@ def _law(frame: Any, moment: int) -> None:
 
 
 def _wing(scene: WingScene, values: Values) -> None:
-    """Add the law for bending and torsion only, because the wing hardly strains otherwise."""
+    """Add the law to bending and torsion only, because the wing hardly strains otherwise."""
     spring = Joints.of(scene.structure).out_of_plane(scene.lanes.stiffness * values["k"])
     scene.add_connector_law(_law, [*spring, 1.0 / values["tau"]], axes=[0, 1], states=_METRES)
 
