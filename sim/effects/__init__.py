@@ -1,4 +1,1 @@
-"""Effects: physics and measurement faults that a recording may contain and a model may be missing.
-
-Each effect has a file in ``library``; ``contract`` defines what it declares.
-"""
+"""Physics and measurement faults ("effects") that a recording may contain and a model may be missing: one file each."""

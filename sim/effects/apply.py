@@ -28,17 +28,13 @@ def by_active(
 
 
 def affected(effects: Iterable[Effect], genes: tuple[Gene, ...], genomes: Array) -> Index:
-    """Return the indices of the ``genomes`` [B, G] in which at least one fault of the measurement is on.
-
-    ``genes``: the G genes of the columns; effects that change the wing or vehicle instead of the observation are
-    ignored.
-    """
+    """Return the indices of ``genomes`` [B, G] (columns: ``genes``) in which a fault of the measurement is on."""
     on = [effect.on(genes, genomes) for effect in effects if effect.observe]
     return np.flatnonzero(np.any(on, axis=0)) if on else np.empty(0, np.intp)
 
 
 def apply(effects: Iterable[Effect], genes: tuple[Gene, ...], genomes: Array, sampling: Sampling) -> None:
-    """Change ``sampling`` by each fault of the measurement in turn, only for the ``genomes`` [B, G] in which it is on.
+    """Change ``sampling`` by each fault of the measurement, for those ``genomes`` [B, G] in which it is on.
 
     ``genes``: the G genes of the columns; other effects are ignored.
     """

@@ -54,11 +54,7 @@ class Probe:
 
     @property
     def size(self) -> int:
-        """Number of genes of forces, moments and motions of the rods.
-
-        With S stations and H harmonics these are S (1 + 2 H), as many again if ``turning``, and 2 (1 + 2 H) if
-        ``driving``.
-        """
+        """Number of genes: S (1 + 2 H) forces (S stations, H harmonics), as many moments, 2 (1 + 2 H) rod motions."""
         return self.loads + (2 * (1 + 2 * self.harmonics) if self.driving else 0)
 
     @property

@@ -35,10 +35,7 @@ EFFECTS: dict[str, Effect] = {
 
 
 def chosen(names: Iterable[str], rig: Wing | Vehicle) -> tuple[Effect, ...]:
-    """Return the effects with these ``names``, in the order of the registry.
-
-    ValueError if a name is unknown or repeated, or its effect does not apply to ``rig``.
-    """
+    """Return the effects ``names``, in the registry's order; ValueError if unknown, repeated or not for ``rig``."""
     wanted = list(names)
     for name in wanted:
         if name not in EFFECTS:

@@ -80,10 +80,7 @@ class Wiring(NamedTuple):
 
 
 class Setting(NamedTuple):
-    """One condition: air density [W] (kg/m^3), wind [3, W] (m/s), gravity (m/s^2, along -z), step of time (s).
-
-    W individuals.
-    """
+    """Condition of W individuals: air density [W] (kg/m^3), wind [3, W] (m/s), gravity (m/s^2), step of time (s)."""
 
     density: Array
     wind: Array
@@ -188,10 +185,7 @@ class Trace(NamedTuple):
 
 
 def new_work(wiring: Wiring, setting: Setting, lanes: Lanes) -> Work:
-    """Allocate the working arrays for a group of W individuals, and store their addresses where the laws read them.
-
-    The arrays are zero except for the constants.
-    """
+    """Allocate the working arrays of W individuals, zero except for constants; store their addresses for the laws."""
     n, c, s = len(wiring.mass), len(wiring.first), len(wiring.geometry)
     z, laws = len(lanes.laws.size), lanes.laws
     motion, stages = (n + 2, 6), (STAGES, n + 2, 6)
@@ -230,10 +224,7 @@ def new_work(wiring: Wiring, setting: Setting, lanes: Lanes) -> Work:
 
 
 def _frame_laws(wiring: Wiring, setting: Setting, laws: Laws, work: Work) -> None:
-    """Fill the frame of every law of an effect in ``work``: integers that describe the arrays the law may use.
-
-    These are the sizes and the addresses of its arrays, see :func:`_frame`.
-    """
+    """Fill the frame of every law in ``work``: three sizes, then the addresses of its arrays (:func:`_frame`)."""
     air = (work.flow, work.loads, work.induced, wiring.geometry, setting.density, setting.wind, work.clock)
     joints = (work.Q, work.d, work.twist, work.more, work.more_k, work.more_d, work.lost, work.stored)
     for k, row in enumerate(laws.strip):

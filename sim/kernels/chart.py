@@ -1,7 +1,4 @@
-"""Convert one individual's state to coordinates relative to a given pose, and back.
-
-The search for a periodic motion (``wingfit.sim.solver.periodic``) works with these coordinates.
-"""
+"""Convert one individual's state to coordinates relative to a pose, and back, to search for a periodic motion."""
 
 from __future__ import annotations
 
@@ -37,10 +34,7 @@ def coordinates(about: State, state: State, rate: float, sizes: Array, out: Arra
 
 @kernel
 def displaced(about: State, x: Array, rate: float, sizes: Array, state: State) -> None:
-    """Set ``state`` from its coordinates ``x`` [12 N + Z]: the inverse of :func:`coordinates`.
-
-    ``about``, ``rate`` and ``sizes`` as there; the driving rods in ``state`` are not changed.
-    """
+    """Set ``state`` from its coordinates ``x`` [12 N + Z], the inverse of :func:`coordinates`; its rods stay."""
     bodies = len(state.V) - 2
     for n in range(bodies):
         k = 12 * n
@@ -90,10 +84,7 @@ def _column(first: Array, second: Array, k: int) -> tuple[float, float, float]:
 
 @inlined
 def turn(first: Array, x: float, y: float, z: float, out: Array) -> None:
-    """Set ``out`` [9] to the rotation matrix ``first`` [9] turned by the rotation vector (x, y, z) (rad).
-
-    This is first exp([x, y, z]~), ~ being the matrix of the cross product (Rodrigues 1840).
-    """
+    """Set ``out`` [9] to ``first`` [9] times the rotation by the vector (x, y, z) in rad (Rodrigues 1840)."""
     angle = math.sqrt(x * x + y * y + z * z)
     half = 0.5 * angle
     once = math.sin(angle) / angle if angle > 0 else 1.0

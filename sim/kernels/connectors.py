@@ -38,10 +38,10 @@ from wingfit.sim.kernels.lanes.vector import Vector, load, load0, store, store0
 
 @kernel
 def relative_pose(first: Index, second: Index, a: Array, b: Array, R: Array, p: Array, Q: Array, d: Array) -> None:
-    """Set Q [C, 9, W] and d [C, 3, W] (m), rotation and position of frame B in frame A, of each of C connectors.
+    """Set rotation Q [C, 9, W] and position d [C, 3, W] (m) of frame B relative to frame A, for each of C connectors.
 
-    ``first``, ``second`` [C]: bodies that carry A and B, at the arms ``a``, ``b`` [C, 3] (m); R, p: poses of all
-    bodies.
+    A and B are the ends of the connector on the bodies ``first`` and ``second`` [C], at the arms ``a``, ``b`` [C, 3]
+    (m) from the centres of mass, and aligned with the bodies; R, p: poses of all bodies.
     """
     for c in range(len(first)):
         i, j = first[c], second[c]
@@ -55,10 +55,10 @@ def relative_pose(first: Index, second: Index, a: Array, b: Array, R: Array, p: 
 
 @inlined
 def spring_wrench(Q: Nine, d: Three, ko: Three, kt: Three) -> tuple[Three, Three, Vector]:
-    """Return moment and force of the spring on B, in A's axes at o_B, and its energy, by thesis Eqs. 5-7.
+    """Return the moment and force of the spring on the second body, and its energy, by thesis Eqs. 5-7.
 
-    Q, d: pose of B in A; ``ko`` and ``kt``: stiffness of rotation about and of translation along the axes (N m/rad,
-    N/m).
+    The wrench acts at the spring's end B there, in the axes of its end A on the first body; Q, d: pose of B in A;
+    ``ko``, ``kt``: stiffness of rotation about and of translation along these axes (N m/rad, N/m).
     """
     g = co_stiffness(ko)
     x, y, z = d
@@ -81,9 +81,9 @@ def spring_wrench(Q: Nine, d: Three, ko: Three, kt: Three) -> tuple[Three, Three
 
 @inlined
 def coupling_wrench(N: Nine, d: Three) -> tuple[Three, Three, Vector]:
-    """Return moment and force on B, and energy, of the stiffness that couples rotation with translation.
+    """Return what :func:`spring_wrench` does, for the stiffness that couples rotation with translation.
 
-    N = Q G_c, d: position of B in A. The energy V_c is n . d, where n~ = N - N^T.
+    N = Q G_c, where G_c is the coupling's co-stiffness; d: position of B in A. The energy is n . d, where n~ = N - N^T.
     """
     n = axial(N)
     t = times(transposed(trace_minus(N)), d)
@@ -94,11 +94,11 @@ def coupling_wrench(N: Nine, d: Three) -> tuple[Three, Three, Vector]:
 def relative_twist(
     Q: Nine, e: Three, arm: Three, omega: Three, velocity: Three, turning: Three, v: Three
 ) -> tuple[Three, Three]:
-    """Return the angular and the linear velocity of frame B relative to A, at o_B in A's axes (rad/s, m/s).
+    """Return angular and linear velocity of the second body relative to the first, at the connector's end there.
 
-    ``omega``, ``velocity``: twist of the first body; ``turning``: the second body's angular velocity in A's axes;
-    ``v``: its velocity in its own axes; ``e`` and ``arm``: vectors from the centres of the first and of the second body
-    to o_B, in A's axes (m). Q: rotation of B in A.
+    All vectors are in the first body's axes, except ``v``, the second body's velocity in its own: ``omega``,
+    ``velocity``: twist of the first body; ``turning``: angular velocity of the second; ``e`` and ``arm``: from the
+    centres of the first and of the second body to that end (m). Q: rotation of the second body relative to the first.
     """
     moving = added(times(Q, v), cross(turning, arm))
     return less(turning, omega), less(less(moving, velocity), cross(omega, e))
@@ -154,7 +154,7 @@ def connect(
 
 @kernel
 def twists(first: Index, second: Index, a: Array, b: Array, Q: Array, d: Array, V: Array, out: Array) -> None:
-    """Set ``out`` [C, 6, W] to the twist J V of each second body relative to the first, at o_B in A's axes.
+    """Set ``out`` [C, 6, W] to the twist of each second body relative to the first (:func:`relative_twist`).
 
     V [N+2, 6, W]: twists of all bodies; Q, d: from :func:`relative_pose`.
     """
@@ -193,9 +193,10 @@ def add_turned(
 
 @kernel
 def push_apart(first: Index, second: Index, a: Array, b: Array, Q: Array, d: Array, push: Array, wrench: Array) -> None:
-    """Subtract the wrench ``push`` [C, 6, W] (at o_B, A's axes) from that on each body B; add it to that on A.
+    """Subtract the wrench ``push`` [C, 6, W] from that on each second body, and add it to that on the first.
 
-    ``wrench`` [N+2, 6, W]: of all bodies, at their centres in their own axes; it is changed in place.
+    ``push`` acts at the connector's end on the second body, in the first body's axes; ``wrench`` [N+2, 6, W], changed
+    in place, at the bodies' centres in their own axes.
     """
     for c in range(len(first)):
         i, j = first[c], second[c]

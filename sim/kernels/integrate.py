@@ -291,10 +291,7 @@ def _set_clock(clock: Array, turn: float, t: int, stage: int) -> None:
 
 @allocating
 def finish_step(work: Work, state: State, alive: Mask) -> None:
-    """Set ``state`` to the end of the step, and ``alive`` [W] to False for individuals that diverged in it.
-
-    These are the ones of which a body rotated by more than MAX_ROTATION, or became NaN.
-    """
+    """Set ``state`` to the end of the step, and ``alive`` [W] to False where a body turned too far or became NaN."""
     _to_stage(work, state, STAGES)
     state.R[:] = work.R
     state.p[:] = work.p

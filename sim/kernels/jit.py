@@ -1,6 +1,4 @@
-"""Compile kernels with numba and cache them on disk.
-
-Fused multiply-add is allowed, but no other change of the arithmetic.
+"""Compile kernels with numba, allowing only fused multiply-add as a change of the arithmetic; cache them on disk.
 
 Numba's cache checks only the file of the cached function, although a kernel contains functions of other files: after a
 change there, outdated code would run. The cache folder is therefore named after a hash of the source of all kernels.

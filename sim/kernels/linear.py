@@ -70,10 +70,7 @@ def _times_inverse(A: Array, D: Array) -> None:
 
 @kernel
 def _subtract_product(A: Array, B: Array, C: Array) -> None:
-    """Replace C by C - A B for 6 x 6 blocks [36, W].
-
-    Two rows of C are computed at a time, to use both arithmetic units of the processor.
-    """
+    """Replace C by C - A B for 6 x 6 blocks [36, W], two rows at a time, to use both arithmetic units."""
     for i in range(0, 36, 12):
         c, d = _row(C, i), _row(C, i + 6)
         for k in range(6):
@@ -125,8 +122,7 @@ def _times_block(m: int, blocks: Array, n: int, x: Array) -> None:
 def solve(order: Index, start: Index, below: Index, row: Index, blocks: Array, x: Array) -> None:
     """Replace the right-hand side ``x`` [N, 6, W] by the solution, given the factors in ``blocks`` (:func:`factor`).
 
-    ``order``, ``start``, ``below`` as there; ``row``: for each block of ``below``, the body whose row of the matrix it
-    is in.
+    ``order``, ``start``, ``below`` as there; ``row``: for each block of ``below``, the body whose matrix row it is in.
     """
     for k in range(len(order)):
         for s in range(start[k], start[k + 1]):

@@ -97,7 +97,7 @@ def add_momentum(lanes: Lanes, setting: Setting, R: Array, V: Array, wrench: Arr
 
 @inlined
 def _first_moment(M: Six) -> Three:
-    """Return mass times centre of mass, s, of the 6 x 6 mass matrix M, whose upper right quarter is s~."""
+    """Return mass times centre of mass of the 6 x 6 mass matrix M, from its upper right quarter."""
     return M[1][7], M[1][2], M[1][3]
 
 
@@ -137,7 +137,7 @@ def add_mass_blocks(lanes: Lanes, setting: Setting, R: Array, V: Array, length: 
 
 @inlined
 def _by_twist(M: Six, omega: Three, v: Three, factor: float) -> Six:
-    """Return ``factor`` M + [[omega~, v~], [0, omega~]] M, for a body with the twist (omega, v)."""
+    """Return ``factor`` M + [[omega~, v~], [0, omega~]] M; x~: matrix of the cross product with x."""
     return (
         plus(scaled(factor, M[0]), plus(skew_times(omega, M[0]), skew_times(v, M[2]))),
         plus(scaled(factor, M[1]), plus(skew_times(omega, M[1]), skew_times(v, M[3]))),
@@ -148,9 +148,9 @@ def _by_twist(M: Six, omega: Three, v: Three, factor: float) -> Six:
 
 @inlined
 def _with_motion(A: Six, omega: Three, v: Three, length: float) -> Six:
-    """Return A (I - l A_j) for a body j with the twist (omega, v), where l is ``length``.
+    """Return A [[I + l omega~ / 2, 0], [l v~, I]], where l is ``length`` and x~ the matrix of the cross product.
 
-    I - l A_j = [[I + l omega~ / 2, 0], [l v~, I]].
+    This is A (I - l A_j) for a body j with the twist (omega, v), A_j as in :mod:`wingfit.sim.kernels.tangents`.
     """
     half = 0.5 * length
     return (

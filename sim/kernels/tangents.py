@@ -60,9 +60,9 @@ from wingfit.sim.kernels.lanes.vector import load, load1, store
 
 @inlined
 def spring_tangent(Q: Nine, d: Three, ko: Three, kt: Three) -> Six:
-    """Return K [6 x 6]: minus the derivative of the spring's wrench on B by the displacement eta of B.
+    """Return K (6 x 6): minus the derivative of the spring's wrench on the second body by the motion of its end there.
 
-    ``ko``, ``kt``: stiffness of rotation and translation; Q, d: pose of B in A.
+    The axes are those of the first body; Q, d: pose of that end; ``ko``, ``kt``: stiffness of rotation and translation.
     """
     S = product(columns_scaled(Q, kt), transposed(Q))
     P = scaled(0.5, plus(times_skew(S, d), scaled(-1.0, skew(times(S, d)))))
@@ -72,7 +72,10 @@ def spring_tangent(Q: Nine, d: Three, ko: Three, kt: Three) -> Six:
 
 @inlined
 def coupling_tangent(N: Nine, d: Three) -> Six:
-    """Return the contribution to K of the stiffness that couples rotation with translation, with N = Q G_c."""
+    """Return the part of K (:func:`spring_tangent`) of the stiffness that couples rotation with translation.
+
+    N = Q G_c and d as in :func:`wingfit.sim.kernels.connectors.coupling_wrench`.
+    """
     L = trace_minus(N)
     turned = plus(outer(d, axial(N)), times_skew(transposed(N), d))
     return scaled(-1.0, turned), transposed(L), L, scaled(0.0, L)
@@ -80,9 +83,10 @@ def coupling_tangent(N: Nine, d: Three) -> Six:
 
 @inlined
 def twist_tangent(g: Three, omega: Three, turning: Three) -> Six:
-    """Return the matrix B: derivative of the relative twist by the displacement eta.
+    """Return B (6 x 6): the derivative of the relative twist of a connector's ends by the motion of the second end.
 
-    ``g``, ``turning``: velocity and angular velocity of frame B; ``omega``: angular velocity of A, all in A's axes.
+    All vectors are in the first body's axes: ``g``, ``turning``: velocity and angular velocity of the second end;
+    ``omega``: angular velocity of the first body.
     """
     return (scaled(-1.0, skew(turning)), scaled(0.0, skew(g)), scaled(-1.0, skew(g)), scaled(-1.0, skew(omega)))
 
@@ -91,7 +95,8 @@ def twist_tangent(g: Three, omega: Three, turning: Three) -> Six:
 def damper_tangent(B: Six, omega: Three, v: Three, arm: Three, do: Three, dt: Three) -> Six:
     """Return D (B - B_k) for body k, which turns with ``omega`` and moves with ``v``; D = diag(do, dt).
 
-    ``arm``: vector from the body's centre to o_B; all vectors are in A's axes.
+    B and B_k are defined in this module. ``arm``: from the body's centre to the connector's end on the second body; all
+    vectors are in the first body's axes.
     """
     oo = plus(B[0], scaled(0.5, skew(omega)))
     to = plus(B[2], plus(skew(v), scaled(-0.5, skew_times(arm, skew(omega)))))
@@ -117,9 +122,9 @@ def complete(A: Six, length: float, do: Three, dt: Three) -> Six:
 
 @inlined
 def moved(e: Three, A: Six, g: Three) -> Six:
-    """Return E(e) A E(g)^T: A transferred from o_B to the centres of two bodies.
+    """Return E(e) A E(g)^T with E(e) = [[I, e~], [0, I]]: A transferred from one point to two others.
 
-    ``e`` (for the rows) and ``g`` (for the columns) lead from the centres to o_B.
+    ``e`` (for the rows) and ``g`` (for the columns) lead from these other points to the first.
     """
     a, c = plus(A[0], skew_times(e, A[2])), plus(A[1], skew_times(e, A[3]))
     return (plus(a, scaled(-1.0, times_skew(c, g))), c, plus(A[2], scaled(-1.0, times_skew(A[3], g))), A[3])

@@ -205,7 +205,7 @@ class VehicleScene:
         return motion_rows(self.angles, self.forward(self.inflow), self.setting.motion.root_pitch, half_step)
 
     def each_side(self, rows: Array) -> Iterator[Side]:
-        """Yield each side (lower wings, then upper ones, if there are any) of the vehicle.
+        """Yield each computed side: the lower wings, then the upper ones of a vehicle that has them (layout "x4").
 
         The motion ``rows`` [B, 14, n] is changed in place to that of the side.
         """

@@ -157,10 +157,7 @@ class WingScene:
 
     @property
     def _motor_sizes(self) -> Array:
-        """Factors that convert the three states of a compliant motor to metres, or empty without one.
-
-        For the lead (s) it is the speed of the tip.
-        """
+        """Factors that convert the states of a compliant motor to metres: a lead (s) times the speed of the tip."""
         wing = self.structure.planform.wing
         stroke = np.abs(RodDrive.of(wing.drive, 0.0, 1).series[1:]).sum()  # as described: the same for every individual
         lead = wing.stations[-1].y * self.angular_rate * max(stroke, _LEAST_STROKE)

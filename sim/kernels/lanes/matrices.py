@@ -76,7 +76,7 @@ def extended(a: Three, factor: float, b: Three) -> Three:
 
 @inlined
 def load_inertia(inertia: Array, n: int) -> Nine:
-    """Load the inertia of body ``n`` from ``inertia`` [N, 9], whose numbers are the same for all individuals."""
+    """Load the inertia of body ``n`` from ``inertia`` [N, 9], the same for all individuals."""
     return (
         inertia[n, 0], inertia[n, 1], inertia[n, 2],
         inertia[n, 3], inertia[n, 4], inertia[n, 5],
@@ -86,7 +86,7 @@ def load_inertia(inertia: Array, n: int) -> Nine:
 
 @inlined
 def gyroscopic(inertia: Nine, omega: Three) -> Nine:
-    """Return the derivative of omega x (I omega) by omega: omega~ I - (I omega)~."""
+    """Return the derivative omega~ I - (I omega)~ of omega x (I omega) by omega; x~: matrix of the cross product."""
     return plus(skew_times(omega, inertia), scaled(-1.0, skew(times(inertia, omega))))
 
 
@@ -180,7 +180,7 @@ def skew(e: Three) -> Nine:
 
 @inlined
 def skew_times(e: Three, A: Nine) -> Nine:
-    """Return e~ A."""
+    """Return e~ A, where e~ is the matrix of the cross product with ``e``."""
     return (
         e[1] * A[6] - e[2] * A[3], e[1] * A[7] - e[2] * A[4], e[1] * A[8] - e[2] * A[5],
         e[2] * A[0] - e[0] * A[6], e[2] * A[1] - e[0] * A[7], e[2] * A[2] - e[0] * A[8],
@@ -190,7 +190,7 @@ def skew_times(e: Three, A: Nine) -> Nine:
 
 @inlined
 def times_skew(A: Nine, e: Three) -> Nine:
-    """Return A e~."""
+    """Return A e~, where e~ is the matrix of the cross product with ``e``."""
     return (
         A[1] * e[2] - A[2] * e[1], A[2] * e[0] - A[0] * e[2], A[0] * e[1] - A[1] * e[0],
         A[4] * e[2] - A[5] * e[1], A[5] * e[0] - A[3] * e[2], A[3] * e[1] - A[4] * e[0],
@@ -210,7 +210,7 @@ def trace_minus(A: Nine) -> Nine:
 
 @inlined
 def axial(A: Nine) -> Three:
-    """Return the vector a with a~ = A - A^T."""
+    """Return the vector a whose cross-product matrix a~ is A - A^T."""
     return A[7] - A[5], A[2] - A[6], A[3] - A[1]
 
 

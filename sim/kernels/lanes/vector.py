@@ -118,10 +118,7 @@ def _indices(builder: Any, args: Any, kinds: Any) -> list[Any]:
 
 
 def _accessors(count: int) -> tuple[Callable[..., Any], Callable[..., None]]:
-    """Return the functions that load and store the lanes of an array at ``count`` indices.
-
-    Numba needs separate functions for each number of indices.
-    """
+    """Return functions that load and store lanes of an array at ``count`` indices; numba needs them for each count."""
 
     def read(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         indices = _indices(builder, args[1:], sig.args[1:])

@@ -27,10 +27,7 @@ def apparent_mass(density: Array, area: Array) -> Array:
 
 
 def swept_area(span: float, stroke: Array, wings: int) -> Array:
-    """Return the area (m^2) that ``wings`` wings of ``span`` (m) sweep, at most a full disc (Ellington 1984, III).
-
-    ``stroke``: angle (rad) from end to end.
-    """
+    """Return the area (m^2) that ``wings`` of ``span`` (m) sweep by a ``stroke`` (rad) in all (Ellington 1984, III)."""
     return np.asarray(span**2 * np.minimum(0.5 * wings * stroke, np.pi))
 
 

@@ -27,10 +27,7 @@ def prandtl(to_tip: Array, spacing: Array) -> Array:
 
 
 def strip_factors(structure: Structure, spacing: Array) -> Array:
-    """Return the mean of Prandtl's factor over the area of every strip, [S, W], for the ``spacing`` [W] (m).
-
-    S strips, W individuals.
-    """
+    """Return the mean of Prandtl's factor over the area of every strip, [S, W], for the ``spacing`` [W] (m)."""
     edges = structure.planform.strips(structure.division)
     u = (np.arange(_PIECES) + 0.5) / _PIECES  # pieces grow with u^2: near the tip the factor is as a root
     y = edges[1:, None] - np.diff(edges)[:, None] * u**2
