@@ -16,10 +16,7 @@ from wingfit.sim.effects.ports.observation import Sampling
 def by_active(
     effects: Sequence[Effect], genes: tuple[Gene, ...], genomes: Array
 ) -> list[tuple[tuple[Effect, ...], list[int]]]:
-    """Group ``genomes`` [B, G] by the ``effects`` that are on in them.
-
-    B individuals with the values of G ``genes``. Each group: the effects that are on, and the indices of its genomes.
-    """
+    """Group ``genomes`` [B, G] by the ``effects`` that are on; return these effects and the genomes' indices."""
     on = np.array([effect.on(genes, genomes) for effect in effects], bool).reshape(len(effects), len(genomes))
     groups: dict[bytes, list[int]] = {}
     for k, active in enumerate(on.T):
@@ -34,10 +31,7 @@ def affected(effects: Iterable[Effect], genes: tuple[Gene, ...], genomes: Array)
 
 
 def apply(effects: Iterable[Effect], genes: tuple[Gene, ...], genomes: Array, sampling: Sampling) -> None:
-    """Change ``sampling`` by each fault of the measurement, for those ``genomes`` [B, G] in which it is on.
-
-    ``genes``: the G genes of the columns; other effects are ignored.
-    """
+    """Change ``sampling`` by each fault of the measurement, for those ``genomes`` [B, G] in which it is on."""
     for effect in effects:
         if effect.observe is None or not len(on := np.flatnonzero(effect.on(genes, genomes))):
             continue

@@ -186,10 +186,7 @@ fault_of_recordings = partial(Effect, family="measurement", port="observation", 
 
 
 def place(station: float, chord: float) -> tuple[Parameter, Parameter]:
-    """Return the two parameters "station" and "chord" for the position of an effect on the wing.
-
-    Their typical values are given as fractions of the span and of the chord.
-    """
+    """Return two parameters for an effect's position on the wing; arguments: typical fractions of span and chord."""
     along = "position along the span, as a fraction of the span from root to tip"
     across = "position along the chord, as a fraction of the chord from the leading edge"
     return (

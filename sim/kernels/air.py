@@ -94,10 +94,7 @@ def strip_flow(
 def _position_and_pitch_rate(
     s: int, start: Index, weight: Array, centroid: Array, R: Array, p: Array, V: Array, flow: Array
 ) -> None:
-    """Set in ``flow`` the world position (m) of the centroid of strip ``s``, and the strip's pitch rate (rad/s).
-
-    Both are area-weighted means over the strip's bodies; arguments as in :func:`strip_flow`.
-    """
+    """Set in ``flow`` the centroid of strip ``s`` (m, world) and its mean pitch rate (rad/s, nose up)."""
     for i in (arrays.PLACE_X, arrays.PLACE_X + 1, arrays.PLACE_X + 2, arrays.PITCH_RATE):
         store(flow, s, i, 0.0)
     for n in range(start[s], start[s + 1]):

@@ -88,10 +88,7 @@ def inertial(mass: Array, inertia: Array, R: Array, V: Array, gravity: float, wr
 
 @kernel
 def times_mass(mass: Array, inertia: Array, V: Array, out: Array) -> None:
-    """Add the momentum M V of each body, in its own frame, to ``out`` [N, 6, W] (angular, then linear).
-
-    M: ``mass`` [N] (kg) and ``inertia`` [N, 9] (kg m^2); ``V`` [N, 6, W]: twists.
-    """
+    """Add the momentum M V of each body in its own frame to ``out`` [N, 6, W]; ``mass`` [N], ``inertia`` [N, 9]."""
     for n in range(len(mass)):
         m = mass[n]
         i00, i11, i22 = inertia[n, 0], inertia[n, 4], inertia[n, 8]
@@ -109,10 +106,7 @@ def times_mass(mass: Array, inertia: Array, V: Array, out: Array) -> None:
 def kinetic_and_height(
     mass: Array, inertia: Array, p: Array, V: Array, gravity: float, kinetic: Array, potential: Array
 ) -> None:
-    """Set ``kinetic`` to 1/2 V^T M V and ``potential`` to m g z, summed over all bodies (both [W], J).
-
-    z is the height of the body's centre of mass, from ``p`` [N, 3, W] (m); other arguments as in :func:`inertial`.
-    """
+    """Set ``kinetic`` to 1/2 V^T M V and ``potential`` to m g z (height z), summed over all bodies ([W] each, J)."""
     kinetic[:] = 0.0
     potential[:] = 0.0
     momentum = np.zeros_like(V)

@@ -154,10 +154,7 @@ def connect(
 
 @kernel
 def twists(first: Index, second: Index, a: Array, b: Array, Q: Array, d: Array, V: Array, out: Array) -> None:
-    """Set ``out`` [C, 6, W] to the twist of each second body relative to the first (:func:`relative_twist`).
-
-    V [N+2, 6, W]: twists of all bodies; Q, d: from :func:`relative_pose`.
-    """
+    """Set ``out`` [C, 6, W] to the :func:`relative_twist` of each connector for the bodies' twists V [N+2, 6, W]."""
     for c in range(len(first)):
         i, j = first[c], second[c]
         q, x = load_matrix(Q, c), load_vector(d, c, 0)

@@ -280,10 +280,7 @@ def _to_stage(work: Work, state: State, stage: int) -> None:
 
 @kernel
 def _set_clock(clock: Array, turn: float, t: int, stage: int) -> None:
-    """Set in ``clock`` [CLOCK, W] the drive phase of ``stage`` of step ``t``, which the effects' laws read.
-
-    ``turn``: drive phase that passes in a step, rad.
-    """
+    """Set in ``clock`` the drive phase of a stage of step ``t``, which the laws read; a step takes ``turn`` (rad)."""
     clock[arrays.NOW] = turn * (t + NODES[stage])
     clock[arrays.START] = turn * t
     clock[arrays.SHARE] = turn * SLOPES[stage]

@@ -101,7 +101,7 @@ def _cache_folder(source: Path) -> Path:
             folder.touch()
             if os.access(folder, os.W_OK):
                 _forget_old(folder.parent)
-                _forget_old(base)  # of versions that kept all of them together
+                _forget_old(base)  # of earlier versions, which stored all folders together
                 return folder
     raise OSError(
         f"compiled kernels cannot be kept in {' or '.join(map(str, places))}: "

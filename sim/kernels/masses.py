@@ -163,10 +163,7 @@ def _with_motion(A: Six, omega: Three, v: Three, length: float) -> Six:
 
 @inlined
 def _with_wind(A: Six, M: Six, omega: Three, w: Three, length: float) -> Six:
-    """Return A plus l M (omega~ w~ - w~ omega~ / 2) in the columns of rotation; l is ``length``.
-
-    The terms arise because the wind ``w`` turns in the frame of the body.
-    """
+    """Add l M (omega~ w~ - w~ omega~ / 2), as the wind w turns in the body's frame, to A's columns of rotation."""
     turned = plus(scaled(length, skew_times(omega, skew(w))), scaled(-0.5 * length, skew_times(w, skew(omega))))
     return plus(A[0], product(M[1], turned)), A[1], plus(A[2], product(M[3], turned)), A[3]
 

@@ -11,10 +11,7 @@ from wingfit.sim.kernels.lanes.vector import Vector, load, load1, load3, store
 
 @kernel
 def combine(part: float, base: Array, U: Array, coefficient: Array, count: int, out: Array) -> None:
-    """Set ``out`` [., 6, W] to ``part`` ``base`` + sum_s coefficient[s] U[s] over the first ``count`` stages s.
-
-    U [STAGES, ., 6, W]: increments of the stages.
-    """
+    """Set ``out`` to ``part`` ``base`` + sum_s coefficient[s] U[s] over the first ``count`` stages; U[s] [., 6, W]."""
     for i in range(out.shape[0]):
         for k in range(6):
             total = part * load(base, i, k)

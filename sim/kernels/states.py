@@ -18,10 +18,7 @@ from wingfit.sim.kernels.lanes.vector import load, load1, store, store1
 
 @kernel
 def combine_states(base: Array, U: Array, coefficient: Array, count: int, out: Array) -> None:
-    """Set the states ``out`` [Z, W] to ``base`` + sum_s coefficient[s] U[s] over the first ``count`` stages s.
-
-    U [STAGES, Z, W]: increments of the stages.
-    """
+    """Set ``out`` [Z, W] to ``base`` + sum_s coefficient[s] U[s] over the first ``count`` stages; U [., Z, W]."""
     for i in range(len(out)):
         total = load1(base, i)
         for s in range(count):
@@ -33,7 +30,8 @@ def combine_states(base: Array, U: Array, coefficient: Array, count: int, out: A
 def keep_tangents(laws: Laws, wiring: Wiring, length: float, work: Work) -> None:
     """Store the states' derivatives at the start of a step in ``work.z_tangent0``, and add the dampers k theta u.
 
-    Row DECAY of the copy holds theta instead of b; ``length`` is h gamma. The dampers go to ``work.more_d0``.
+    For the symbols, see this module. Row DECAY of the copy holds theta instead of b; ``length`` is h gamma. The dampers
+    are added to ``work.more_d0``.
     """
     work.z_tangent0[:] = work.z_tangent
     for i in range(len(work.z)):
@@ -52,7 +50,7 @@ def keep_tangents(laws: Laws, wiring: Wiring, length: float, work: Work) -> None
 def start_states(wiring: Wiring, laws: Laws, step: float, coupling: Array, stage: int, work: Work) -> None:
     """Set ``work.z_known`` [Z, W] to r_z of a stage, and add the connectors' wrenches -k theta r_z to ``work.wrench``.
 
-    ``coupling``: coefficients of the earlier stages; ``step``: h, s.
+    For the symbols, see this module. ``coupling``: coefficients of the earlier stages; ``step``: h, s.
     """
     for i in range(len(work.z)):
         total = load1(work.z_rate, i)
@@ -74,7 +72,7 @@ def start_states(wiring: Wiring, laws: Laws, step: float, coupling: Array, stage
 
 @kernel
 def finish_states(wiring: Wiring, laws: Laws, work: Work, stage: int) -> None:
-    """Set ``work.U_z`` of a stage, once ``U_xi`` and ``U_V`` of the same stage are known, from which U_r follows."""
+    """Set the increments ``work.U_z`` of a stage, once ``U_xi`` and ``U_V`` of the same stage are known."""
     for i in range(len(work.z)):
         store(work.U_z, stage, i, load(work.z_tangent0, DECAY, i) * load1(work.z_known, i))
     if len(laws.connector) == 0:

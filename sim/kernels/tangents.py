@@ -72,10 +72,7 @@ def spring_tangent(Q: Nine, d: Three, ko: Three, kt: Three) -> Six:
 
 @inlined
 def coupling_tangent(N: Nine, d: Three) -> Six:
-    """Return the part of K (:func:`spring_tangent`) of the stiffness that couples rotation with translation.
-
-    N = Q G_c and d as in :func:`wingfit.sim.kernels.connectors.coupling_wrench`.
-    """
+    """Return the contribution to K of the coupling of rotation with translation (N, d: see ``coupling_wrench``)."""
     L = trace_minus(N)
     turned = plus(outer(d, axial(N)), times_skew(transposed(N), d))
     return scaled(-1.0, turned), transposed(L), L, scaled(0.0, L)

@@ -71,10 +71,7 @@ def _ramped(angle: Array, x: Array, rate: float) -> Array:
 
 
 def at_rest(structure: Structure, states: int = 0) -> State:
-    """Return the initial state: bodies in their rest pose, rods horizontal, no motion, and ``states`` zeros.
-
-    ``states``: number of internal states of effects.
-    """
+    """Return the initial state: bodies in their rest pose, rods horizontal, no motion, ``states`` zeros of effects."""
     n = len(structure.bodies)
     motion = (zeros((n + 2, 9, LANES)), zeros((n + 2, 3, LANES)), zeros((n + 2, 6, LANES)))
     state = State(*motion, zeros((states, LANES)))
@@ -95,10 +92,7 @@ def setting(condition: Condition, steps: int) -> Setting:
 
 
 def new_trace(structure: Structure, steps: int, *, with_motion: bool = False, states: int = 0) -> Trace:
-    """Allocate arrays for the results of one beat of ``steps`` steps, without the motion unless ``with_motion``.
-
-    ``states``: number of effects' states in the motion.
-    """
+    """Allocate results of one beat; motion, with this number of effects' ``states``, only if ``with_motion``."""
     rows, bodies = steps if with_motion else 0, len(structure.bodies) + 2
     shapes: dict[str, tuple[int, ...]] = {
         "tracks": (steps, len(structure.wing.markers), 3), "rods": (steps, 2, 6), "air": (steps, 3),

@@ -68,10 +68,7 @@ class Course:
 
 
 class Subject(NamedTuple):
-    """What is simulated: a structure, a condition, and a function that makes the kernels' inputs.
-
-    ``scene`` takes up to LANES genomes [., G].
-    """
+    """What is simulated: a structure, a condition, and a function from up to LANES genomes to the kernels' inputs."""
 
     structure: Structure
     condition: Condition
@@ -207,10 +204,7 @@ def _put(into: State, lane: int, state: State) -> None:
 
 
 def _mean_growth(distances: Array) -> float:
-    """Return the growth factor per beat over the latter half of ``distances`` [beats] (m).
-
-    It is the slope of a straight line through their logarithms.
-    """
+    """Fit an exponential to the latter half of ``distances`` [beats] (m); return its growth factor per beat."""
     tail = np.log(np.maximum(distances[len(distances) // 2 :], ROUND_OFF))
     return float(np.exp(np.polyfit(np.arange(len(tail)), tail, 1)[0]))
 

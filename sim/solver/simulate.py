@@ -1,7 +1,4 @@
-"""Compute the periodic motion of a batch of wings to a requested accuracy.
-
-No other module runs the kernels of the wing.
-"""
+"""Compute the periodic motion of a batch of wings to a requested accuracy; only this module runs their kernels."""
 
 from __future__ import annotations
 

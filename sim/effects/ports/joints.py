@@ -47,10 +47,7 @@ class Joints:
         return cls(along, part, within, reach)
 
     def out_of_plane(self, stiffness: Array) -> tuple[Array, Array]:
-        """Return the stiffness about x and about y [C, W] from ``stiffness`` [C, 6, W] (W individuals).
-
-        At the connectors of the root to a driving rod, that about x (bending) is set to zero.
-        """
+        """Return the stiffness about x and y [C, W] of ``stiffness`` [C, 6, W]; 0 about x where root and rods join."""
         return np.where(self.within[:, None], stiffness[:, 0], 0.0), stiffness[:, 1]
 
     def bending(self, stiffness: Array) -> tuple[Array, Array]:

@@ -47,10 +47,7 @@ class Sampling:
         return self.rig
 
     def along_axes(self, x: Array, z: Array) -> Array:
-        """Return forces [B, C] (N) in the C channels of the recording, from ``x`` and ``z`` [B].
-
-        ``x`` and ``z`` are forces along the body's axes in units of the vehicle's weight.
-        """
+        """Return forces [B, C] (N) in the recording's channels, from ``x``, ``z`` [B] in weights of the vehicle."""
         weight = self.vehicle.mass * STANDARD_GRAVITY
         return weight * np.stack([x if axis == "x" else z for axis in self.recording.forces], axis=1)
 

@@ -139,10 +139,7 @@ class VehicleScene:
         return stations(self.setting.vehicle, self.setting.motion)
 
     def load(self, law: Callable[[Array], Array]) -> None:
-        """Multiply the circulation by ``law``, a function of distances [m] (in m) from the flapping axis.
-
-        It returns a factor [B, m] for each individual and distance.
-        """
+        """Multiply the circulation by ``law``, a factor [B, m] at m distances (m) from the flapping axis."""
         self.loading *= law(np.concatenate([self.setting.r, self.stations.r]))
 
     # -- for effects of the flow -------------------------------------------------------------------------------

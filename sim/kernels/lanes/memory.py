@@ -1,7 +1,4 @@
-"""Allocate arrays in which the eight values of a group of individuals fill one cache line of the processor.
-
-Loading a group that spans two lines takes twice as long.
-"""
+"""Arrays in which every group of lanes fills one cache line; loading one that spans two lines takes twice as long."""
 
 from __future__ import annotations
 
@@ -32,10 +29,7 @@ def aligned(array: ArrayLike) -> Array:
 
 
 def several(shapes: dict[str, tuple[int, ...]]) -> dict[str, Array]:
-    """Return arrays of zeros [..., LANES], by name, for the ``shapes`` [...] given by name.
-
-    They are parts of one allocation, because a group of individuals needs dozens of arrays.
-    """
+    """Return zeros [..., LANES] by name for ``shapes`` [...], all from one allocation, since dozens are needed."""
     sizes = {name: LANES * math.prod(shape) for name, shape in shapes.items()}
     whole, start, found = zeros((sum(sizes.values()),)), 0, {}
     for name, size in sizes.items():

@@ -14,7 +14,7 @@ from wingfit.sim.kernels.lanes.matrices import load_matrix
 from wingfit.sim.kernels.lanes.vector import greatest, load, load0, magnitude, root, store, store0
 from wingfit.sim.kernels.laws import connector_port
 
-_EDGE = 0.02  # of the play: so far before and behind a stop the spring sets in
+_EDGE = 0.02  # distance before and behind a stop over which the spring sets in, over the play
 
 
 def _law(frame: Any, moment: int) -> None:
@@ -43,7 +43,7 @@ def _law(frame: Any, moment: int) -> None:
         cosine, sine = cosine_and_sine(beyond)
         C = cosine - x * x * x / (12.0 * h) - h * beyond
         S = (0.25 * x * x / h + sine) * phi / (size + 1e-300)
-        less, s = (C * p + S * q) / r - 1.0, (C * q - S * p) / r  # those of the pin
+        less, s = (C * p + S * q) / r - 1.0, (C * q - S * p) / r  # cosine minus one, and sine, of the pin's angle
         n = (Q[1] * g1 * less - Q[2] * g2 * s, Q[1] * g1 * s + Q[2] * g2 * less)
         store(port.wrench, c, 0, load(port.wrench, c, 0) + q - r * S)
         store(port.wrench, c, 1, load(port.wrench, c, 1) - n[1])

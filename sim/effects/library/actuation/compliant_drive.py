@@ -9,7 +9,7 @@ from wingfit.sim.effects.ports.wing import WingScene
 from wingfit.sim.kernels import LANES
 from wingfit.sim.kernels.motor import AVERAGING, DROOP, FOLLOWING, HOLDING, MOTOR
 
-# Over the angular rate. A lead decays, and the mean load is learnt, within a beat: e^(-2 pi) remains after it. Slower
+# Rates over the angular rate of the beat. Leads and errors of the mean load decay to e^(-2 pi) within a beat. Slower
 # rates would react less to the load within the beat, but need a third more beats to the periodic motion.
 GOVERNOR = 1.0
 LEARNING = 1.0

@@ -15,7 +15,7 @@ from wingfit.sim.kernels.lanes.vector import greatest, least, load, store
 from wingfit.sim.kernels.laws import strip_port
 
 NEAR = 0.2  # chords from mid-chord to the mirror plane at which fling has fallen to a half
-_PHASES = 360  # at which the top of the stroke is looked for
+_PHASES = 360  # number of drive phases among which the top of the stroke is searched
 
 
 def fling_near(distance: Array) -> Array:

@@ -16,7 +16,7 @@ from wingfit.sim.kernels.laws import strip_port
 from wingfit.sim.vehicle.states import separate, steady_attachment
 
 _RECENT = 0.25  # chords travelled over which the rate of alpha of a strip is taken
-_STEEPEST = 50.0  # exponent beyond which exp only overflows
+_STEEPEST = 50.0  # exponent beyond which the steady attachment is 0 or 1 to round-off
 _METRES = 0.01  # m of motion of the wing per unit of either state
 
 

@@ -19,10 +19,7 @@ _SCALE = 0.1  # motion of the wing over the motion of the air that causes it
 
 
 def apparent_mass(density: Array, area: Array) -> Array:
-    """Return the mass of air (kg) that a disc of ``area`` (m^2) moves: 8/3 rho R^3 for a disc of radius R.
-
-    ``density``: rho, kg/m^3 (Tuckerman 1925; Pitt and Peters 1981).
-    """
+    """Return the air mass (kg) that a disc moves: 8/3 rho R^3 for radius R (Tuckerman 1925; Pitt and Peters 1981)."""
     return np.asarray(8.0 / 3.0 * density * (area / np.pi) ** 1.5)
 
 

@@ -14,7 +14,7 @@ from wingfit.sim.kernels.lanes.vector import load, store
 from wingfit.sim.kernels.laws import strip_port
 from wingfit.sim.wing.structure import Structure
 
-_PIECES = 64  # of a strip
+_PIECES = 64  # pieces of a strip over which the factor is averaged
 
 
 def prandtl(to_tip: Array, spacing: Array) -> Array:

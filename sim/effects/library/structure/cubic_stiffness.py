@@ -12,7 +12,7 @@ from wingfit.sim.effects.ports.wing import WingScene
 from wingfit.sim.kernels.lanes.vector import load, load0, store, store0
 from wingfit.sim.kernels.laws import connector_port
 
-_SOFTEST = 0.7  # part of the stiffness that softening takes at most; the tangent loses 5/4 of it at most
+_SOFTEST = 0.7  # largest fraction of the stiffness that softening removes; the tangent loses at most 5/4 of it
 
 
 def _law(frame: Any, moment: int) -> None:

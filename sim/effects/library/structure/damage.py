@@ -14,15 +14,14 @@ _POINTS = 64  # along a connector: exact to 1e-3 for the narrowest damage on fou
 def _wing(scene: WingScene, values: Values) -> None:
     factor = remaining(Joints.of(scene.structure), values)[:, None]
     scene.lanes.stiffness[:] *= factor
-    scene.lanes.damping[:] *= factor  # the foam that is gone damps no more
+    scene.lanes.damping[:] *= factor  # lost foam does not damp
 
 
 def remaining(joints: Joints, values: Values) -> Array:
     """Return the fraction [C, W] of the stiffness that remains in each connector (C connectors, W individuals).
 
-    At the position s of the span, 1 - loss exp(-((s - station) / width)^2 / 2) remains. For a connector along the span,
-    the pieces of its length are in series, so that their compliances add; for one along the chord, they are in
-    parallel.
+    At the position s of the span, 1 - loss exp(-((s - station) / width)^2 / 2) remains. The pieces of a connector along
+    the span are in series, so that their compliances add; those of one along the chord are in parallel.
     """
     s = joints.reach[:, :1] + (np.arange(_POINTS) + 0.5) / _POINTS * np.diff(joints.reach)
     away = (s[:, :, None] - values["station"]) / values["width"]

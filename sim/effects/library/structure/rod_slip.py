@@ -13,9 +13,9 @@ from wingfit.sim.kernels.lanes.vector import greatest, least, load, load0, load1
 from wingfit.sim.kernels.laws import connector_port
 
 _METRES = [0.1]  # m/rad: one radian of bending moves a point one chord away
-_FOAM_ROW = 4  # of stiffness: stretching along the span, which the rods leave to the foam
+_FOAM_ROW = 4  # row of the stiffness for stretching along the span, which is that of the foam alone
 _TINY = 1e-30
-_SHAKE = 0.1  # keeps what rods carry from wandering: without it the periodic motion depends on how it began
+_SHAKE = 0.1  # returns slipped rods slowly: without it the periodic motion depends on how it began
 
 
 def _law(frame: Any, moment: int) -> None:
