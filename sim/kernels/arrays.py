@@ -119,10 +119,10 @@ class Lanes(NamedTuple):
     ``coefficients`` [4, W]; ``lift_share`` to ``drag_x`` [N, W]: how lift and drag are distributed to N bodies
     (:mod:`wingfit.sim.kernels.air`); ``hinge`` [9, W]: unit vector along the axis of the driving rods, then the
     position of the true hinge relative to the described one, in the rods' frame (m), then its position in the world
-    (m). The others are empty for most wings: ``coupling`` [C, 9, W], stiffness that couples rotation with translation;
-    ``pairs`` [P, 3] of bodies (i, j) with the number of their matrix block, whose momenta are coupled by the mass
-    matrices ``masses`` [P, 36, W], the first ``weighing`` of which have weight, while the others are added mass of the
-    air; and ``laws`` of effects.
+    (m). The remaining inputs are empty for most wings: ``coupling`` [C, 9, W], stiffness that couples rotation with
+    translation; ``pairs`` [P, 3] of bodies (i, j) with the number of their matrix block, whose momenta are coupled by
+    the mass matrices ``masses`` [P, 36, W], the first ``weighing`` of which have weight, while the others are added
+    mass of the air; and ``laws`` of effects.
     """
 
     stiffness: Array

@@ -17,7 +17,7 @@ def coordinates(about: State, state: State, rate: float, sizes: Array, out: Arra
 
     N bodies without the driving rods, Z states of effects. For each body: rotation vector times LENGTH, displacement,
     angular velocity times LENGTH over ``rate`` (rad/s, of the beat), velocity over ``rate``; then the effects' states
-    times ``sizes`` [Z]. Both states are those of one individual: their arrays lack the axis of individuals.
+    times ``sizes`` [Z]. Both states are those of one individual: their arrays have no axis of individuals.
     """
     bodies = len(state.V) - 2
     for n in range(bodies):

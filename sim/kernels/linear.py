@@ -122,7 +122,8 @@ def _times_block(m: int, blocks: Array, n: int, x: Array) -> None:
 def solve(order: Index, start: Index, below: Index, row: Index, blocks: Array, x: Array) -> None:
     """Replace the right-hand side ``x`` [N, 6, W] by the solution, given the factors in ``blocks`` (:func:`factor`).
 
-    ``order``, ``start``, ``below`` as there; ``row``: for each block of ``below``, the body whose matrix row it is in.
+    ``order``, ``start``, ``below`` as in :func:`factor`; ``row``: for each block of ``below``, the body whose matrix
+    row it is in.
     """
     for k in range(len(order)):
         for s in range(start[k], start[k + 1]):

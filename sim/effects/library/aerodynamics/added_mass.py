@@ -76,7 +76,7 @@ def _normal_motion(y: float, middle: float, centre: tuple[float, float]) -> list
 
     Each entry: index of the component, velocity at mid-chord, its change per metre along x. ``middle``: x of mid-chord
     (m); ``centre``: x and y of the body's centre of mass (m). Components that do not move the section along its normal
-    are left out.
+    are not listed.
     """
     return [(0, y - centre[1], 0.0), (1, centre[0] - middle, -1.0), (5, 1.0, 0.0)]
 

@@ -32,9 +32,10 @@ def _induce(scene: VehicleScene, values: Values) -> None:
     """Add the periodic inflow v along body x, through the disc that the vehicle's wings sweep, to the scene.
 
     It solves m v' + 2 rho A V_T v = share T(v), V_T^2 = (U_x + mean v)^2 + U_z^2, with the air's apparent mass m and
-    density rho, the disc's area A, the stream (U_x, U_z) and the thrust T of the wings. T is taken as linear in v
-    between zero and the inflow of hover, then once more about the solution. v is computed at every second instant,
-    because it is smooth. The force of added mass in the model does not include the rate of change of the inflow.
+    density rho, the disc's area A, the stream (U_x, U_z) the thrust T of the wings, and the effect's size share. T is
+    taken as linear in v between zero and the inflow of hover, then once more about the solution. v is computed at every
+    second instant, because it is smooth. The force of added mass in the model does not include the rate of change of
+    the inflow.
     """
     vehicle, air, wings = scene.setting.vehicle, scene.setting.condition, scene.wings.every(2)
     flap, share = scene.angles.flap[:, 0], values["share"][:, None]
@@ -70,8 +71,9 @@ def slices(edges: Array) -> Array:
 def _law(frame: Any, moment: int) -> None:
     """Add the inflow v of each strip to the air: v' = -share L / m - 2 rho A |U + v| v / m in world axes.
 
-    v (m/s) is the state of the strip, L its lift (N, a vector), U the wind, A and m the area and the air mass of its
-    slice of the disc (:func:`slices`). ``frame`` and ``moment``: see :mod:`wingfit.sim.kernels.laws`.
+    v (m/s) is the state of the strip, share the effect's size, L the strip's lift (N, a vector), U the wind, A and m
+    the area and the air mass of the strip's slice of the disc (:func:`slices`). ``frame`` and ``moment``: see
+    :mod:`wingfit.sim.kernels.laws`.
     """
     port = strip_port(frame)
     for s in range(port.places):
