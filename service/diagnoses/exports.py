@@ -1,4 +1,4 @@
-"""Exports of a diagnosis: its ranking as CSV, all of it as JSON, its maps and misfits as NetCDF."""
+"""Exports of a diagnosis: the ranking of its hypotheses as CSV, all of it as JSON, maps and misfits as NetCDF."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ PHASE = "phase of the beat"
 
 
 def document(exported: Exported[DiagnosisRow], found: Json) -> DiagnosisExport:
-    """The JSON export: the diagnosis, its dataset, and the finding ``found``."""
+    """Return the JSON export: the diagnosis, its dataset, and ``found``, the finding as JSON."""
     heading = exported.heading("diagnosis-export")
     return DiagnosisExport(**heading, diagnosis=diagnosis_views.diagnosis(exported.row), finding=found)
 
 
 def table(found: Json) -> str:
-    """The ranking as CSV, one hypothesis per row, the most probable first; the nominal model has no effects."""
+    """Return the hypotheses of the finding as CSV, one per line, the most probable first; no effects: nominal model."""
     head = ["rank", "effects", *RANKING, f"misfit_{found['unit'].lower()}", "refitted"]
     rows = [
         [rank, " + ".join(one["effects"]), *(one[name] for name in RANKING), one["misfit"], one["refitted"]]
@@ -46,7 +46,7 @@ def table(found: Json) -> str:
 
 
 def file(exported: Exported[DiagnosisRow], found: Json) -> bytes:
-    """Maps of the misfit, missing loads, and the misfit to each recording as NetCDF, a group each."""
+    """Return the NetCDF file, a group each: misfits by recording, by marker, by span and phase, and missing loads."""
     row = exported.row
 
     def write(root: Any) -> None:
@@ -88,7 +88,7 @@ def _recordings(root: Any, found: Json) -> None:
 
 
 def _markers(root: Any, found: Json) -> None:
-    """Write the misfit of each marker or force axis, over all recordings, into ``root``."""
+    """Write the misfit of each marker or force axis, over all recordings, into a group of ``root``."""
     items, unit, along = found["markers"], found["unit"], ("marker",)
     if not items:
         return
