@@ -146,7 +146,7 @@ class Service:
         return await self._metrics_text.result(READ_SECONDS)
 
     def gauges(self) -> Iterator[Metric]:
-        """Yield the state of the service as Prometheus gauges, over all owners; jobs as counted last."""
+        """Yield the state of the service as Prometheus gauges, over all owners; jobs are those of the last count."""
         workers, pace = self._pool.standing or Standing(0), self.runner.pace()
         jobs = GaugeMetricFamily("wingfit_jobs", "Calibrations and diagnoses by state.", labels=["kind", "state"])
         for kind, counts in (self.health.jobs or {}).items():

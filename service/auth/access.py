@@ -73,7 +73,7 @@ def _only_own(state: ORMExecuteState) -> None:
 
 
 class KeyRing:
-    """The valid API keys, in memory: the caller of each by the hash of the key's secret."""
+    """The valid API keys, held in memory; finds the caller to whom a secret belongs by the secret's hash."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()

@@ -30,8 +30,7 @@ KEPT, KEPT_BYTES = 8, 2**28
 class Opened(NamedTuple):
     """An uploaded dataset that was read.
 
-    ``parsed``: the dataset in the internal format of `records/files/parsed.py` if the upload was a NetCDF file, else
-    None.
+    ``parsed``: for a NetCDF file the dataset in the internal format of `records/files/parsed.py`, for a zip None.
     """
 
     dataset: Dataset

@@ -28,8 +28,7 @@ def checked(
     """Return the specification that the request ``body`` describes; raise a 422 if it does not fit the dataset.
 
     For a diagnosis of a run, ``of_run`` is the run's specification, which applies where ``body`` has no setting, and
-    ``genome`` its best genome (gene name to value), from which the diagnosis starts. Genes that the requested model
-    does not have are ignored.
+    ``genome`` (gene name to value) its best genome, from which to start; genes not in the requested model are ignored.
     """
     spec_views.refuse_foreign(body, dataset)
     base = of_run or CalibrationSpec()

@@ -1,7 +1,4 @@
-"""Diagnoses as jobs of the runner.
-
-An interrupted diagnosis is computed again from the beginning, and gives the same finding.
-"""
+"""Diagnoses as jobs of the runner; an interrupted one is computed again from the beginning, with equal results."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Writes CSV (RFC 4180), numbers in full precision, and no text that a spreadsheet would run as a formula."""
+"""Writes CSV (RFC 4180): numbers in full precision, and text so that a spreadsheet runs none of it as a formula."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ FORMULA = tuple("=+-@\t\r\n\0＝＋－＠")
 
 
 def lines(rows: Iterable[Sequence[Cell]]) -> str:
-    """Return rows of cells as CSV text; None gives an empty cell, text that looks like a formula an apostrophe."""
+    """Return rows of cells as CSV text: None as an empty cell, and text that looks like a formula after a "'"."""
     buffer = io.StringIO()
     csv.writer(buffer).writerows([_plain(cell) for cell in row] for row in rows)
     return buffer.getvalue()

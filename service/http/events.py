@@ -60,7 +60,7 @@ class News(NamedTuple):
 
     Attributes:
         steps: the events of new steps.
-        after: sequence number of the last of these steps.
+        after: sequence number of the last of these steps, or the one after which to read if there are none.
         complete: whether there are no further steps in the database.
         status: state, pending action and error of the job; a ``state`` event is sent whenever they change.
         state: the ``state`` event.
@@ -126,8 +126,7 @@ class Events:
     async def _read(self, watched: Watched, after: int) -> News | None:
         """Return the events after sequence number ``after``; None if the job was deleted or the service stops.
 
-        Streams that need the same events of the same database version share one read. Each caller's access to the job
-        was checked before the stream began.
+        Streams that need the same events of the same database version share one read: each caller's access was checked.
         """
         key = watched.id, after, self._database.version
         read = self._reads.get(key)

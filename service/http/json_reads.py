@@ -43,8 +43,7 @@ async def answer(read: Callable[[], bytes], *, short: bool) -> Response:
 def runs(database: Database, limit: int, cursor: str | None, dataset_id: str | None, state: str | None) -> bytes:
     """Return a page of up to ``limit`` runs as JSON, newest first.
 
-    ``cursor``: where the page begins, None: at the newest; ``dataset_id``, ``state``: only runs that have them, unless
-    None.
+    ``cursor``: where the page begins (None: at the newest); ``dataset_id``, ``state``: of the runs (None: any).
     """
     equal = {"dataset_id": dataset_id, "state": state, "owner": visible_owner()}
     where = [f"{name} = :{name}" for name, value in equal.items() if value is not None]
@@ -81,7 +80,7 @@ def _page_of_runs(where: tuple[str, ...]) -> str:
 
 @lru_cache(RUNS_IN_CACHE)
 def _run_json(row: tuple[Any, ...]) -> bytes:
-    """Return a run as JSON; ``row``: its columns RUN. The result is cached, because equal rows give equal JSON."""
+    """Return a run as JSON; ``row``: the columns named in RUN. Equal rows give equal JSON, so it is cached."""
     values = dict(zip(RUN, row, strict=True))
     values["spec"] = json.loads(values["spec"])
     return to_json(views.run_of(values))

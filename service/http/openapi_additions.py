@@ -25,7 +25,7 @@ FORM = "multipart/form-data"
 
 
 def extend_openapi(app: FastAPI) -> None:
-    """Make the OpenAPI document that ``app`` publishes contain the additions."""
+    """Make the OpenAPI document that ``app`` publishes contain the additions of this module."""
     generate = app.openapi
 
     def openapi() -> Json:

@@ -66,7 +66,7 @@ def error_item(where: str, value: object, message: str) -> ErrorItem:
 
 
 def shown(value: object) -> object:
-    """Return ``value`` in a form that an error message can quote: long ones shortened, and always valid JSON."""
+    """Return ``value`` in a form that an error message can quote: long texts shortened, and always valid JSON."""
     if value is None or isinstance(value, bool) or (isinstance(value, float) and math.isfinite(value)):
         return value
     if isinstance(value, int) and abs(value) < 2**63:

@@ -128,9 +128,8 @@ def _limited(receive: Receive, limit: int) -> Receive:
 def _response_sender(send: Send, *, headers_only: bool = False) -> Send:
     """Wrap ``send`` to add the security headers, and to send a large body in chunks (``headers_only``: no body).
 
-    Each chunk waits until the client has received the one before. A body sent whole would wait in the buffer of its
-    connection while the request counts as answered: the limits on concurrent requests would then not limit the bodies
-    in memory.
+    Each chunk waits until the client has received the one before. A body sent whole would wait in memory while its
+    request counts as answered, so that the limits on concurrent requests would not limit the bodies in memory.
     """
 
     async def sender(message: Message) -> None:

@@ -93,8 +93,7 @@ def created(
 ) -> tuple[store.Answer, bool]:
     """Call ``create``, which creates a resource, and store its answer in the same transaction.
 
-    If the request is a repetition (``again`` identifies it), nothing is created. Returns the answer, and whether it is
-    new.
+    A repetition (``again`` identifies the request) creates nothing. Returns the answer, and whether it is new.
     """
     with database.write() as session:
         earlier = store.earlier_answer(session, again)

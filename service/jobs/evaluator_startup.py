@@ -1,4 +1,4 @@
-"""Starts the evaluator (the worker processes that simulate) in a thread, so that the API answers at once; retries."""
+"""Starts the evaluator (worker processes that simulate) in a thread, so that the API answers at once, and retries."""
 
 from __future__ import annotations
 

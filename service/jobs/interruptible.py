@@ -29,8 +29,7 @@ class InterruptibleEvaluator:
     def evaluate(self, problem: Problem, values: npt.ArrayLike, *, residuals: bool = False) -> Evaluation:
         """Return the misfits of ``values`` [B, F] (B individuals, F free genes) to the recordings of ``problem``.
 
-        ``residuals``: whether to return residuals too. InterruptedStepError soon after an interruption, even if a
-        worker hangs.
+        ``residuals``: return residuals too. InterruptedStepError soon after an interruption, even if a worker hangs.
         """
         if self._interrupted():
             raise InterruptedStepError

@@ -52,9 +52,8 @@ class JobRef(NamedTuple):
 class Pace(NamedTuple):
     """Signs of a hanging computation, for the metrics (0 where no job runs or waits).
 
-    Attributes:
-        stalled_s: seconds since the last stored step, of the running job for which this is longest.
-        waited_s: seconds that the oldest queued job has waited.
+    ``stalled_s``: seconds since the last stored step, of the running job for which they are most; ``waited_s``: seconds
+    that the oldest queued job has waited.
     """
 
     stalled_s: float

@@ -14,8 +14,7 @@ from contextlib import contextmanager
 class Changes:
     """Notifies coroutines of changed jobs: threads call :meth:`publish`, coroutines wait in :meth:`watch`.
 
-    Attributes:
-        closed: whether the service stops, so that streams must end.
+    ``closed``: whether the service stops, so that streams must end.
     """
 
     def __init__(self) -> None:
@@ -25,7 +24,7 @@ class Changes:
 
     @contextmanager
     def watch(self, job_id: str) -> Iterator[asyncio.Event]:
-        """Give an event that is set whenever the job or the API keys change, and when the service stops."""
+        """Yield an event that is set whenever the job or the API keys change, and when the service stops."""
         watcher = (asyncio.get_running_loop(), asyncio.Event())
         with self._lock:
             self._watchers.setdefault(job_id, set()).add(watcher)

@@ -16,7 +16,7 @@ CONNECT_SECONDS = 10.0
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Listen on every address of this machine and forward until the process is ended."""
+    """Forward as the command line says (``arguments`` None: that of the process) until the process is ended."""
     parser = argparse.ArgumentParser(prog="python -m wingfit.service.operations.forward", description=__doc__)
     parser.add_argument("target", help="address to forward to, as host:port")
     parser.add_argument("--host", default="0.0.0.0", help="address to listen on (default: all)")  # noqa: S104  its purpose

@@ -144,7 +144,7 @@ class JsonFormatter(logging.Formatter):
 def set_up_log(log_format: LogFormat) -> None:
     """Log to standard error, as text or JSON.
 
-    Only the JSON log contains every request: in a text log they would hide other messages.
+    Only the JSON log contains every request: in a text log the requests would hide other messages.
     """
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(levelname)s %(name)s: %(message)s")
     logging.getLogger("alembic").setLevel(logging.WARNING)

@@ -148,7 +148,7 @@ class Watchdog:
             faulthandler.register(watchdog.STACKS, file=sys.stderr, all_threads=True)
 
     def listen(self) -> None:
-        """Install faulthandler's handlers before the present signal handlers; repeat this when these have changed."""
+        """Make faulthandler handle the stop signals before their present handlers; call again when these change."""
         for number in SIGNALS:
             faulthandler.unregister(number)
             # Only the stack of the thread that takes the signal: reading the others while they run is not safe.

@@ -1,7 +1,7 @@
 """Selects the genome with which to compute the forces of one recording, for a run on forces.
 
-Its coefficients can be estimated from that recording ("local") or all fitted ones together ("joint"), be the average of
-the local estimates, follow from the global model (a function of the condition), or be nominal.
+Its coefficients were estimated from that recording ("local") or from all fitted recordings together ("joint"), or are
+the average of the local estimates, those of the global model (a function of the condition), or nominal.
 """
 
 from __future__ import annotations
@@ -28,13 +28,7 @@ Estimates = Mapping[str, Mapping[str, float]]
 
 @dataclass(frozen=True)
 class Chosen:
-    """A genome for computing forces.
-
-    Attributes:
-        source: where its coefficients come from.
-        genome: all genes, name to value.
-        remarks: for the user.
-    """
+    """A genome for computing forces: ``source`` of its coefficients, all genes (name to value), remarks for users."""
 
     source: Source
     genome: Mapping[str, float]

@@ -74,7 +74,7 @@ def forces(found: ForceComparison, source: f.SourceOrGiven | None = None) -> f.F
 
 
 def law(stored: f.GlobalModel, dataset: Dataset) -> GlobalModel:
-    """Convert the global model of a stored result back; the conditions are those of the recordings that it names."""
+    """Convert ``stored``, a global model as JSON, back; its conditions are those of the recordings that it names."""
     return GlobalModel(
         genes=tuple(
             GlobalGene(

@@ -22,7 +22,7 @@ PIECE = 2**20
 
 
 async def _copy(request: Request, service: ServiceDep) -> AsyncIterator[BinaryIO]:
-    """Give a copy of the database, opened for reading; one at a time, and removed when the request ends."""
+    """Yield a copy of the database, opened for reading; one at a time, and removed when the request ends."""
     async with service.backups.slot():
         if await request.is_disconnected():
             raise ProblemError(503, "busy", "the client of this backup is gone")

@@ -87,7 +87,7 @@ def list_datasets(service: ServiceDep, limit: http.Limit = 50, cursor: http.Curs
 
 @router.get("/{dataset_id}", response_model=a.Dataset, responses=http.errors(404), summary="Fetch a dataset")
 def fetch(service: ServiceDep, dataset_id: str, if_none_match: http.IfNoneMatch = None) -> Response:
-    """Return the description of one dataset: its recordings, and how they were made."""
+    """Return the description of one dataset: its recordings, and the conditions under which they were made."""
     with service.database.read() as session:
         row = store.one(session, DatasetRow, dataset_id)
     return http.tagged(views.dataset(row), if_none_match)

@@ -30,9 +30,9 @@ def submit_job(
     """Store the job that a request describes, queue it, and return the answer. A repeated request gets the same answer.
 
     ``kind``: of the job; ``key``: the Idempotency-Key, if any; ``plan`` checks the request ``body`` and returns a job,
-    not yet stored, with its dataset_id, kind, name and spec. Two requests with one Idempotency-Key are equal if they
-    contain the same fields with the same values. A default written out differs from a field left out, because it
-    overrides a run's setting.
+    not yet stored, with its dataset_id, kind, name and spec. Two requests with one key are equal if they contain the
+    same fields with the same values. A default written out differs from a field left out, because it overrides a run's
+    setting.
     """
     again = http.repeat(request, key, body.model_dump_json(exclude_unset=True))
     with service.database.read() as session:

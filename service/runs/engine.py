@@ -37,7 +37,7 @@ class Engine:
         return search.prepare(spec, dataset).spec
 
     def gene_names(self, spec: CalibrationSpec, dataset: Dataset) -> tuple[str, ...]:
-        """Return the names of the model's genes; raise ValueError for an impossible ``division`` or an unknown term."""
+        """Return the names of the model's genes; ValueError for an impossible discretisation or an unknown term."""
         return tuple(gene.name for gene in search.model_for(dataset, spec).genes)
 
     def genome(self, spec: CalibrationSpec, dataset: Dataset, values: Mapping[str, float]) -> dict[str, float]:
@@ -45,7 +45,7 @@ class Engine:
         return base_genome(search.model_for(dataset, spec), values).as_dict()
 
     def genes(self, spec: CalibrationSpec, dataset: Dataset, genome: Mapping[str, float]) -> tuple[GeneResult, ...]:
-        """Return all genes with their nominal values and bounds, and ``genome``, the best one so far, as best values.
+        """Return all genes with nominal value, bounds, and their value in ``genome`` as the best value so far.
 
         Standard errors are None, because they are known only at the end of the search.
         """

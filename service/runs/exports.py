@@ -40,7 +40,7 @@ class Exported(Generic[AnyJob]):
     at: str
 
     def heading(self, schema: str) -> Export:
-        """Return the fields that exports of runs and of diagnoses share; ``schema`` names the kind of export."""
+        """Return the fields that all exports share; ``schema``: kind of export, e.g. "run-export"."""
         return Export(
             schema_id=f"urn:wingfit:schema:{schema}:1",
             wingfit_version=wingfit_version(),

@@ -23,10 +23,7 @@ def gene_names(engine: Engine, spec: CalibrationSpec, dataset: Dataset) -> tuple
 
 
 def refuse_unknown(spec: CalibrationSpec, dataset: Dataset, known_genes: tuple[str, ...]) -> None:
-    """Raise a 422 if ``spec`` names recordings that the dataset does not have, or genes not in ``known_genes``.
-
-    ``known_genes``: names of the genes of the model.
-    """
+    """Raise a 422 for recordings that the dataset does not have, and genes not in ``known_genes``, the model's."""
     genes = [(f"body.genes.{place}", name) for place, name in enumerate(spec.genes)]
     genes += [(f"body.fixed.{name}", name) for name in spec.fixed]
     recordings = tuple(recording.name for recording in dataset.recordings)

@@ -49,7 +49,7 @@ def calibration_spec(body: BaseModel, base: CalibrationSpec | None = None) -> Ca
 
 
 def simulation_spec(body: WingIn) -> CalibrationSpec:
-    """Return the specification of the model that the request ``body`` for a simulation describes."""
+    """Return the specification of the model in ``body``, a request for a simulation, with the widest gene bounds."""
     return replace(calibration_spec(body), bounds_factor=WIDEST_BOUNDS)
 
 

@@ -36,7 +36,7 @@ def dataset(row: DatasetRow) -> a.Dataset:
 
 
 def recording(record: Recording, held_out: bool) -> a.RecordingInfo:
-    """Return the JSON answer that describes one recording and its condition; ``held_out``: not used for fitting."""
+    """Return the JSON answer about one recording and its condition; ``held_out``: used for validation only."""
     tracked = record.kind == "tracks"
     seen = np.isfinite(record.positions).all(axis=2) if tracked else record.valid
     return answer(
@@ -88,7 +88,7 @@ def result(outcome: tracks_result.Result) -> a.Result:
 
 
 def comparison(tracks: tracks_result.Comparison) -> Comparison:
-    """Return recorded and simulated marker tracks as the JSON answer (mm); of very long ones every n-th sample."""
+    """Return recorded and simulated marker tracks as the JSON answer (mm); of long ones every ``stride``-th sample."""
     stride = max(1, -(-tracks.recorded.size // MOST_COORDINATES))
     return {
         "recording": tracks.recording,

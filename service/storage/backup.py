@@ -97,9 +97,8 @@ def restore(backup: Path, folder: Path, *, keep_keys: bool = False) -> Contents:
 def _put(backup: Path, target: Path, keep_keys: bool) -> Contents:
     """Copy ``backup`` to the file ``target`` if the copy passes all checks; return its keys and the owners of its data.
 
-    The copy is checked, not the original, which other processes may change; and in a separate folder, so that an
-    interrupted process leaves no unchecked database where a server would open it. ``keep_keys``: whether the API keys
-    stay valid.
+    The copy is checked, not the original, which other processes may change; and in a separate folder, so that a crash
+    leaves no unchecked database where a server would open it. ``keep_keys``: whether the API keys stay valid.
     """
     for left in target.parent.glob(f"{STAGING}*"):  # by a process that was killed
         shutil.rmtree(left, ignore_errors=True)

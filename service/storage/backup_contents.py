@@ -49,10 +49,7 @@ class Contents:
 
 
 def contents(database: sqlite3.Connection) -> Contents:
-    """Read the keys and owners in ``database``, a backup whose schema was checked.
-
-    ContentsError for a key that wingfit cannot have made.
-    """
+    """Read keys and owners in ``database``, whose schema was checked; ContentsError for a key not made by wingfit."""
     return Contents(tuple(_keys(database)), tuple(_owners(database)))
 
 

@@ -77,5 +77,5 @@ def _objects(rows: Sequence[Sequence[Any]]) -> Objects:
 
 
 def _normal(sql: str) -> tuple[str, ...]:
-    """Split ``sql`` into its words, without spaces, upper case and without the quotes around names, to be compared."""
+    """Split ``sql`` into tokens, names unquoted and in upper case, so that equivalent schemas give equal tokens."""
     return tuple(token if token[0] == "'" else token.strip('"`[]').upper() or token for token in TOKENS.findall(sql))

@@ -36,8 +36,7 @@ class ServiceClock:
     """Clock that counts the seconds for which the service has run, over all its processes; never decreases.
 
     It is never ahead of true time, except that each start of a process may add up to one day too much if the wall clock
-    jumped ahead. ``wall`` and ``steady`` return the wall time (UTC) and the seconds of a monotonic clock; tests replace
-    them.
+    jumped ahead. ``wall``, ``steady``: functions that return the wall time (UTC), and seconds of a monotonic clock.
     """
 
     def __init__(self, wall: Callable[[], datetime] = _wall, steady: Callable[[], float] = _steady) -> None:
@@ -77,10 +76,9 @@ def _elapsed(before: tuple[datetime, float], now: tuple[datetime, float]) -> flo
 
 
 def _stopped(stored: str, wall: datetime) -> float:
-    """Return the seconds for which no process ran, at most one day: from ``stored`` to ``wall``.
+    """Return the seconds for which no process ran, from ``stored`` to ``wall``, limited to [0, 1 day].
 
-    ``stored``: wall time (RFC 3339) that an earlier process stored last. 0 if ``wall`` is earlier, or ``stored``
-    unreadable.
+    ``stored``: wall time (RFC 3339) that an earlier process stored last; an unreadable one gives 0.
     """
     try:
         gap = (wall - datetime.fromisoformat(stored)).total_seconds()

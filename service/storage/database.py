@@ -110,8 +110,7 @@ class Database:
     def __init__(self, folder: Path) -> None:
         """Lock ``folder`` (created if missing), migrate its database to the newest schema and open it.
 
-        Only the user who runs the process can read the folder and the database. DataFolderError if the folder cannot be
-        used.
+        Only the user who runs the process can then read the folder. DataFolderError if it cannot be used.
         """
         try:
             make_folder(folder)
@@ -160,8 +159,7 @@ class Database:
     def read(self) -> Iterator[Session]:
         """Open a session for reading one consistent snapshot of the database.
 
-        Queries return only the rows that the caller of the request (:data:`wingfit.service.auth.access.CALLER`) may
-        see.
+        Queries return only the rows that :data:`wingfit.service.auth.access.CALLER`, who sent the request, may see.
         """
         if self._closed:
             raise DatabaseClosedError("the service is stopping")

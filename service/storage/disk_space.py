@@ -16,8 +16,7 @@ REMEDY = "make room there, or set TMPDIR to a folder with room and restart the s
 def while_spooling(error: BaseException | None) -> str | None:
     """Return the message for an error that occurred while a request was read; None for errors of another kind.
 
-    The web framework writes large parts of a request to temporary files, so the disk may be full or the folder
-    unusable.
+    The web framework writes large parts of a request to temporary files, which fails if their disk is full.
     """
     if not isinstance(error, OSError):
         return None

@@ -24,9 +24,9 @@ TABLES: tuple[JobTable, ...] = (DiagnosisRow, RunRow)
 class Housekeeping:
     """Thread that deletes old data at the start and every hour: stored answers, and jobs that ended long ago.
 
-    Jobs are deleted only if ``keep_days`` is not None; ``on_deleted`` is called with the id of each. Datasets are never
-    deleted. The service clock (`clock.py`) measures how long ago a job ended, from the first pass that found the job
-    ended. The wall time of the end is not used, because the wall clock may have been wrong.
+    Jobs are deleted only if ``keep_days`` is not None, datasets never; ``on_deleted`` is called with the id of each
+    job. The service clock (`clock.py`) measures how long ago a job ended, from the first pass that found the job ended.
+    The wall time of the end is not used, because the wall clock may have been wrong.
     """
 
     def __init__(

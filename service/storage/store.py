@@ -310,10 +310,8 @@ _MADE: dict[str, type[OwnedRow]] = {"datasets": DatasetRow, "runs": RunRow, "dia
 class Repeat:
     """Identifies a request, so that its repetition is recognised.
 
-    Attributes:
-        path: of the request, with the caller's owner if keys are required.
-        key: value of its Idempotency-Key header.
-        fingerprint: SHA-256 of its contents (hexadecimal).
+    ``path``: of the request, with the caller's owner if keys are required; ``key``: value of its Idempotency-Key
+    header; ``fingerprint``: SHA-256 of its contents (hexadecimal).
     """
 
     path: str
@@ -323,13 +321,7 @@ class Repeat:
 
 @dataclass(frozen=True)
 class Answer:
-    """The HTTP response to a request that created a resource.
-
-    Attributes:
-        status: HTTP status.
-        location: path of the new resource.
-        body: JSON.
-    """
+    """The HTTP response to a request that created a resource: status, path of the resource, and JSON body."""
 
     status: int
     location: str

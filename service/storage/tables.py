@@ -43,7 +43,7 @@ class OwnedRow:
 
 
 class KeyRow(Table):
-    """An API key. Revoked keys stay in the table, with the time ``revoked_at``.
+    """An API key; revoked keys stay in the table, with the time ``revoked_at``.
 
     The secret itself is not stored, only its hash ``sha256``. ``scopes``: what the key permits (read, write, admin).
     """
@@ -143,8 +143,8 @@ class RunRow(JobRow, Table):
     """A calibration run.
 
     Attributes:
-        best_mm, best_mn: misfit of the best genome of the present stage, in the end that of the result, of tracks (mm)
-            or forces (mN); the other is None.
+        best_mm, best_mn: misfit of the best genome (of the present stage, at the end of the result): mm for tracks, mN
+            for forces.
         genome: best genome so far, gene name to value; None before the first generation.
         result: result as JSON; None unless the run has succeeded.
     """
@@ -183,8 +183,8 @@ class FindingRow(Table):
 class StepOfJob:
     """The columns that generations of runs and steps of diagnoses share: the progress of the job at that step.
 
-    ``sequence`` counts the steps of a job from 1, over all stages and restarts; times are in seconds since the job
-    began.
+    ``sequence`` counts the steps of a job from 1, over all stages and restarts; ``elapsed_seconds``: computing time so
+    far.
     """
 
     job_id: Mapped[str]
@@ -220,8 +220,7 @@ class GenerationRow(StepOfJob, Table):
 
     Attributes:
         generation: number of the generation within its stage, from 0.
-        best, mean: fitness of the best individual, and mean of those that did not fail (m^2 for tracks, N^2 for
-            forces).
+        best, mean: sum of squares (m^2 or N^2) of the best individual, and its mean over those that did not fail.
         best_mm, best_mn: misfit of the best individual, of tracks (mm) or of forces (mN); the other is None.
         failed, reasons: number of individuals whose simulation failed, and why.
     """
