@@ -1,6 +1,6 @@
 """Middleware that checks host, origin and size of every request, adds security headers and sends bodies in chunks.
 
-All middleware of the service is plain ASGI, because Starlette's BaseHTTPMiddleware would buffer the event streams.
+All middleware of the service is plain ASGI: middleware that returns a whole response would buffer the event streams.
 """
 
 from __future__ import annotations
