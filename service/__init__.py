@@ -1,1 +1,1 @@
-"""The server: HTTP API, database, computation of jobs, web page."""
+"""The server: HTTP API, database, computation of jobs (runs and diagnoses), web page."""

@@ -1,6 +1,7 @@
 """Builds the JSON answers (typed dicts of `wingfit.client`) from Python objects and database rows.
 
-The ending of a field's name gives the conversion: field ``before_mm`` is attribute ``before`` (m) of the object in mm.
+The ending of a field's name says how to convert: field ``before_mm`` of the answer is attribute ``before`` (in m) of
+the object, converted to mm.
 """
 
 from __future__ import annotations
@@ -34,8 +35,8 @@ UNITS: Mapping[str, tuple[Convert, Convert]] = {
 def answer(shape: type[T], source: object, /, **computed: object) -> T:
     """Build the typed dict ``shape``: each field is taken from ``computed``, or else from an attribute of ``source``.
 
-    Sequences become lists, nested objects become the typed dicts that ``shape`` names, infinity and NaN become null.
-    AttributeError for a field that is neither computed nor an attribute.
+    Units are converted from SI as the field's name says. Sequences become lists, nested objects the typed dicts that
+    ``shape`` names, infinity and NaN None. AttributeError for a field that is neither computed nor an attribute.
     """
     found: Any = {}
     for name, hint in _fields(shape).items():
@@ -44,12 +45,12 @@ def answer(shape: type[T], source: object, /, **computed: object) -> T:
 
 
 def checked(shape: type[T], values: Mapping[str, Any]) -> T:
-    """Stored ``values`` as the typed dict ``shape``; ValueError where they do not have its fields and types."""
+    """Return ``values``, stored JSON, as typed dict ``shape``; ValueError if fields are missing or of a wrong type."""
     return _adapter(shape).validate_python(values)  # type: ignore[no-any-return]
 
 
 def in_si(values: Mapping[str, Any]) -> dict[str, Any]:
-    """The inverse: ``values`` by API field (``before_mm``) as values by attribute (``before``) in SI units."""
+    """Convert ``values`` from the API's names and units to those in SI, e.g. ``before_mm`` to ``before`` (m)."""
     found = dict(values)
     for name in values:
         if ending := _ending(name):
@@ -59,7 +60,7 @@ def in_si(values: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _attribute(source: object, name: str) -> tuple[Any, Convert | None]:
-    """The attribute of ``source`` for the API field ``name``, and the conversion of its numbers from SI, or None."""
+    """Return the attribute of ``source`` for API field ``name``, and its conversion from SI (None: not needed)."""
     if hasattr(source, name):
         return getattr(source, name), None
     if ending := _ending(name):
@@ -72,7 +73,7 @@ def _ending(name: str) -> str:
 
 
 def _plain(value: Any, convert: Convert | None, hint: Any) -> Any:
-    """``value``, its numbers converted by ``convert``, as JSON data of the type ``hint``."""
+    """Convert ``value`` to JSON data of the type ``hint``, its numbers by ``convert`` (None: not converted)."""
     if get_origin(hint) in (Union, UnionType):
         if value is None:
             return None

@@ -68,7 +68,10 @@ DESCRIPTION = (
 def create_app(
     settings: Settings, *, database: Database | None = None, limits: StopLimits | None = None, **parts: Unpack[Parts]
 ) -> FastAPI:
-    """Build the application. At its start it opens the data folder, unless an open ``database`` is given."""
+    """Build the web application; ``parts`` replace parts of the service, for tests.
+
+    When it starts, the application opens the data folder of ``settings``, unless an open ``database`` is given.
+    """
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[dict[str, Metrics]]:

@@ -1,4 +1,4 @@
-"""The parts of a running service: constructed, started and stopped in order, and the dependencies that inject them."""
+"""The parts of a running service: creates, starts and stops them; and gives them to routes as FastAPI dependencies."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Parts(TypedDict, total=False):
 
 
 class Service:
-    """What request handlers need: settings, database, jobs, limits and metrics."""
+    """What the routes need: settings, database, jobs, limits on concurrent requests, and metrics."""
 
     def __init__(self, settings: Settings, database: Database, **parts: Unpack[Parts]) -> None:
         self.settings, self.database = settings, database
@@ -82,7 +82,7 @@ class Service:
         self._metrics_text = threads.SharedCall("metrics", self.metrics.text)
 
     def start(self) -> None:
-        """Load the keys, recover the jobs of an earlier process, and start the evaluator."""
+        """Load the API keys, queue the jobs that an earlier process did not finish, and start the evaluator."""
         self.load_keys()
         forget_snapshots(self.settings.data)
         self.runner.recover()
@@ -90,19 +90,22 @@ class Service:
         self._pool.start()
 
     def load_keys(self) -> None:
-        """Read the valid keys from the database; event streams that were opened with a revoked key end."""
+        """Read the valid API keys from the database; event streams that were opened with a revoked key end."""
         with self.database.read() as session:
             self.keys.load(session)
         self.changes.wake_all()
 
     def begin_stop(self) -> None:
-        """End the event streams and start no more jobs. Safe in a signal handler."""
+        """End the event streams and start no more jobs. May be called in a signal handler."""
         self.runner.begin_stop()
         self._housekeeping.stop()
         self.changes.close()
 
     def stop(self, limits: StopLimits | None = None) -> bool:
-        """Stop within ``limits``; return whether all threads ended. Stored jobs stay; the log names running threads."""
+        """Stop within ``limits``; return whether all threads ended.
+
+        Unfinished jobs stay stored and continue at the next start; the log names what did not end in time.
+        """
         limits = limits or StopLimits()
         self.begin_stop()
         # In a thread, because a job that waits for the database may hold the lock of the runner.
@@ -118,7 +121,7 @@ class Service:
         return ended and closed and stored
 
     def unfinished(self) -> Iterator[str]:
-        """One line for each request that is being answered and each job that is being computed."""
+        """Yield one line for each request that is being answered and each job that is being computed."""
         for method, path, began in list(self.open_requests.values()):
             yield f"{method} {path}, since {time.monotonic() - began:.1f} s"
         yield from self._running_jobs()
@@ -138,12 +141,12 @@ class Service:
             return f"its last step is unknown: {type(error).__name__}"
 
     async def metrics_text(self) -> bytes:
-        """All metrics in the text format of Prometheus; TimeoutError after ``READ_SECONDS``."""
+        """Return all metrics in the text format of Prometheus; TimeoutError after ``READ_SECONDS``."""
         await self.health.look()
         return await self._metrics_text.result(READ_SECONDS)
 
     def gauges(self) -> Iterator[Metric]:
-        """The state of the service as Prometheus gauges, over all owners; job numbers are those of the last count."""
+        """Yield the state of the service as Prometheus gauges, over all owners; jobs are those of the last count."""
         workers, pace = self._pool.standing or Standing(0), self.runner.pace()
         jobs = GaugeMetricFamily("wingfit_jobs", "Calibrations and diagnoses by state.", labels=["kind", "state"])
         for kind, counts in (self.health.jobs or {}).items():

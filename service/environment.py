@@ -22,12 +22,15 @@ OF_KUBERNETES = re.compile(
 
 
 def given(environment: Mapping[str, str]) -> dict[str, str]:
-    """The variables that begin with ``WINGFIT_``, stripped of spaces; an empty one counts as unset."""
+    """Return the variables that begin with ``WINGFIT_``, with surrounding spaces removed; empty ones are left out."""
     return {key: value.strip() for key, value in environment.items() if key.startswith(PREFIX) and value.strip()}
 
 
 def unknown(read: Mapping[str, str], settings: Iterable[str]) -> list[str]:
-    """The set variables (``read``) that are neither ``settings`` nor used elsewhere, each with a similar known name."""
+    """Return those of the variables ``read`` that are neither ``settings`` of the server nor used elsewhere.
+
+    Each name is followed by a similar known one, in parentheses.
+    """
     known = {*settings, *OF_OTHERS}
     return [
         f"{name} ({nearest(name, sorted(known))})"

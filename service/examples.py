@@ -1,4 +1,4 @@
-"""Examples of answers in the published description (OpenAPI)."""
+"""Examples of JSON answers, for the OpenAPI document."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Runs the service: opens the data folder and the port, or reports why it cannot, then starts uvicorn."""
+"""Runs the service: opens the port and the data folder, or reports why that is impossible, then starts uvicorn."""
 
 from __future__ import annotations
 
@@ -34,11 +34,14 @@ PORT_TAKEN = (errno.EADDRINUSE, errno.EACCES)
 
 
 class ServeError(RuntimeError):
-    """The service cannot start; the message says why, and what to do."""
+    """Raised when the service cannot start; the message says why, and what to do."""
 
 
 class _Server(uvicorn.Server):
-    """uvicorn's server, stopped by a signal in bounded time: ends open event streams, for which uvicorn would wait."""
+    """uvicorn's server, which a signal stops in bounded time.
+
+    It ends open event streams itself, because uvicorn would wait for them.
+    """
 
     def __init__(self, config: uvicorn.Config, app: FastAPI, limits: StopLimits) -> None:
         super().__init__(config)
@@ -47,12 +50,12 @@ class _Server(uvicorn.Server):
         self._watchdog = Watchdog(limits.kill)
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
-        """Start; a signal stops the server even if the start hangs."""
+        """Start the server; from now on a signal stops it, even if the start hangs."""
         self._watchdog.listen()
         await super().startup(sockets)
 
     async def on_tick(self, counter: int) -> bool:
-        """Install the signal handlers again: Ray's handler aborts the process three seconds after a SIGTERM."""
+        """Install the signal handlers again at every tick of uvicorn (0.1 s), because Ray replaces them."""
         for number in shutdown.SIGNALS:
             signal.signal(number, self.handle_exit)
         self._watchdog.listen()
@@ -74,7 +77,10 @@ def _unfinished(app: FastAPI) -> Iterator[str]:
 
 
 def serve(settings: Settings, *, limits: StopLimits | None = None, **parts: Unpack[Parts]) -> None:
-    """Serve until SIGTERM or Ctrl-C; ServeError if the data folder or the port is not available."""
+    """Serve until SIGTERM or Ctrl-C; ServeError if the data folder or the port is not available.
+
+    ``limits``: on the time to stop; ``parts`` replace parts of the service, for tests.
+    """
     limits = limits or StopLimits()
     set_up_log(settings.log)
     sys.setswitchinterval(SWITCH_SECONDS)
@@ -113,7 +119,7 @@ def serve(settings: Settings, *, limits: StopLimits | None = None, **parts: Unpa
 
 
 def _require_admin_key(settings: Settings, database: Database, listening: socket.socket) -> None:
-    """ServeError if no valid key can manage keys, because nobody could use the server."""
+    """Raise ServeError if no valid API key can manage keys, because nobody could then create any key."""
     with database.read() as session:
         known = any(row.revoked_at is None and "admin" in row.scopes for row in keys.every(session))
     if not known:

@@ -37,7 +37,7 @@ FLAGS = ("require_keys", "allow_remote")
 
 
 class SettingsError(ValueError):
-    """A setting with which the service cannot run."""
+    """Raised for a setting with which the service cannot run; the message says what to change."""
 
 
 @dataclass(frozen=True)
@@ -102,7 +102,7 @@ class Settings:
 
     @classmethod
     def from_env(cls, env: Mapping[str, str] | None = None) -> Settings:
-        """Settings from ``env`` (default: the environment of the process); an empty value counts as unset.
+        """Return the settings in ``env`` (default: the environment of the process); an empty value counts as unset.
 
         Raises SettingsError for an invalid value, and for a ``WINGFIT_`` variable that nothing reads, because a
         misspelt setting would be ignored silently.
@@ -120,7 +120,7 @@ class Settings:
 
     @property
     def keys(self) -> bool:
-        """Whether calls need an API key: by default only where other machines can reach the server."""
+        """Whether calls require an API key: by default only where other machines can reach the server."""
         return self.require_keys or not (self.allow_remote or is_loopback(self.host))
 
     @property
@@ -131,7 +131,7 @@ class Settings:
 
 
 def is_loopback(host: str) -> bool:
-    """Whether ``host`` names this machine only."""
+    """Return whether ``host`` is an address of this machine that other machines cannot reach."""
     address = _address(host)
     return host == "localhost" if address is None else address.is_loopback
 
@@ -141,7 +141,7 @@ def _variable(field: str) -> str:
 
 
 def _parsed(field: str, text: str) -> Any:
-    """The value of the setting ``field`` from its ``text``; SettingsError if the text is not a valid value."""
+    """Return the value of the setting ``field`` from its ``text``; SettingsError if the text is not a valid value."""
     if field in RANGES:
         return _integer(field, text)
     if field in FLAGS:
@@ -152,7 +152,7 @@ def _parsed(field: str, text: str) -> Any:
 
 
 def _hosts(text: str) -> tuple[str, ...]:
-    """The host names in comma-separated ``text``; SettingsError for one that no request can match."""
+    """Return the host names in comma-separated ``text``; SettingsError for one that no request can match."""
     names = tuple(name.strip().lower() for name in text.split(",") if name.strip())
     for name in names:
         if not (HOST_NAME.fullmatch(name) or _address(name)):

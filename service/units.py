@@ -1,4 +1,4 @@
-"""Conversion from SI to the units of the API; numbers that JSON does not have become null."""
+"""Converts SI units to the units of the API; infinity and NaN, which JSON does not have, become None (null)."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ ZERO_CELSIUS = 273.15
 
 
 def mm(value: float | None) -> float | None:
-    """Metres to millimetres."""
+    """Convert metres to millimetres; None for None, infinity or NaN."""
     return None if value is None else finite(value * MM)
 
 
 def mn(value: float | None) -> float | None:
-    """Newtons to millinewtons."""
+    """Convert newtons to millinewtons; None for None, infinity or NaN."""
     return None if value is None else finite(value * MN)
 
 
 def tidy_mm(stated: float) -> float:
-    """A distance (m) that a user entered in mm, converted back to mm without rounding errors: 0.07, not 0.0700...01."""
+    """Convert a distance that a user entered in mm back from m to mm, without rounding errors: 0.07, not 0.070...01."""
     return round(stated * MM, 9)
 
 
 def finite(value: float) -> float | None:
-    """``value``, or None if it is infinite or not a number."""
+    """Return ``value``, or None if it is infinite or NaN."""
     return float(value) if math.isfinite(value) else None

@@ -1,7 +1,7 @@
-"""The caller of a request: API keys, their scopes, and the rows that a database session of the caller may see.
+"""Who sent a request (API keys and what they permit), and the database rows that the caller may see.
 
-Only a plain hash of each secret is stored: a secret has 256 random bits, so it cannot be guessed from its hash. The
-valid keys are held in memory, because one process owns the database and changes them.
+Only a plain hash of each key's secret is stored: a secret has 256 random bits, so it cannot be guessed from its hash.
+The valid keys are held in memory, because one process owns the database and changes them.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ SECRET_BYTES = 32
 
 @dataclass(frozen=True)
 class Caller:
-    """Who sent a request.
+    """The API key with which a request was sent.
 
     Attributes:
         key: id of the key.
-        owner: owner of what is made with the key; several keys may have the same owner.
+        owner: owner of the datasets and jobs created with the key; several keys may have the same owner.
         scopes: read, write, or admin, which includes both, sees the data of all owners, and manages keys.
     """
 
@@ -38,7 +38,7 @@ class Caller:
     scopes: frozenset[str]
 
     def may(self, scope: Scope) -> bool:
-        """Whether the key permits ``scope``."""
+        """Return whether the key permits requests of this ``scope``."""
         return scope in self.scopes or "admin" in self.scopes
 
 
@@ -49,19 +49,19 @@ CALLER: ContextVar[Caller | None] = ContextVar("caller", default=None)
 
 
 def visible_owner() -> str | None:
-    """The owner whose rows the caller of this request may see; None if the caller may see the rows of all owners."""
+    """Return the owner whose rows the caller of this request may see; None: the rows of all owners."""
     caller = CALLER.get()
     return None if caller is None or caller.may("admin") else caller.owner
 
 
 def owner_of_new() -> str | None:
-    """The owner of the resources that this request creates; None where no key is required."""
+    """Return the owner of what this request creates; None where no key is required."""
     caller = CALLER.get()
     return caller.owner if caller else None
 
 
 class OwnSession(Session):
-    """A session that adds the owner's filter to every query: only rows that the caller may see are returned."""
+    """A database session whose queries return only the rows that the caller of the request may see."""
 
 
 @event.listens_for(OwnSession, "do_orm_execute")
@@ -73,7 +73,7 @@ def _only_own(state: ORMExecuteState) -> None:
 
 
 class KeyRing:
-    """The valid keys, by the hash of their secret."""
+    """The valid API keys, held in memory; finds the caller to whom a secret belongs by the secret's hash."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -81,26 +81,26 @@ class KeyRing:
         self._ids: frozenset[str] = frozenset()
 
     def load(self, session: Session) -> None:
-        """Read the keys that are valid now; ``session`` must not have read anything yet."""
+        """Replace the keys by those that are valid now; ``session`` must not have read anything yet."""
         with self._lock:  # around the query, so that an older result cannot overwrite a newer one
             rows = session.scalars(select(KeyRow).where(KeyRow.revoked_at.is_(None)))
             self._callers = {row.sha256: Caller(row.id, row.owner, frozenset(row.scopes)) for row in rows}
             self._ids = frozenset(caller.key for caller in self._callers.values())
 
     def caller(self, secret: str) -> Caller | None:
-        """The caller whose key has this secret; None if no key has it or the key is revoked."""
+        """Return the caller whose key has this secret; None if no valid key has it."""
         return self._callers.get(digest(secret))
 
     def admits(self, caller: Caller | None) -> bool:
-        """Whether the key of ``caller`` is still valid; True for None, where no key is required."""
+        """Return whether the key of ``caller`` is still valid; True for None, where no key is required."""
         return caller is None or caller.key in self._ids
 
 
 def new_secret() -> str:
-    """A random secret, which nobody can guess."""
+    """Return a new random secret that nobody can guess."""
     return SECRET_PREFIX + secrets.token_urlsafe(SECRET_BYTES)
 
 
 def digest(secret: str) -> str:
-    """The hash of a secret that is stored (SHA-256, hexadecimal)."""
+    """Return the hash of a secret as it is stored (SHA-256, hexadecimal)."""
     return hashlib.sha256(secret.encode("utf-8", "surrogatepass")).hexdigest()

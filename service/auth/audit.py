@@ -20,9 +20,9 @@ UNKNOWN = "-"
 
 
 def record(scope: Scope, status: int, request_id: str) -> None:
-    """Log an answered or refused request if its method can change something.
+    """Log a request to the API if its method can change something; ``status``: HTTP status of the answer.
 
-    Key and owner are ``-`` where no key is required, and where the request had no valid one.
+    ``scope``: ASGI scope of the request. Key and owner are logged as ``-`` if the request had no valid key.
     """
     if scope["method"] not in CHANGING or not scope["path"].startswith(API):
         return

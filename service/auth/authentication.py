@@ -20,13 +20,13 @@ READING = frozenset({"GET", "HEAD", "OPTIONS"})
 
 
 class Authentication:
-    """Middleware that refuses API calls without a valid key of the needed scope; the web page itself needs none."""
+    """Middleware that refuses API calls without a valid key of the required scope; the web page requires no key."""
 
     def __init__(self, app: ASGIApp) -> None:
         self.app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Handle one connection."""
+        """Check one request, and pass it on with its caller set, or refuse it."""
         if scope["type"] != "http":
             await self.app(scope, receive, send)
             return
@@ -75,7 +75,7 @@ def _refusal(scope: Scope, caller: Caller | None) -> ProblemError | None:
 
 
 def needed_scope(method: str, path: str) -> KeyScope:
-    """The scope (read, write or admin) that a key needs for a request with this method and path."""
+    """Return the scope (read, write or admin) that a key must have for a request with this method and path."""
     if any(path == root or path.startswith(f"{root}/") for root in ADMINISTRATION):
         return "admin"
     return "read" if method in READING else "write"

@@ -1,4 +1,4 @@
-"""The bodies of requests about keys and the session of a browser."""
+"""The bodies of requests that create API keys or store a key in a browser's cookie."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Make, list and revoke API keys in a database session."""
+"""Creates, lists and revokes API keys in the caller's database session."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from wingfit.service.storage.tables import KeyRow
 
 
 def make(session: Session, name: str, owner: str, scopes: Sequence[Scope]) -> tuple[KeyRow, str]:
-    """Store a new key; return its row and its secret, which is not stored."""
+    """Store a new key and return its row and its secret; the secret itself is not stored."""
     secret = new_secret()
     row = KeyRow(id=store.new_id("key"), name=name, owner=owner, scopes=sorted(set(scopes)))
     row.sha256, row.created_at = digest(secret), store.now()
@@ -24,12 +24,12 @@ def make(session: Session, name: str, owner: str, scopes: Sequence[Scope]) -> tu
 
 
 def every(session: Session) -> list[KeyRow]:
-    """All keys, including revoked ones, newest first."""
+    """Return all keys, including revoked ones, newest first."""
     return list(session.scalars(select(KeyRow).order_by(KeyRow.number.desc())))
 
 
 def revoke(session: Session, key_id: str) -> KeyRow:
-    """Revoke a key; a 404 if there is none, a 409 for the last key that can manage keys."""
+    """Revoke a key and return its row; raise a 404 if there is none, a 409 for the last key that can manage keys."""
     row = store.one(session, KeyRow, key_id)
     others = [key for key in every(session) if key.revoked_at is None and key.id != key_id]
     if "admin" in row.scopes and row.revoked_at is None and not any("admin" in key.scopes for key in others):

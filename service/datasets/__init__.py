@@ -1,1 +1,1 @@
-"""Parsed datasets."""
+"""Uploaded datasets, read and kept in memory."""

@@ -1,7 +1,7 @@
-"""Cache of parsed datasets by id: parsing takes longer than most requests may.
+"""Keeps datasets in memory by id, because parsing one takes longer than most requests may.
 
-A damaged NetCDF file can hang the process that opens it. Therefore each is opened once, in a separate process, and its
-parsed form is stored beside the archive; later only this form is read.
+A damaged NetCDF file can hang the process that opens it. Therefore each is opened once, in a separate process, which
+converts it to an internal format (`records/files/parsed.py`); that is stored too, and later only that is read.
 """
 
 from __future__ import annotations
@@ -28,14 +28,17 @@ KEPT, KEPT_BYTES = 8, 2**28
 
 
 class Opened(NamedTuple):
-    """A dataset, and its parsed form (bytes) if its archive is a NetCDF file, which is opened only once."""
+    """An uploaded dataset that was read.
+
+    ``parsed``: for a NetCDF file the dataset in the internal format of `records/files/parsed.py`, for a zip None.
+    """
 
     dataset: Dataset
     parsed: bytes | None
 
 
 class Datasets:
-    """Cache of the datasets used last, limited by number and bytes. A dataset never changes."""
+    """Cache of the datasets used last, limited in number and bytes. The contents of a dataset never change."""
 
     def __init__(self, database: Database, engine: Engine) -> None:
         self._database, self._engine = database, engine
@@ -45,7 +48,7 @@ class Datasets:
         self._damaged: dict[str, DatasetError] = {}
 
     def get(self, dataset_id: str) -> Dataset:
-        """The parsed dataset with this id, from the cache or the database; a 404 if there is none."""
+        """Return the dataset with this id, from the cache or the database; raise a 404 if there is none."""
         with self._database.read() as session:
             row = store.one(session, DatasetRow, dataset_id)
         if (known := self._known(dataset_id)) is not None:
@@ -60,7 +63,10 @@ class Datasets:
         return loaded
 
     def open(self, archive: bytes, filename: str, limits: Limits | None = None) -> Opened:
-        """Read an archive; ValueError says what is wrong with it. ``limits`` default to those of an upload."""
+        """Read ``archive``, the bytes of a zip or NetCDF file; ValueError says what is wrong with it.
+
+        ``limits``: on time and memory of the process that reads NetCDF; None: those of an upload.
+        """
         if not is_netcdf(archive):
             return Opened(self._engine.load(archive, filename), None)
         label = label_of(filename)
@@ -74,7 +80,7 @@ class Datasets:
         return self._engine.load(archive, filename) if parsed is None else load_parsed(parsed, filename)
 
     def _is_old(self, dataset_id: str) -> bool:
-        """Whether the dataset is a NetCDF file that an earlier version stored without its parsed form."""
+        """Return whether an earlier version stored this NetCDF dataset without its form in the internal format."""
         with self._database.look() as connection:
             return is_netcdf(store.archive_piece(connection, dataset_id, 0, 8)) and not store.has_parsed(
                 connection, dataset_id
@@ -95,7 +101,7 @@ class Datasets:
         return opened.dataset
 
     def _keep_parsed(self, dataset_id: str, parsed: bytes) -> None:
-        """Store the parsed form in the database; a full disk is ignored, because the form only saves time."""
+        """Store a dataset's internal format (bytes); a full disk is ignored, because the form only saves time."""
         try:
             with self._database.write() as session:
                 store.keep_parsed(session, dataset_id, parsed)
@@ -111,7 +117,7 @@ class Datasets:
             return self._kept.get(dataset_id)
 
     def keep(self, dataset_id: str, loaded: Dataset) -> None:
-        """Put a parsed dataset into the cache."""
+        """Put the dataset ``loaded`` into the cache."""
         with self._lock:
             self._kept[dataset_id] = loaded
             while len(self._kept) > KEPT or (len(self._kept) > 1 and self._bytes > KEPT_BYTES):

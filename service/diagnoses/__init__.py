@@ -1,1 +1,1 @@
-"""Diagnoses: specification, computation, schemas, exports."""
+"""Diagnoses: requests, specification, computation, JSON answers, exports."""

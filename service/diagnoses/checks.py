@@ -1,4 +1,4 @@
-"""Checks of requests for diagnoses."""
+"""Checks requests for diagnoses, and converts them to specifications."""
 
 from __future__ import annotations
 
@@ -25,9 +25,10 @@ def checked(
     of_run: CalibrationSpec | None = None,
     genome: Mapping[str, float] | None = None,
 ) -> DiagnosisSpec:
-    """The specification that ``body`` gives, with the settings and the ``genome`` of a run if there is one; or a 422.
+    """Return the specification that the request ``body`` describes; raise a 422 if it does not fit the dataset.
 
-    Genes of ``genome`` that the requested model does not have are ignored.
+    For a diagnosis of a run, ``of_run`` is the run's specification, which applies where ``body`` has no setting, and
+    ``genome`` (gene name to value) its best genome, from which to start; genes not in the requested model are ignored.
     """
     spec_views.refuse_foreign(body, dataset)
     base = of_run or CalibrationSpec()

@@ -1,4 +1,4 @@
-"""The functions of `wingfit.diagnosis` and `wingfit.report` that the service calls, in a class that tests replace."""
+"""The functions of `wingfit.diagnosis` and `wingfit.report` that the service calls; tests can replace the class."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from wingfit.records import Dataset
 
 
 class Diagnoser:
-    """Diagnoses the flexible wing on tracks, and the blade-element wing of a vehicle on forces."""
+    """Diagnoses datasets of marker tracks (flexible wing) and of forces (blade-element model of a vehicle)."""
 
     def check(self, spec: DiagnosisSpec, dataset: Dataset) -> None:
-        """ValueError when ``spec`` does not fit ``dataset``."""
+        """Raise ValueError if ``spec`` does not fit ``dataset``."""
         check(dataset, spec)
 
     def diagnose(self, spec: DiagnosisSpec, dataset: Dataset, evaluator: Evaluator) -> Iterator[Progress]:
-        """Diagnose; yields the progress, and the last item has the finding."""
+        """Compute the diagnosis and yield its progress; the last item has the finding (the result)."""
         return diagnose(dataset, spec, evaluator)
 
     def stored(self, finding: Finding) -> dict[str, Any]:
-        """``finding`` as JSON."""
+        """Return ``finding`` as JSON."""
         return report.finding_json(finding)
 
     def html(self, stored: dict[str, Any]) -> str:
-        """The report of a stored finding: one HTML file without external resources."""
+        """Return the report on a finding (``stored``: its JSON) as one HTML file without external resources."""
         return report.html(report.finding_from_json(stored))

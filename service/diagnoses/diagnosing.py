@@ -1,4 +1,4 @@
-"""Diagnoses as jobs; an interrupted one is computed again from the beginning and gives the same finding."""
+"""Diagnoses as jobs of the runner; an interrupted one is computed again from the beginning, with equal results."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ STORE_SECONDS = 0.5
 
 
 class Diagnosing(JobKind):
-    """The kind of job that is a diagnosis: how the runner computes, stores and describes one."""
+    """The diagnosis as a kind of job: how the runner computes, stores and describes a diagnosis."""
 
     what, path, prefix, step_event = "diagnosis", "/v1/diagnoses", "dx", "step"
     table, step_table, step_answer = DiagnosisRow, StepRow, StepEvent
@@ -34,16 +34,19 @@ class Diagnosing(JobKind):
         self._database, self._diagnoser, self._datasets = database, diagnoser, datasets
 
     def view(self, row: DiagnosisRow) -> Diagnosis:
-        """The answer that describes a diagnosis."""
+        """Return the JSON answer that describes the diagnosis stored in ``row``."""
         return views.diagnosis(row)
 
     def begin(self, _session: Session, row: DiagnosisRow) -> Points:
-        """Start from the beginning; the sequence numbers of steps continue, so that event streams miss none."""
+        """Reset the progress in ``row``; return no steps, because a diagnosis always starts from the beginning.
+
+        The sequence numbers of steps continue, so that event streams miss none.
+        """
         row.stage, row.progress, row.evaluations, row.elapsed_seconds = None, 0.0, 0, 0.0
         return []
 
     def steps(self, row: DiagnosisRow, evaluator: Evaluator) -> Iterator[Step]:
-        """Diagnose; yields a step at each new stage, and within a stage at most every STORE_SECONDS."""
+        """Yield a step at each new stage of the diagnosis, and within a stage at most every STORE_SECONDS."""
         spec, dataset = views.spec(row), self._datasets.get(row.dataset_id)
         stage, stored_at = "", 0.0
         for progress in self._diagnoser.diagnose(spec, dataset, evaluator):

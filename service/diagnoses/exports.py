@@ -1,4 +1,4 @@
-"""Exports of a diagnosis: its ranking as CSV, all of it as JSON, its maps and misfits as NetCDF."""
+"""Exports of a diagnosis: the ranking of its hypotheses as CSV, all of it as JSON, maps and misfits as NetCDF."""
 
 from __future__ import annotations
 
@@ -30,13 +30,16 @@ PHASE = "phase of the beat"
 
 
 def document(exported: Exported[DiagnosisRow], found: Json) -> DiagnosisExport:
-    """The JSON export: the diagnosis, its dataset, and the finding ``found``."""
+    """Return the JSON export: the diagnosis, its dataset, and ``found``, the finding as JSON."""
     heading = exported.heading("diagnosis-export")
     return DiagnosisExport(**heading, diagnosis=diagnosis_views.diagnosis(exported.row), finding=found)
 
 
 def table(found: Json) -> str:
-    """The ranking as CSV, one hypothesis per row, the most probable first; the nominal model has no effects."""
+    """Return ``found``, a finding as JSON, as CSV: one hypothesis per line, the most probable first.
+
+    The hypothesis without effects is the nominal model.
+    """
     head = ["rank", "effects", *RANKING, f"misfit_{found['unit'].lower()}", "refitted"]
     rows = [
         [rank, " + ".join(one["effects"]), *(one[name] for name in RANKING), one["misfit"], one["refitted"]]
@@ -46,7 +49,10 @@ def table(found: Json) -> str:
 
 
 def file(exported: Exported[DiagnosisRow], found: Json) -> bytes:
-    """Maps of the misfit, missing loads, and the misfit to each recording as NetCDF, a group each."""
+    """Return ``found``, a finding as JSON, as the bytes of a NetCDF file.
+
+    One group each has the misfit by recording, by marker, and by span and phase of the beat, and each missing load.
+    """
     row = exported.row
 
     def write(root: Any) -> None:
@@ -69,7 +75,10 @@ def file(exported: Exported[DiagnosisRow], found: Json) -> bytes:
 
 
 def _recordings(root: Any, found: Json) -> None:
-    """Write the misfit to each recording, without and with the named effects, with 90 % intervals, into ``root``."""
+    """Write a group with the misfit to each recording into ``root``; ``found``: the finding as JSON.
+
+    Misfits are those without and with the named effects, with 90 % intervals.
+    """
     items, unit, along = found["recordings"], found["unit"], ("recording",)
     if not items:
         return
@@ -88,7 +97,7 @@ def _recordings(root: Any, found: Json) -> None:
 
 
 def _markers(root: Any, found: Json) -> None:
-    """Write the misfit of each marker or force axis, over all recordings, into ``root``."""
+    """Write a group with the misfit of each marker or force axis into ``root``; ``found``: the finding as JSON."""
     items, unit, along = found["markers"], found["unit"], ("marker",)
     if not items:
         return
@@ -113,7 +122,7 @@ def _markers(root: Any, found: Json) -> None:
 
 
 def _phase_map(root: Any, found: Json) -> None:
-    """Write the misfit as a function of span and phase of the beat into ``root``."""
+    """Write a group with the misfit by span and phase of the beat into ``root``; ``found``: the finding as JSON."""
     given, unit = found["phase_map"], found["unit"]
     if given is None:
         return
@@ -127,7 +136,7 @@ def _phase_map(root: Any, found: Json) -> None:
 
 
 def _load(group: Any, load: Json) -> None:
-    """Write the load missing from the nominal model in one recording into ``group``."""
+    """Write ``load``, what the nominal model misses in one recording, into ``group``: a force, or a rod's rotation."""
     units, along = str(CF_UNITS.get(load["unit"], load["unit"])), ("station", "phase")
     meaning = f"rotation missing at rod {load['rod']}" if load["rod"] else "force missing from the nominal model"
     nc.describe(group, {"recording": load["recording"], "rod": load["rod"]})

@@ -1,4 +1,4 @@
-"""A diagnosis in this process, without a server: the same checks and computation, with a pool of processes."""
+"""Computes a diagnosis in this process and worker processes, without a server, with the same checks and results."""
 
 from __future__ import annotations
 
@@ -26,9 +26,10 @@ OnProgress = Callable[[float, float | None, str], None]
 
 
 def diagnose(path: Path, request: dict[str, Any], workers: int | None, on_progress: OnProgress) -> Finding:
-    """Diagnose the dataset at ``path``; ``request`` is a body of ``POST /v1/diagnoses``.
+    """Diagnose the dataset at ``path`` and return the finding; ``request``: a body of ``POST /v1/diagnoses``.
 
-    ``on_progress`` gets the fraction done, the remaining seconds, and the stage. WingfitError says what is wrong.
+    ``workers``: number of worker processes (None: the evaluator decides). ``on_progress`` is called with the fraction
+    done, the remaining time (s, None if unknown) and the stage. WingfitError says what is wrong.
     """
     dataset, diagnoser = _loaded(path), Diagnoser()
     try:

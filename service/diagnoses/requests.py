@@ -15,7 +15,7 @@ Values = Annotated[dict[str, Number], Field(max_length=1000)]
 
 
 class DiagnosisIn(JobSettings, BaseModel):
-    """A diagnosis of a dataset, or of a run, whose settings apply where the request has none.
+    """Body of a request for a diagnosis of a dataset, or of a run, whose settings apply where the request has none.
 
     See `wingfit.diagnosis.DiagnosisSpec`.
     """

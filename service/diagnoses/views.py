@@ -15,17 +15,17 @@ _SPEC = TypeAdapter(DiagnosisSpec)
 
 
 def diagnosis(row: DiagnosisRow) -> answers.Diagnosis:
-    """The JSON answer that describes a diagnosis, from its row."""
+    """Return the JSON answer that describes the diagnosis stored in ``row``."""
     return job_of(answers.Diagnosis, columns(row), diagnosis_settings(spec(row)))
 
 
 def spec(row: DiagnosisRow) -> DiagnosisSpec:
-    """The specification of a diagnosis from its row."""
+    """Return the specification of the diagnosis stored in ``row``."""
     return _SPEC.validate_python(row.spec)
 
 
 def diagnosis_settings(spec: DiagnosisSpec) -> answers.DiagnosisSpec:
-    """The settings of a diagnosis as JSON answers contain them (units of the API)."""
+    """Return the settings of a diagnosis as the JSON answers contain them, in the API's units."""
     return answer(
         answers.DiagnosisSpec,
         spec.calibration,

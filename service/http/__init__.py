@@ -1,1 +1,1 @@
-"""HTTP below the routes: limits, middleware, errors as problem details, shared response helpers, event streams."""
+"""HTTP code below the routes: limits, middleware, errors as problem documents, response helpers, event streams."""

@@ -1,4 +1,4 @@
-"""Limits concurrent requests that take much time or memory. Waiting requests hold no worker thread."""
+"""Limits how many requests that take much time or memory run at a time. Waiting requests hold no worker thread."""
 
 from __future__ import annotations
 
@@ -21,7 +21,10 @@ MAX_WAITING = 64
 
 
 class ConcurrencyLimit:
-    """At most ``limit`` requests of a kind run and ``max_waiting`` wait; further ones are answered with a 503."""
+    """Limit for one kind of request, which messages call ``what``.
+
+    At most ``limit`` of them run and ``max_waiting`` wait; further ones are answered with a 503.
+    """
 
     def __init__(self, what: str, limit: int, max_waiting: int = MAX_WAITING) -> None:
         self._what, self._free = what, asyncio.Semaphore(limit)
@@ -29,7 +32,7 @@ class ConcurrencyLimit:
 
     @asynccontextmanager
     async def slot(self) -> AsyncIterator[None]:
-        """Wait for one of the ``limit`` slots, and hold it within the block; a 503 where too many wait."""
+        """Wait until fewer than ``limit`` requests run, and count as running within the block; 503 if too many wait."""
         if self._free.locked() and self._waiting >= self._max_waiting:
             detail = f"{self._waiting} {self._what} are waiting, the maximum; try again in some seconds"
             raise ProblemError(503, "busy", detail)

@@ -1,4 +1,4 @@
-"""Writes CSV (RFC 4180) with numbers in full precision; a spreadsheet cannot run any of its text as a formula."""
+"""Writes CSV (RFC 4180): numbers in full precision, and text so that a spreadsheet runs none of it as a formula."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ FORMULA = tuple("=+-@\t\r\n\0＝＋－＠")
 
 
 def lines(rows: Iterable[Sequence[Cell]]) -> str:
-    """CSV text of rows of cells. None gives an empty cell; a text that looks like a formula gets an apostrophe."""
+    """Return rows of cells as CSV text: None as an empty cell, and text that looks like a formula after a "'"."""
     buffer = io.StringIO()
     csv.writer(buffer).writerows([_plain(cell) for cell in row] for row in rows)
     return buffer.getvalue()

@@ -1,4 +1,4 @@
-"""Answers errors that no handler answers, and requests that are given up because the server stops."""
+"""Answers requests whose error nothing else answers, and requests that are abandoned because the server stops."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ LOG = logging.getLogger("wingfit.http")
 
 
 class ErrorBoundary:
-    """Middleware that answers unexpected errors without their details, and with the headers of every other answer.
+    """Middleware that answers unexpected errors: without their details, and with the usual security headers.
 
-    Starlette's own handler is outside all other middleware: its answer omits their headers and ends the connection.
+    Starlette's own handler is outside all other middleware: its answer omits these headers and ends the connection.
     """
 
     def __init__(self, app: ASGIApp) -> None:
         self.app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Handle one connection."""
+        """Handle one request; a connection of another type is passed on."""
         if scope["type"] != "http":
             await self.app(scope, receive, send)
             return

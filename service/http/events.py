@@ -1,4 +1,7 @@
-"""Server-sent events of a job, read from the database, so that a first connection and a reconnection are alike."""
+"""Server-sent events about a job.
+
+They are read from the database, so that a client that reconnects gets the same events as one that stayed connected.
+"""
 
 from __future__ import annotations
 
@@ -38,9 +41,13 @@ JobState = tuple[Run | Diagnosis, Sequence[GenerationEvent | StepEvent]]
 
 
 class Watched(NamedTuple):
-    """A job to watch: its ``id``, the name of the event for each of its steps, and the function that reads them.
+    """A job whose events a client wants.
 
-    ``read(session, after, limit)`` returns the job and at most ``limit`` of its steps after sequence number ``after``.
+    Attributes:
+        id: of the job.
+        step: name of the event that reports a step of the job.
+        read: ``read(session, after, limit)`` returns the job and up to ``limit`` of its steps with sequence numbers
+            above ``after``, as JSON answers.
     """
 
     id: str
@@ -49,15 +56,15 @@ class Watched(NamedTuple):
 
 
 class News(NamedTuple):
-    """The result of one database read of a job, as server-sent events ready to send.
+    """The result of one database read about a job, as server-sent events ready to be sent.
 
     Attributes:
         steps: the events of new steps.
-        after: sequence number of the last of them.
-        complete: whether there are no further steps.
-        status: the state and wish of the job; a ``state`` event is sent whenever it changes.
+        after: sequence number of the last of these steps, or the one after which to read if there are none.
+        complete: whether there are no further steps in the database.
+        status: state, pending action and error of the job; a ``state`` event is sent whenever they change.
         state: the ``state`` event.
-        final: whether the state is the last one.
+        final: whether the state is final, so that the stream ends.
     """
 
     steps: bytes
@@ -69,14 +76,17 @@ class News(NamedTuple):
 
 
 class Events:
-    """The event streams of one service. All who wait for the same event share one database read."""
+    """The event streams of the service. Streams that wait for the same events share one database read."""
 
     def __init__(self, database: Database, changes: Changes, keys: KeyRing) -> None:
         self._database, self._changes, self._keys = database, changes, keys
         self._reads: dict[tuple[str, int, int], asyncio.Future[News | None]] = {}
 
     def answer(self, watched: Watched, last_event_id: str | None) -> StreamingResponse:
-        """The events after ``last_event_id``; a 422 for an id that no stream has sent, a 503 for too many streams."""
+        """Return the response that streams the events after ``last_event_id`` (None: all).
+
+        Raises a 422 for an id that no stream can have sent, a 503 if too many streams are open.
+        """
         text = (last_event_id or "0").strip()
         if not (text.isascii() and text.isdecimal() and len(text) <= 15):
             item = error_item("header.Last-Event-ID", last_event_id, "must be an id that this stream has sent")
@@ -88,7 +98,10 @@ class Events:
         return StreamingResponse(stream, headers=headers, media_type=MEDIA_TYPE)
 
     async def _stream(self, watched: Watched, after: int, caller: Caller | None = None) -> AsyncIterator[bytes]:
-        """Events after sequence ``after``, until the final state is sent, the key is revoked or the service stops."""
+        """Yield the events after sequence number ``after``, and a comment every HEARTBEAT_SECONDS without an event.
+
+        Ends once the final state is sent, the job is deleted, the caller's API key is revoked or the service stops.
+        """
         sent: tuple[object, ...] | None = None
         with self._changes.watch(watched.id) as changed:
             while True:
@@ -111,10 +124,9 @@ class Events:
                     yield b": alive\n\n"
 
     async def _read(self, watched: Watched, after: int) -> News | None:
-        """The news after sequence ``after``; None if the job was deleted.
+        """Return the events after sequence number ``after``; None if the job was deleted or the service stops.
 
-        Each watcher's access was checked before its stream began, so all may share the result. Every read of the same
-        database version finds the same.
+        Streams that need the same events of the same database version share one read: each caller's access was checked.
         """
         key = watched.id, after, self._database.version
         read = self._reads.get(key)
@@ -126,7 +138,7 @@ class Events:
 
 
 def watched(kind: JobKind, job_id: str) -> Watched:
-    """The job with this id to watch; its events report the generations of a run or the steps of a diagnosis."""
+    """Describe the job with this id to :class:`Events`: its steps are generations of a run or steps of a diagnosis."""
 
     def read(session: Session, after: int, limit: int) -> JobState:
         past = store.steps(session, kind.step_table, job_id, after, limit)
@@ -137,7 +149,10 @@ def watched(kind: JobKind, job_id: str) -> Watched:
 
 
 def described(step: str, example: str) -> dict[str, Any]:
-    """OpenAPI of a stream: the schema of one event, and an example."""
+    """Return the OpenAPI description of an event stream: the schema of one event, and ``example``.
+
+    ``step``: name of the event that reports a step.
+    """
     data = {"type": "string", "contentMediaType": "application/json"}
     properties = {"id": {"type": "string"}, "event": {"enum": [step, "state"]}, "data": data}
     schema = {"type": "object", "properties": properties, "required": list(properties)}

@@ -1,4 +1,4 @@
-"""uvicorn's HTTP protocol with limits that it lacks: the size of headers and trailers, and the slowest client."""
+"""uvicorn's HTTP protocol with two limits added: the size of headers and trailers, and how slow a client may be."""
 
 from __future__ import annotations
 
@@ -27,7 +27,10 @@ SLOW_SECONDS = 15.0
 
 
 class Protocol(HttpToolsProtocol):
-    """One connection; refuses headers or trailers of more than ``HEAD_LIMIT`` bytes."""
+    """One connection. Refuses headers or trailers of more than ``HEAD_LIMIT`` bytes, and closes slow connections.
+
+    A connection is slow if the client receives less than SLOWEST_BYTES_PER_SECOND while the server waits to send.
+    """
 
     _unended = 0
     # While the server waits for the client: since when, and how many bytes were not taken then; totals so far.
@@ -38,14 +41,14 @@ class Protocol(HttpToolsProtocol):
     _slow_timer: asyncio.TimerHandle | None = None
 
     def data_received(self, data: bytes) -> None:
-        """Parse the next bytes of the connection."""
+        """Parse the next bytes of the connection; refuse the request if its headers are too long."""
         self._unended += len(data)
         super().data_received(data)
         if self._unended > HEAD_LIMIT and not self.transport.is_closing():
             self._refuse(f"the request line and headers are longer than {HEAD_LIMIT >> 10} KiB; send less")
 
     def on_headers_complete(self) -> None:
-        """Begin the request."""
+        """Begin the request: its headers were received."""
         self._unended = 0
         super().on_headers_complete()
         if self.parser.should_upgrade():
@@ -53,21 +56,21 @@ class Protocol(HttpToolsProtocol):
             self.cycle.keep_alive = False
 
     def on_body(self, body: bytes) -> None:
-        """Take a part of the body; :mod:`wingfit.service.http.request_limits` limits its size."""
+        """Receive a part of the request's body; :mod:`wingfit.service.http.request_limits` limits its size."""
         self._unended = 0
         super().on_body(body)
 
     def on_message_complete(self) -> None:
-        """End the request; the next one may follow."""
+        """End the request: its body was received, and the next request may follow."""
         self._unended = 0
         super().on_message_complete()
 
     def send_400_response(self, msg: str) -> None:  # noqa: ARG002  uvicorn's signature
-        """Refuse what cannot be parsed."""
+        """Refuse bytes that cannot be parsed as a request."""
         self._refuse("the bytes received are no HTTP/1.1 request with a known method; check the address and the port")
 
     def pause_writing(self) -> None:
-        """Stop writing until the client has received what was sent, and start to check its rate."""
+        """Stop writing until the client has received what was sent; start to check how fast it receives."""
         super().pause_writing()
         if self._slow_timer is None:
             self._paused_at, self._waiting = self.loop.time(), self._untaken()
@@ -79,7 +82,7 @@ class Protocol(HttpToolsProtocol):
         self._count_taken()
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Stop the timer."""
+        """Stop the timer that checks how fast the client receives."""
         if self._slow_timer is not None:
             self._slow_timer.cancel()
         super().connection_lost(exc)
@@ -92,7 +95,7 @@ class Protocol(HttpToolsProtocol):
             self._slow_bytes += self._waiting - self._untaken()
 
     def _check_rate(self) -> None:
-        """Close the connection if the client took too little in the ``SLOW_SECONDS`` in which the server waited."""
+        """Close the connection if the client received too little while the server waited for SLOW_SECONDS."""
         self._count_taken()
         rate = self._slow_bytes / max(self._slow_seconds, 1e-3)
         self._slow_seconds, self._slow_bytes = 0.0, 0
@@ -108,13 +111,13 @@ class Protocol(HttpToolsProtocol):
         LOG.info(line, self.client, rate / 2**10, self.scope["path"], SLOWEST_BYTES_PER_SECOND / 2**10)
 
     def _discard_untaken(self) -> None:
-        """Make the operating system discard its send buffer when the connection closes, instead of after minutes."""
+        """Make the operating system discard unsent data when the connection closes, not minutes later."""
         connection = self.transport.get_extra_info("socket")
         with suppress(OSError, ValueError), socket.socket(fileno=os.dup(connection.fileno())) as same:
             same.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
 
     def _untaken(self) -> int:
-        """Bytes not yet received by the client, here and in the operating system's send buffer (up to megabytes)."""
+        """Return how many bytes the client has not received: here and in the operating system's send buffer."""
         waiting = self.transport.get_write_buffer_size()
         connection = self.transport.get_extra_info("socket")
         with suppress(OSError, ValueError):  # not supported, or the connection is gone

@@ -1,4 +1,4 @@
-"""The commonest reads, from the database straight to JSON: a run, a page of runs, a page of a history.
+"""The most frequent reads, from the database straight to JSON: a page of runs, a page of a run's history.
 
 They bypass SQLAlchemy's object mapper, which would load and parse the unneeded columns ``genome`` and ``result`` and
 take longer than all the rest (docs/decisions/0010-reads.md).
@@ -35,13 +35,16 @@ _HISTORY = f"SELECT {', '.join(ITEM)} FROM generation WHERE run_id = ? AND seque
 
 
 async def answer(read: Callable[[], bytes], *, short: bool) -> Response:
-    """A response with the JSON that ``read`` returns; a ``short`` read runs in the event loop, others in a thread."""
+    """Return a response with the JSON that ``read`` returns; ``short``: in the event loop, else in a thread."""
     body = read() if short else await run_in_threadpool(read)
     return Response(body, media_type=http.JSON)
 
 
 def runs(database: Database, limit: int, cursor: str | None, dataset_id: str | None, state: str | None) -> bytes:
-    """A page of runs as JSON, newest first."""
+    """Return a page of up to ``limit`` runs as JSON, newest first.
+
+    ``cursor``: where the page begins (None: at the newest); ``dataset_id``, ``state``: of the runs (None: any).
+    """
     equal = {"dataset_id": dataset_id, "state": state, "owner": visible_owner()}
     where = [f"{name} = :{name}" for name, value in equal.items() if value is not None]
     values: dict[str, Any] = equal | {"rows": limit + 1}
@@ -55,7 +58,10 @@ def runs(database: Database, limit: int, cursor: str | None, dataset_id: str | N
 
 
 def history(database: Database, run_id: str, after: int, limit: int) -> bytes:
-    """A page of a run's generations as JSON, ascending, or a 404."""
+    """Return a page of up to ``limit`` generations of a run as JSON, ascending, with sequence numbers above ``after``.
+
+    Raises a 404 if the caller may see no such run.
+    """
     with database.look() as connection:
         if connection.execute(_RUN_EXISTS, {"id": run_id, "owner": visible_owner()}).fetchone() is None:
             raise not_found("run", run_id)
@@ -74,7 +80,7 @@ def _page_of_runs(where: tuple[str, ...]) -> str:
 
 @lru_cache(RUNS_IN_CACHE)
 def _run_json(row: tuple[Any, ...]) -> bytes:
-    """A run as JSON; equal rows give equal JSON."""
+    """Return a run as JSON; ``row``: the columns named in RUN. Equal rows give equal JSON, so it is cached."""
     values = dict(zip(RUN, row, strict=True))
     values["spec"] = json.loads(values["spec"])
     return to_json(views.run_of(values))

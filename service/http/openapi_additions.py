@@ -1,4 +1,4 @@
-"""Additions to the OpenAPI document that FastAPI generates: problems, links, 304 responses."""
+"""Additions to the OpenAPI document that FastAPI generates: the schema of problems, examples, links, 304 responses."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ FORM = "multipart/form-data"
 
 
 def extend_openapi(app: FastAPI) -> None:
-    """Make ``app`` publish the additions."""
+    """Make the OpenAPI document that ``app`` publishes contain the additions of this module."""
     generate = app.openapi
 
     def openapi() -> Json:
@@ -50,7 +50,7 @@ def _problems(specification: Json) -> None:
 
 
 def _examples(specification: Json) -> None:
-    """Give answers their examples, and their settings the descriptions that the requests give them."""
+    """Add examples to the schemas of answers; describe settings in answers as in the requests that set them."""
     schemas = specification["components"]["schemas"]
     for shape, example in EXAMPLES.items():
         schemas[shape.__name__]["examples"] = [example]
@@ -61,7 +61,7 @@ def _examples(specification: Json) -> None:
 
 
 def _links(specification: Json) -> None:
-    """Links from every answer that creates something to the calls that take its id."""
+    """Add links from every answer that creates a resource to the calls that take the resource's id."""
     for path, status, name in CREATING:
         links = specification["paths"][path]["post"]["responses"][status].setdefault("links", {})
         for other, methods in specification["paths"].items():
@@ -74,7 +74,7 @@ def _links(specification: Json) -> None:
 
 
 def _fields(specification: Json, operation: Json, media_type: str = "application/json") -> Json:
-    """The fields of the request body of an operation."""
+    """Return the fields of the request body of an ``operation`` (name to JSON schema); empty if it has none."""
     content = operation.get("requestBody", {}).get("content", {}).get(media_type, {})
     name = content.get("schema", {}).get("$ref", "").rpartition("/")[2]
     fields: Json = specification["components"]["schemas"].get(name, {}).get("properties", {})
@@ -82,7 +82,7 @@ def _fields(specification: Json, operation: Json, media_type: str = "application
 
 
 def _remove_null(specification: Json) -> None:
-    """Remove null from parameters and form fields: unlike JSON they cannot be null, only omitted."""
+    """Remove null from the types of parameters and form fields: unlike JSON fields they can only be omitted."""
     for methods in specification["paths"].values():
         for operation in methods.values():
             given = [parameter["schema"] for parameter in operation.get("parameters", ())]

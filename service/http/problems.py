@@ -1,4 +1,4 @@
-"""Errors as problem details (RFC 9457): what is wrong, where, and what to do."""
+"""Errors as problem documents (RFC 9457): what is wrong, where in the request, and what to do."""
 
 from __future__ import annotations
 
@@ -30,7 +30,15 @@ ErrorItem = dict[str, Any]
 
 
 class ProblemError(Exception):
-    """An error to be sent as a problem; ``kind`` is the last part of its ``type`` URI, ``extra`` further members."""
+    """An error that is sent as a problem document.
+
+    Attributes:
+        status: HTTP status.
+        kind: last part of the document's ``type`` URI, e.g. "not-found".
+        detail: what is wrong and what to do, for the user.
+        errors: one item for each fault in the request, see :func:`error_item`.
+        extra: further members of the document.
+    """
 
     def __init__(self, status: int, kind: str, detail: str, *, errors: Sequence[ErrorItem] = (), **extra: Any) -> None:
         super().__init__(detail)
@@ -38,27 +46,27 @@ class ProblemError(Exception):
 
 
 def not_found(what: str, name: str, remedy: str = "") -> ProblemError:
-    """A 404: there is no ``what`` called ``name``."""
+    """Return a 404: there is no ``what`` (e.g. "run") called ``name``; ``remedy``: what to do instead."""
     return ProblemError(404, "not-found", f"there is no {what} {shown(name)!r}{'; ' if remedy else ''}{remedy}")
 
 
 def conflict(detail: str, **extra: Any) -> ProblemError:
-    """A 409: the present state of the resource does not allow the request."""
+    """Return a 409: the present state of the resource does not allow the request; ``extra``: further members."""
     return ProblemError(409, "conflict", detail, **extra)
 
 
 def invalid(detail: str, errors: Sequence[ErrorItem]) -> ProblemError:
-    """A 422: the request is not valid; ``errors`` say where."""
+    """Return a 422: the request is not valid; ``errors``: one item for each fault, see :func:`error_item`."""
     return ProblemError(422, "invalid", detail, errors=errors)
 
 
 def error_item(where: str, value: object, message: str) -> ErrorItem:
-    """An item of ``errors``: the place in the request, the value there, and what is wrong with it."""
+    """Describe one fault: ``where`` in the request (e.g. "body.genes.0"), ``value`` there, what is wrong with it."""
     return {"where": where, "value": shown(value), "message": message}
 
 
 def shown(value: object) -> object:
-    """``value`` in a form that an error message can quote: shortened, and valid JSON for any value."""
+    """Return ``value`` in a form that an error message can quote: long texts shortened, and always valid JSON."""
     if value is None or isinstance(value, bool) or (isinstance(value, float) and math.isfinite(value)):
         return value
     if isinstance(value, int) and abs(value) < 2**63:
@@ -68,7 +76,7 @@ def shown(value: object) -> object:
 
 
 def response(problem: ProblemError, headers: Mapping[str, str] | None = None) -> Response:
-    """The response that sends ``problem``."""
+    """Return the HTTP response that sends ``problem``, with further ``headers``."""
     body: dict[str, Any] = {
         "type": f"urn:wingfit:problem:{problem.kind}",
         "title": HTTPStatus(problem.status).phrase,
@@ -84,7 +92,7 @@ def response(problem: ProblemError, headers: Mapping[str, str] | None = None) ->
 
 
 def install(app: FastAPI) -> None:
-    """Make ``app`` answer every error with a problem."""
+    """Make ``app`` answer every error with a problem document."""
     app.add_exception_handler(ProblemError, _on_problem)
     app.add_exception_handler(HTTPException, _on_http)
     app.add_exception_handler(RequestValidationError, _on_validation)
@@ -128,7 +136,7 @@ def _without_room(request: Request, error: BaseException | None, detail: str) ->
 
 
 def internal(request: Request, error: Exception) -> Response:
-    """The response to an unexpected error: 507 for a full disk, else 500; the log has the details."""
+    """Return the response to an unexpected error, and log it: 507 for a full disk, else 500 without details."""
     if detail := disk_space.anywhere(error):
         return _without_room(request, error, detail)
     LOG.error("%s %a failed", request.method, request.scope["path"], exc_info=error)
@@ -136,7 +144,7 @@ def internal(request: Request, error: Exception) -> Response:
 
 
 def from_pydantic(item: Mapping[str, Any]) -> ErrorItem:
-    """An item of ``errors`` from an error of pydantic."""
+    """Convert ``item``, an error of pydantic, to an item of ``errors``, see :func:`error_item`."""
     where = ".".join(str(part) for part in item["loc"])
     value = None if item["type"] == "missing" else item.get("input")
     return error_item(where, value, item["msg"])

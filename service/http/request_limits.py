@@ -1,6 +1,6 @@
-"""Checks host, origin and size of every request; adds the security headers and sends large bodies in chunks.
+"""Middleware that checks host, origin and size of every request, adds security headers and sends bodies in chunks.
 
-All middleware of the service is plain ASGI, because a request-response middleware would buffer the event streams.
+All middleware of the service is plain ASGI: middleware that returns a whole response would buffer the event streams.
 """
 
 from __future__ import annotations
@@ -40,13 +40,13 @@ RAW_HEADERS = [(name.lower().encode(), value.encode()) for name, value in SECURI
 
 
 class RequestLimits:
-    """Middleware; ``allowed_hosts`` are the host names that a request may carry."""
+    """Middleware that refuses requests by host, origin or size; ``allowed_hosts``: host names of this server."""
 
     def __init__(self, app: ASGIApp, allowed_hosts: tuple[str, ...]) -> None:
         self.app, self.allowed_hosts = app, frozenset(allowed_hosts)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Handle one connection."""
+        """Check one request, and pass it on or refuse it."""
         if scope["type"] != "http":
             await self.app(scope, receive, send)
             return
@@ -110,7 +110,7 @@ def _too_large(limit: int) -> ProblemError:
 
 
 def _limited(receive: Receive, limit: int) -> Receive:
-    """Count what is received, because a chunked body has no Content-Length; a 413 beyond ``limit`` bytes."""
+    """Wrap ``receive`` to count the body's bytes (a chunked body has no Content-Length); a 413 above ``limit``."""
     received = 0
 
     async def counted() -> Message:
@@ -126,10 +126,10 @@ def _limited(receive: Receive, limit: int) -> Receive:
 
 
 def _response_sender(send: Send, *, headers_only: bool = False) -> Send:
-    """Add the security headers, and send a large body in chunks, each after the client has taken the one before.
+    """Wrap ``send`` to add the security headers, and to send a large body in chunks (``headers_only``: no body).
 
-    A body sent whole would wait in the buffer of its connection while the request counts as answered: the limits on
-    concurrent requests would then not limit the bodies in memory.
+    Each chunk waits until the client has received the one before. A body sent whole would wait in memory while its
+    request counts as answered, so that the limits on concurrent requests would not limit the bodies in memory.
     """
 
     async def sender(message: Message) -> None:

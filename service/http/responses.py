@@ -1,4 +1,4 @@
-"""Helpers that the routes share: documented errors, idempotent requests, ETags."""
+"""Helpers that the routes share: documentation of errors, repeatable requests (Idempotency-Key), ETags."""
 
 from __future__ import annotations
 
@@ -42,7 +42,10 @@ LOCATION = {"Location": {"description": "path of the new resource", "schema": {"
 
 
 def errors(*statuses: int) -> Responses:
-    """OpenAPI of the problems that a route may answer with; `default` documents those of every route."""
+    """Return the OpenAPI description of the problems that a route may answer with.
+
+    ``statuses``: HTTP statuses beside 422; the entry `default` documents those of every route.
+    """
     content = {problems.MEDIA_TYPE: {"schema": {"$ref": "#/components/schemas/Problem"}}}
     documented: Responses = {
         status: {"description": HTTPStatus(status).phrase, "content": content} for status in (422, *statuses)
@@ -59,7 +62,7 @@ def errors(*statuses: int) -> Responses:
 
 
 async def refuse_unknown_query(request: Request) -> None:
-    """A 422 for an unknown query parameter, because a misspelt one would be ignored silently."""
+    """Raise a 422 for an unknown query parameter, because a misspelt one would be ignored silently."""
     path = getattr(request.scope.get("route"), "path", "")
     if not request.query_params:
         return
@@ -77,7 +80,7 @@ async def refuse_unknown_query(request: Request) -> None:
 
 
 def repeat(request: Request, key: str | None, *parts: str) -> store.Repeat | None:
-    """Identify a request by path, owner, Idempotency-Key and the hash of ``parts`` (its body); None without a key."""
+    """Identify a request by path, owner, Idempotency-Key ``key`` and hash of its body ``parts``; None if no key."""
     if key is None:
         return None
     caller = CALLER.get()
@@ -88,9 +91,9 @@ def repeat(request: Request, key: str | None, *parts: str) -> store.Repeat | Non
 def created(
     database: Database, again: store.Repeat | None, create: Callable[[Session], store.Answer]
 ) -> tuple[store.Answer, bool]:
-    """Call ``create`` unless the request is a repetition, and store its answer in the same transaction.
+    """Call ``create``, which creates a resource, and store its answer in the same transaction.
 
-    Return the answer, and whether it is new.
+    A repetition (``again`` identifies the request) creates nothing. Returns the answer, and whether it is new.
     """
     with database.write() as session:
         earlier = store.earlier_answer(session, again)
@@ -102,17 +105,17 @@ def created(
 
 
 def sent(answer: store.Answer) -> Response:
-    """The HTTP response that sends ``answer``, the stored answer to a request that created a resource."""
+    """Return the HTTP response that sends ``answer``, the answer to a request that created a resource."""
     return JSONResponse(answer.body, answer.status, {"Location": answer.location})
 
 
 def tagged(answer: object, known: str | None) -> Response:
-    """``answer`` as JSON with an ETag, or a 304 if the caller has it (``known``: its ``If-None-Match``)."""
+    """Return ``answer`` as JSON with an ETag; a 304 if the ``If-None-Match`` header ``known`` has this ETag."""
     return marked(to_json(answer), JSON, known)
 
 
 def marked(body: bytes, media_type: str, known: str | None, headers: Mapping[str, str] | None = None) -> Response:
-    """``body`` with an ETag and further ``headers``, or a 304 if the caller has it."""
+    """Return ``body`` with an ETag and ``headers``; a 304 if the ``If-None-Match`` header ``known`` has this ETag."""
     tag = f'"{hashlib.sha256(body).hexdigest()[:32]}"'
     if matches(known, tag):
         return Response(status_code=304, headers={"ETag": tag})
@@ -120,11 +123,11 @@ def marked(body: bytes, media_type: str, known: str | None, headers: Mapping[str
 
 
 def attachment(filename: str) -> dict[str, str]:
-    """The header that makes a browser save an answer as ``filename``."""
+    """Return the header that makes a browser save an answer as ``filename``."""
     return {"Content-Disposition": f'attachment; filename="{filename}"'}
 
 
 def matches(known: str | None, tag: str) -> bool:
-    """Whether the ``If-None-Match`` header ``known`` contains ``tag``."""
+    """Return whether the ``If-None-Match`` header ``known`` contains ``tag`` or "*"."""
     given = [part.strip().removeprefix("W/") for part in (known or "").split(",")]
     return tag in given or "*" in given

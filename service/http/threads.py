@@ -1,4 +1,4 @@
-"""Daemon threads for one call each. Unlike a thread pool they cannot be exhausted, and the exit waits for none."""
+"""Runs each call in a daemon thread of its own: never all busy like a pool, and not awaited when the process ends."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Result = TypeVar("Result")
 
 
 def call(name: str, function: Callable[[], Result]) -> Future[Result]:
-    """Call ``function`` in a new thread called ``name``; return the future of its result."""
+    """Call ``function`` in a new daemon thread called ``name``; return the future of its result."""
     future: Future[Result] = Future()
     future.set_running_or_notify_cancel()  # so that cancelling the future does not lose the result
 
@@ -33,7 +33,10 @@ def call(name: str, function: Callable[[], Result]) -> Future[Result]:
 
 
 def done_within(seconds: float, name: str, function: Callable[[], object]) -> bool:
-    """Whether ``function`` returns within ``seconds``, and not False; a longer call continues in its thread."""
+    """Return whether ``function`` returns within ``seconds`` with another result than False.
+
+    It runs in a thread called ``name``, where a longer call continues; an exception is logged and gives False.
+    """
     try:
         return call(name, function).result(seconds) is not False
     except TimeoutError:
@@ -44,7 +47,7 @@ def done_within(seconds: float, name: str, function: Callable[[], object]) -> bo
 
 
 class SharedCall(Generic[Result]):
-    """A function called in a thread; all who wait at the same time share one call."""
+    """Calls ``function`` in a thread; callers that wait at the same time share one call and its result."""
 
     def __init__(self, name: str, function: Callable[[], Result]) -> None:
         self._name, self._function = name, function
@@ -52,7 +55,7 @@ class SharedCall(Generic[Result]):
         self._start = 0.0
 
     async def result(self, seconds: float) -> Result:
-        """The result of the function; TimeoutError once its call lasts longer than ``seconds``.
+        """Return the result of the function; raise TimeoutError once the call has lasted longer than ``seconds``.
 
         To be awaited in one event loop only.
         """

@@ -1,1 +1,1 @@
-"""Computation of jobs: the runner, the start of the evaluator, and notification of changes."""
+"""Computation of jobs (runs and diagnoses): the runner, the start of the evaluator, notification of changes."""

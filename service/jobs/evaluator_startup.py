@@ -1,4 +1,4 @@
-"""Starts the evaluator in the background, so that the API answers at once; retries when that fails."""
+"""Starts the evaluator (worker processes that simulate) in a thread, so that the API answers at once, and retries."""
 
 from __future__ import annotations
 
@@ -23,7 +23,11 @@ NO_WORKER = (
 
 
 class Pool:
-    """Holds the evaluator that all jobs share. ``error`` says why it has not started yet."""
+    """Starts and holds the evaluator (worker processes that simulate), which all jobs share.
+
+    Attributes:
+        error: why the last attempt to start the evaluator failed; None before the first failure and once it runs.
+    """
 
     def __init__(self, make: Callable[[], RunningEvaluator], on_ready: Callable[[RunningEvaluator], None]) -> None:
         self._make, self._on_ready = make, on_ready
@@ -34,35 +38,35 @@ class Pool:
         self._thread = threading.Thread(target=self._start, name="evaluator-start", daemon=True)
 
     def start(self) -> None:
-        """Start the evaluator in its thread."""
+        """Start the thread that starts the evaluator."""
         self._thread.start()
 
     @property
     def status(self) -> Literal["starting", "ok", "degraded"]:
-        """Status of the evaluator, as the health call reports it."""
+        """Status for the health call: "degraded" if the evaluator cannot start or has no live worker."""
         if self._evaluator:
             return "degraded" if self.workers == 0 else "ok"
         return "degraded" if self.error else "starting"
 
     @property
     def detail(self) -> str | None:
-        """Why jobs are not computed, if that is known."""
+        """Why no job is computed at present, for the user; None if no reason is known."""
         return NO_WORKER if self._evaluator and self.workers == 0 else self.error
 
     @property
     def workers(self) -> int | None:
-        """Number of live workers, if the evaluator knows it."""
+        """Number of live workers; None if it is unknown or the evaluator has not started."""
         standing = self.standing
         return standing.workers if standing else None
 
     @property
     def standing(self) -> Standing | None:
-        """Live, dead and restarted workers; None before the evaluator has started."""
+        """Numbers of live, dead and restarted workers; None before the evaluator has started."""
         evaluator = self._evaluator
         return evaluator.standing if evaluator else None
 
     def close(self, seconds: float = CLOSE_SECONDS) -> bool:
-        """Close the evaluator, or abandon it after ``seconds``; returns whether it closed."""
+        """Close the evaluator, waiting at most ``seconds``; return whether it closed in that time."""
         self._stop.set()
         with self._lock:
             evaluator, self._evaluator = self._evaluator, None

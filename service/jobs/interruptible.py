@@ -1,4 +1,4 @@
-"""An evaluator whose calls can be abandoned: a batch may take minutes, and a worker may hang."""
+"""An evaluator whose calls can be interrupted: one batch of simulations may take minutes, and a worker may hang."""
 
 from __future__ import annotations
 
@@ -18,16 +18,19 @@ LOOK_SECONDS = 0.2
 
 
 class InterruptibleEvaluator:
-    """Evaluates in a separate thread, and abandons it once ``interrupted`` returns True.
+    """Evaluates in a separate thread, and no longer waits for that thread once ``interrupted()`` returns True.
 
-    The evaluator is notified and drops what no worker has started. It is not waited for, because it may hang itself.
+    ``evaluator`` is then notified, and drops the simulations that no worker has started.
     """
 
     def __init__(self, evaluator: RunningEvaluator, interrupted: Callable[[], bool]) -> None:
         self._evaluator, self._interrupted = evaluator, interrupted
 
     def evaluate(self, problem: Problem, values: npt.ArrayLike, *, residuals: bool = False) -> Evaluation:
-        """Misfits of ``values`` [B, F]; InterruptedStepError once interrupted, whatever the evaluator does."""
+        """Return the misfits of ``values`` [B, F] (B individuals, F free genes) to the recordings of ``problem``.
+
+        ``residuals``: return residuals too. InterruptedStepError soon after an interruption, even if a worker hangs.
+        """
         if self._interrupted():
             raise InterruptedStepError
         # Kept for the abandoned thread: ``interrupted`` may return False again later.

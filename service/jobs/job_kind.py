@@ -1,4 +1,4 @@
-"""Interface between the runner and the kinds of job (calibration, diagnosis), which compute in stored steps."""
+"""Interface between the runner and the kinds of job (run, diagnosis), whose computation is stored step by step."""
 
 from __future__ import annotations
 
@@ -18,18 +18,19 @@ Points = list[tuple[float, float]]
 
 
 class InterruptedStepError(Exception):
-    """A step was abandoned because the job is to be cancelled or the service stops."""
+    """Raised within a step when the job is to be cancelled or the service stops."""
 
 
 @dataclass(frozen=True)
 class Step:
-    """One finished step of a job.
+    """One finished step of a job: a generation of a run, a report of progress of a diagnosis, or the final result.
 
     Attributes:
-        progress: of the whole job, in [0, 1].
-        store: ``store(session, row, eta_seconds)`` writes the results, in one transaction with the job's state.
-        last: whether the job has ended; its results are stored only if it was not cancelled meanwhile.
-        resumable: whether a restarted job continues after this step.
+        progress: fraction of the whole job that is done, in [0, 1].
+        store: ``store(session, row, eta_seconds)`` writes the step's results, in one transaction with the job's state;
+            ``eta_seconds`` is the estimated remaining time.
+        last: whether this step ends the job; its results are stored only if the job was not cancelled meanwhile.
+        resumable: whether a restarted job continues after this step instead of repeating it.
     """
 
     progress: float
@@ -39,14 +40,16 @@ class Step:
 
 
 class JobKind(ABC):
-    """A kind of job (run, diagnosis): its resource in the API, its tables, and how one is computed.
+    """A kind of job (run or diagnosis): its resource in the API, its tables, and how one job is computed.
 
     Attributes:
-        what: singular name of the resource, also for messages.
-        path: of the resource, e.g. "/v1/runs"; ids start with ``prefix``.
-        table: of the jobs.
-        step_table: of their steps.
-        step_event: name of the event that reports a step, whose data are a ``step_answer``.
+        what: singular name of the resource, e.g. "run", also for messages.
+        path: path of the resource, e.g. "/v1/runs".
+        prefix: beginning of the ids of its jobs, e.g. "dx".
+        step_event: name of the server-sent event that reports a step.
+        table: database table of the jobs.
+        step_table: database table of their steps.
+        step_answer: typed dict of a step as JSON, the data of a ``step_event``.
     """
 
     what: str
@@ -59,12 +62,12 @@ class JobKind(ABC):
 
     @abstractmethod
     def view(self, row: Any) -> Run | Diagnosis:
-        """The answer that describes a job."""
+        """Return the JSON answer that describes the job stored in ``row`` (of ``table``)."""
 
     @abstractmethod
     def begin(self, session: Session, row: Any) -> Points:
-        """Prepare ``row`` for a start or restart; return (elapsed s, progress) of the steps that stay valid."""
+        """Prepare ``row`` for a start or restart; return (elapsed time in s, progress) of the steps to keep."""
 
     @abstractmethod
     def steps(self, row: Any, evaluator: Evaluator) -> Iterator[Step]:
-        """Compute the job and yield its steps; ``last`` is True for the final one only."""
+        """Compute the job in ``row`` and yield its steps; only the final one has ``last`` True."""

@@ -1,8 +1,8 @@
-"""Computes jobs (calibrations, diagnoses): a few at a time, one thread each, every step stored before the next starts.
+"""Computes jobs (runs and diagnoses), a few at a time, one thread each; every step is stored before the next starts.
 
-:mod:`wingfit.workers.jobs` decides what a job may do next, and the runner carries out its instructions. A
-:class:`wingfit.service.jobs.job_kind.JobKind` computes the steps. A job is RUNNING only while its thread lives, so
-after any end of the process the database contains what remains to be done.
+The state machine :mod:`wingfit.workers.jobs` decides what a job may do next and returns instructions, which the runner
+carries out. A :class:`wingfit.service.jobs.job_kind.JobKind` computes the steps. A job is computed only while its
+thread lives, so after any end of the process the database contains what remains to be done.
 """
 
 from __future__ import annotations
@@ -50,14 +50,18 @@ class JobRef(NamedTuple):
 
 
 class Pace(NamedTuple):
-    """Seconds since the last progress of the slowest running job, and seconds that the oldest queued job has waited."""
+    """Signs of a hanging computation, for the metrics (0 where no job runs or waits).
+
+    ``stalled_s``: seconds since the last stored step, of the running job for which they are most; ``waited_s``: seconds
+    that the oldest queued job has waited.
+    """
 
     stalled_s: float
     waited_s: float
 
 
 class Runner:
-    """Owns the threads that compute jobs."""
+    """Queues jobs, and owns the threads that compute them."""
 
     def __init__(
         self,
@@ -68,9 +72,10 @@ class Runner:
         of_one: int | None = None,
         most_starts: int = jobs.MOST_STARTS,
     ) -> None:
-        """Compute at most ``at_once`` jobs at a time, and at most ``of_one`` of these for one owner.
+        """Compute at most ``at_once`` jobs at a time, at most ``of_one`` of them for one owner (None: ``at_once``).
 
-        A job fails if the server ended ``most_starts`` times during it without progress.
+        ``kinds``: the kinds of job; ``changes``: notified of every change of a job; ``most_starts``: a job fails if the
+        server crashed that many times while the job ran without progress.
         """
         self._database, self._changes, self._kinds = database, changes, kinds
         self._at_once, self._of_one, self._most_starts = at_once, of_one or at_once, most_starts
@@ -88,7 +93,7 @@ class Runner:
     # -- from outside ----------------------------------------------------------------------------------------
 
     def recover(self) -> None:
-        """Continue what an earlier process left: first the running jobs, then the queued ones."""
+        """Queue the jobs that an earlier process did not finish: those it was computing, then those it had queued."""
         with self._lock:
             with self._database.write() as session:
                 left = [
@@ -102,17 +107,20 @@ class Runner:
                 self._obey(job, instructions)
 
     def attach(self, evaluator: RunningEvaluator) -> None:
-        """Start to compute with ``evaluator``."""
+        """Set the ``evaluator`` of all jobs, and start to compute queued jobs."""
         with self._lock:
             self._evaluator = evaluator
         self._dispatch()
 
     def enqueue(self, kind: JobKind, job_id: str, owner: str | None) -> None:
-        """Queue a job that was stored as QUEUED."""
+        """Put a new job, already stored as QUEUED, at the end of the queue."""
         self._obey(JobRef(kind, job_id, owner), (Instruction.ENQUEUE, Instruction.PUBLISH))
 
     def control(self, kind: JobKind, job_id: str, event: jobs.Event) -> JobRow:
-        """Apply a user's event; a 409 with the state when the job does not admit it."""
+        """Apply ``event`` (cancel, pause or resume, requested by a user) to a job; return the job's new row.
+
+        Raises a 409 if the state of the job does not allow the event, a 404 if there is no such job.
+        """
         with self._lock:
             with self._database.write() as session:
                 row = store.one(session, kind.table, job_id)
@@ -131,11 +139,11 @@ class Runner:
         return row
 
     def begin_stop(self) -> None:
-        """Start no more jobs; failures from now on are not counted against jobs. Safe in a signal handler."""
+        """Start no more jobs; errors from now on do not make a job fail. May be called in a signal handler."""
         self._stopping = True
 
     def stop(self, timeout: float) -> bool:
-        """Wait at most ``timeout`` s for the current steps; returns whether all threads ended."""
+        """Start no more jobs, and wait up to ``timeout`` s for the current steps; return whether all threads ended."""
         self.begin_stop()
         deadline = time.monotonic() + timeout
         self._leave()
@@ -146,7 +154,7 @@ class Runner:
         return not any(thread.is_alive() for thread in threads)
 
     def pace(self) -> Pace:
-        """Return how long running jobs have made no progress and queued jobs have waited, now."""
+        """Return how long running jobs have made no progress, and how long queued jobs have waited."""
         with self._lock:
             now = time.monotonic()
             return Pace(
@@ -155,7 +163,7 @@ class Runner:
             )
 
     def _leave(self) -> None:
-        """Record that the server stops in an orderly way, so that the stop is not counted against running jobs."""
+        """Store that the server stops in an orderly way, so that the running jobs are not suspected of a crash."""
         try:
             with self._database.write() as session:
                 for row, _ in self._unfinished(session, jobs.State.RUNNING):
@@ -164,13 +172,13 @@ class Runner:
             LOG.warning("the stop is not stored (%s); it counts as an end of the server", error)
 
     def under_way(self) -> list[JobRef]:
-        """Jobs that are computed now; does not take the lock, which a hanging thread may hold."""
+        """Return the jobs that are computed now, without taking the lock, which a hanging thread may hold."""
         return list(self._threads)
 
     # -- the waiting line ------------------------------------------------------------------------------------
 
     def _is_suspect(self, row: JobRow) -> bool:
-        """Whether the job fails if the server crashes once more while the job runs (it may have caused the crashes)."""
+        """Return whether the job fails if the server crashes once more while it runs, as the probable cause."""
         return row.starts >= max(1, self._most_starts - 1)
 
     def _unfinished(self, session: Session, state: jobs.State) -> list[tuple[JobRow, JobKind]]:
@@ -205,7 +213,10 @@ class Runner:
         del self._waits_since[job]
 
     def _next(self) -> JobRef | None:
-        """The first queued job that may start now. A suspect, and all jobs behind it, wait until no other job runs."""
+        """Return the first queued job that may start now, or None.
+
+        A suspect (a job that may have crashed the server), and all jobs queued behind it, wait until no other job runs.
+        """
         if self._suspects & self._threads.keys():
             return None
         for job in self._waiting:
@@ -216,9 +227,9 @@ class Runner:
         return None
 
     def _may_start(self, job: JobRef) -> bool:
-        """Whether the owner's share is not used up, and the job has no thread.
+        """Return whether fewer than the permitted number of jobs of this owner run, and the job itself has no thread.
 
-        A job that was paused and resumed waits until its earlier thread has ended.
+        A job that was paused and resumed at once may still have its earlier thread.
         """
         beside = sum(other.owner == job.owner for other in self._threads)
         return job not in self._threads and beside < self._of_one
@@ -263,7 +274,7 @@ class Runner:
                 return
 
     def _patiently(self, job: JobRef, write: Callable[[], Written]) -> Written:
-        """Call ``write`` and return its result; wait and retry while the disk is full: the job loses nothing."""
+        """Call ``write`` and return its result; while the disk is full, wait and call ``write`` again."""
         waited = 0.0
         while True:
             try:
@@ -293,7 +304,10 @@ class Runner:
         return row, points
 
     def _store(self, job: JobRef, step: Step, points: Points) -> bool:
-        """Store one step with its results in one transaction; returns whether the job continues."""
+        """Store the results of ``step`` and the job's new state in one transaction; return whether the job continues.
+
+        ``points``: (elapsed time in s, progress) of all steps so far, from which the remaining time is estimated.
+        """
         eta = jobs.eta_seconds(points)
 
         def write() -> tuple[Instruction, ...]:
@@ -335,18 +349,21 @@ class Runner:
 
 
 def message(error: Exception) -> str:
-    """``error`` for the user, without stack trace; unexpected errors with the name of the exception."""
+    """Return the text of ``error`` for the user, without stack trace, with a remedy for known simulation failures.
+
+    An error without a message for users is preceded by the name of its exception.
+    """
     text = with_remedy(str(error)) if _is_for_user(error) else f"{type(error).__name__}: {error}"
     return text[:LONGEST_ERROR]
 
 
 def _is_for_user(error: Exception) -> bool:
-    """Whether ``error`` has a message that the domain wrote for the user."""
+    """Return whether the message of ``error`` is meant for the user: ValueErrors of the models and the estimation."""
     return isinstance(error, ValueError) and bool(str(error))
 
 
 def _failure(job: JobRef, error: Exception) -> str:
-    """Why a job failed; an unexpected error is reported as a fault of the server."""
+    """Return why a job failed; an error without a message for users is described as a fault of the server."""
     if _is_for_user(error):
         return message(error)
     return f"the server made a mistake ({message(error)}); the {job.kind.what}'s data are kept; please report it"

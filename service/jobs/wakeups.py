@@ -1,4 +1,7 @@
-"""Wakes event streams when a job changes. Carries no data: watchers read the database, so they miss nothing."""
+"""Wakes the event streams of a job when the job changes.
+
+A notification contains no data: the woken streams read the database, so a missed notification loses nothing.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +12,10 @@ from contextlib import contextmanager
 
 
 class Changes:
-    """Notifications of changed jobs: threads call :meth:`publish`, coroutines wait in :meth:`watch`."""
+    """Notifies coroutines of changed jobs: threads call :meth:`publish`, coroutines wait in :meth:`watch`.
+
+    ``closed``: whether the service stops, so that streams must end.
+    """
 
     def __init__(self) -> None:
         self._lock = threading.RLock()
@@ -18,7 +24,7 @@ class Changes:
 
     @contextmanager
     def watch(self, job_id: str) -> Iterator[asyncio.Event]:
-        """An event that is set when the job or the API keys change, and when the service stops."""
+        """Yield an event that is set whenever the job or the API keys change, and when the service stops."""
         watcher = (asyncio.get_running_loop(), asyncio.Event())
         with self._lock:
             self._watchers.setdefault(job_id, set()).add(watcher)
@@ -33,23 +39,23 @@ class Changes:
 
     @property
     def watchers(self) -> int:
-        """Number of watchers."""
+        """Number of coroutines that wait for changes, over all jobs."""
         with self._lock:
             return sum(len(group) for group in self._watchers.values())
 
     def publish(self, job_id: str) -> None:
-        """Wake the watchers of a job that has changed."""
+        """Wake the coroutines that wait for changes of this job."""
         with self._lock:
             watchers = list(self._watchers.get(job_id, ()))
         _wake(watchers)
 
     def close(self) -> None:
-        """End all watchers, so that open streams do not delay the end of the process."""
+        """Wake all waiting coroutines for good, so that open event streams do not delay the end of the process."""
         self.closed = True
         self.wake_all()
 
     def wake_all(self) -> None:
-        """Wake all watchers."""
+        """Wake the waiting coroutines of all jobs."""
         with self._lock:
             watchers = [watcher for group in self._watchers.values() for watcher in group]
         _wake(watchers)

@@ -16,7 +16,7 @@ CONNECT_SECONDS = 10.0
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Listen on every address of this machine and forward until the process is ended."""
+    """Forward as the command line says (``arguments`` None: that of the process) until the process is ended."""
     parser = argparse.ArgumentParser(prog="python -m wingfit.service.operations.forward", description=__doc__)
     parser.add_argument("target", help="address to forward to, as host:port")
     parser.add_argument("--host", default="0.0.0.0", help="address to listen on (default: all)")  # noqa: S104  its purpose
@@ -30,7 +30,7 @@ def main(arguments: list[str] | None = None) -> None:
 
 
 async def forward(host: str, port: int, target_host: str, target_port: int) -> None:
-    """Forward every connection to ``host``:``port`` to the target, until cancelled."""
+    """Forward every connection made to ``host``:``port`` to ``target_host``:``target_port``, until cancelled."""
 
     async def connected(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         try:
@@ -46,7 +46,10 @@ async def forward(host: str, port: int, target_host: str, target_port: int) -> N
 
 
 async def _connect_both(reader: asyncio.StreamReader, writer: asyncio.StreamWriter, host: str, port: int) -> None:
-    """Connect to the target and copy both ways until both sides have finished. OSError if it cannot be reached."""
+    """Connect to ``host``:``port`` and copy in both directions until both sides have finished.
+
+    ``reader`` and ``writer``: of the client's connection. OSError if the target cannot be reached.
+    """
     target_reader, target_writer = await asyncio.wait_for(asyncio.open_connection(host, port), CONNECT_SECONDS)
     try:
         ways = (_copy(reader, target_writer), _copy(target_reader, writer))
@@ -58,7 +61,7 @@ async def _connect_both(reader: asyncio.StreamReader, writer: asyncio.StreamWrit
 
 
 async def _copy(source: asyncio.StreamReader, target: asyncio.StreamWriter) -> None:
-    """Copy until ``source`` ends, then close that direction of ``target``; the other direction may go on."""
+    """Copy until ``source`` ends, then close that direction of ``target``; the other direction stays open."""
     while chunk := await source.read(CHUNK_BYTES):
         target.write(chunk)
         await target.drain()

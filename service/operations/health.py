@@ -1,4 +1,4 @@
-"""The health of the service, answered without a pool thread or a lock, which a slow request may hold."""
+"""The health of the service, determined without a pool thread or a lock, which a slow request may hold."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ Jobs = dict[str, dict[str, int]]
 
 
 class Health:
-    """Reports the health of the service; a separate thread counts jobs, and concurrent callers share the count."""
+    """Determines the health of the service; a separate thread counts jobs, and concurrent callers share one count."""
 
     def __init__(self, settings: Settings, database: Database, pool: Pool, kinds: Sequence[JobKind]) -> None:
         self._settings, self._database, self._pool, self._kinds = settings, database, pool, kinds
@@ -34,7 +34,7 @@ class Health:
         """Number of jobs of all owners by kind and state; None if the database did not answer in time."""
 
     async def look(self) -> str | None:
-        """Count the jobs again into ``jobs``. Return None, or the reason if they could not be counted."""
+        """Count the jobs again and store the numbers in ``jobs``; return None, or the reason why that failed."""
         try:
             self.jobs = await self._counting.result(READ_SECONDS)
         except TimeoutError:
@@ -46,7 +46,7 @@ class Health:
         return None
 
     async def now(self) -> HealthAnswer:
-        """The health of the service; counts are over all owners, for every caller."""
+        """Return the health of the service as the JSON answer; jobs of all owners are counted, for every caller."""
         silent = await self.look()
         run, diagnosis = (None if self.jobs is None else _active(self.jobs[kind.what]) for kind in self._kinds)
         return HealthAnswer(

@@ -1,4 +1,4 @@
-"""Metrics for Prometheus, and the log: every request is counted, logged and given an id."""
+"""Metrics for Prometheus, and the log: every request is counted, logged and gets an id."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ REQUEST: ContextVar[str | None] = ContextVar("request", default=None)
 
 
 class Metrics:
-    """The counters of one service; ``gauges`` is called whenever the metrics are read."""
+    """The metrics of the service: counters of requests; and ``gauges``, a function called whenever metrics are read."""
 
     def __init__(self, gauges: Callable[[], Iterable[Metric]]) -> None:
         self._registry = CollectorRegistry()
@@ -55,7 +55,7 @@ class Metrics:
         )
 
     def count(self, scope: Scope, status: int, seconds: float) -> None:
-        """Count a request by method, route and status.
+        """Count a request by method, route and HTTP ``status``; ``seconds``: time to answer.
 
         Unknown methods and paths count as "other", so that callers cannot create any number of Prometheus series.
         """
@@ -66,7 +66,7 @@ class Metrics:
             self.seconds.labels(method, path).observe(seconds)
 
     def text(self) -> bytes:
-        """All metrics in the text format of Prometheus."""
+        """Return all metrics in the text format of Prometheus."""
         return generate_latest(self._registry)
 
 
@@ -79,18 +79,18 @@ class _Gauges(Collector):
         return []
 
     def collect(self) -> Iterable[Metric]:
-        """The present state of the service as Prometheus gauges."""
+        """Return the present state of the service as Prometheus gauges."""
         return self._gauges()
 
 
 class MetricsAndLog:
-    """Middleware that counts and logs every request, and gives it an id for the log and the answer."""
+    """Middleware that counts and logs every request, and gives it an id, which the log and the answer contain."""
 
     def __init__(self, app: ASGIApp) -> None:
         self.app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Handle one connection."""
+        """Handle one request; a connection of another type is passed on."""
         if scope["type"] != "http":
             await self.app(scope, receive, send)
             return
@@ -126,7 +126,7 @@ class JsonFormatter(logging.Formatter):
     STANDARD = frozenset(vars(logging.makeLogRecord({}))) | {"message", "asctime", "taskName"}
 
     def format(self, record: logging.LogRecord) -> str:
-        """``record`` as JSON."""
+        """Return ``record`` as JSON."""
         line: dict[str, Any] = {
             "time": datetime.fromtimestamp(record.created, UTC).isoformat(timespec="milliseconds"),
             "level": record.levelname,
@@ -142,7 +142,10 @@ class JsonFormatter(logging.Formatter):
 
 
 def set_up_log(log_format: LogFormat) -> None:
-    """Log to standard error. Only the JSON log contains every request: in a text log they would hide other messages."""
+    """Log to standard error, as text or JSON.
+
+    Only the JSON log contains every request: in a text log the requests would hide other messages.
+    """
     logging.basicConfig(level=logging.INFO, format="%(asctime)s %(levelname)s %(name)s: %(message)s")
     logging.getLogger("alembic").setLevel(logging.WARNING)
     if log_format == "json":

@@ -1,4 +1,4 @@
-"""A stop in bounded time: what does not end in time is given up, and the log names it.
+"""Stops the server in bounded time: what has not ended in time is abandoned, and the log names it.
 
 Three mechanisms end the process, each in case the one before hangs: the graceful stop
 (:meth:`wingfit.service.container.Service.stop`), whose steps have time limits; a thread (:class:`Deadline`) that exits
@@ -57,7 +57,10 @@ class StopLimits:
 
 
 class Deadline:
-    """Exits the process ``seconds`` after the first signal; ``unfinished`` describes what is running then."""
+    """Thread that ends the process ``seconds`` after the first signal to stop.
+
+    ``unfinished()`` gives a line for the log about each request and job that is running then.
+    """
 
     def __init__(self, unfinished: Callable[[], Iterable[str]], seconds: float) -> None:
         self._unfinished, self._seconds = unfinished, seconds
@@ -66,7 +69,7 @@ class Deadline:
         threading.Thread(target=self._wait, name=DEADLINE, daemon=True).start()
 
     def begin(self) -> None:
-        """Start the time at a signal. Safe in a signal handler."""
+        """Start to count the time, at a signal to stop. May be called in a signal handler."""
         self._signals.put(None)
 
     def _wait(self) -> None:
@@ -83,13 +86,13 @@ class Deadline:
 
 
 def leave() -> NoReturn:
-    """Exit with status 0 without waiting for any thread; nothing that was acknowledged is lost."""
+    """End the process with status 0 without waiting for any thread; nothing that was acknowledged as stored is lost."""
     threads.done_within(REPORT_SECONDS, "stop-log", logging.shutdown)
     os._exit(0)
 
 
 def held_up() -> bool:
-    """Whether threads are still running that a normal exit would wait for."""
+    """Wait up to JOIN_SECONDS for the threads that a normal exit waits for; return whether one of them still runs."""
     deadline = time.monotonic() + JOIN_SECONDS
     own = threading.current_thread()
     waited_for = [one for one in threading.enumerate() if one is not own and not one.daemon]
@@ -113,7 +116,7 @@ def _threads() -> Iterator[str]:
 
 
 def _stack_lines(frame: FrameType | None) -> Iterator[str]:
-    """The innermost ``FRAMES`` lines of a stack, innermost first."""
+    """Yield file, line and function of the ``FRAMES`` innermost calls of a stack, innermost first."""
     for _ in range(FRAMES):
         if frame is None:
             return
@@ -123,10 +126,10 @@ def _stack_lines(frame: FrameType | None) -> Iterator[str]:
 
 
 class Watchdog:
-    """Starts the process that kills this one ``seconds`` after a signal, even if no thread can run Python.
+    """Starts a process that kills the server ``seconds`` after a signal to stop, even if no thread can run Python.
 
-    Python's signal handlers need the interpreter; faulthandler's handler does not, and writes into the pipe to that
-    process as soon as the signal arrives. If the process cannot be started, the server works without it.
+    Python's signal handlers need the interpreter; faulthandler's handler does not, and writes into a pipe to the
+    watchdog process as soon as the signal arrives. If that process cannot be started, the server works without it.
     """
 
     def __init__(self, seconds: float) -> None:
@@ -145,7 +148,7 @@ class Watchdog:
             faulthandler.register(watchdog.STACKS, file=sys.stderr, all_threads=True)
 
     def listen(self) -> None:
-        """Install faulthandler's handlers before the present ones; to be repeated when those have changed."""
+        """Make faulthandler handle the stop signals before their present handlers; call again when these change."""
         for number in SIGNALS:
             faulthandler.unregister(number)
             # Only the stack of the thread that takes the signal: reading the others while they run is not safe.

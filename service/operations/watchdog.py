@@ -24,7 +24,7 @@ CHUNK = 65536
 
 
 def main(server: int, seconds: float) -> None:
-    """Wait for a signal, then ``seconds`` for the process ``server`` (its id) to end, then kill it."""
+    """Wait for a signal to stop, then ``seconds`` for the process with id ``server`` to end, then kill it."""
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)  # also sent to this process, by a service manager or a terminal
     if not os.read(0, CHUNK) or ended(server, seconds):
@@ -36,7 +36,7 @@ def main(server: int, seconds: float) -> None:
 
 
 def ended(server: int, seconds: float) -> bool:
-    """Whether the server ends within ``seconds``."""
+    """Wait up to ``seconds`` for the process with id ``server`` to end; return whether it ended."""
     deadline = time.monotonic() + seconds
     while (left := deadline - time.monotonic()) > 0:
         if select.select([0], [], [], left)[0] and not os.read(0, CHUNK):

@@ -1,1 +1,1 @@
-"""Answers about results of runs and simulations: loads, forces, coefficients."""
+"""JSON answers about results of runs and simulations: loads, forces, coefficients."""

@@ -1,4 +1,8 @@
-"""Selects the coefficients of a run on forces for one recording: local, joint, average, or from the global model."""
+"""Selects the genome with which to compute the forces of one recording, for a run on forces.
+
+Its coefficients were estimated from that recording ("local") or from all fitted recordings together ("joint"), or are
+the average of the local estimates, those of the global model (a function of the condition), or nominal.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +28,7 @@ Estimates = Mapping[str, Mapping[str, float]]
 
 @dataclass(frozen=True)
 class Chosen:
-    """Where coefficients come from (``source``), the full genome (name to value), and remarks for the user."""
+    """A genome for computing forces: ``source`` of its coefficients, all genes (name to value), remarks for users."""
 
     source: Source
     genome: Mapping[str, float]
@@ -32,7 +36,10 @@ class Chosen:
 
 
 def chosen(service: Service, row: RunRow, dataset: Dataset, recording: str, requested: Source | None) -> Chosen:
-    """The coefficients of the ``requested`` source, by default the best; a 409 if the run has none of it."""
+    """Return the genome for ``recording`` from the ``requested`` source (None: the first available of PREFERENCE).
+
+    Raises a 409 if the run has no coefficients from that source.
+    """
     available = offered(service, row, dataset, recording, estimates(service, row, dataset))
     source = requested or next(iter(available))
     if source not in available:
@@ -45,7 +52,10 @@ def chosen(service: Service, row: RunRow, dataset: Dataset, recording: str, requ
 def offered(
     service: Service, row: RunRow, dataset: Dataset, recording: str, found: Estimates
 ) -> dict[Source, Callable[[], Chosen]]:
-    """Functions that return the genome of each source that the run has for a recording, the best source first."""
+    """Return, by source, functions that return the genome of the run for ``recording``, in the order of PREFERENCE.
+
+    Only sources that the run has are included; ``found``: its estimates so far (:func:`estimates`).
+    """
     spec = store.spec(row)
     nominal = service.engine.genome(spec, dataset, {})
 
@@ -71,14 +81,14 @@ def offered(
 
 
 def estimates(service: Service, row: RunRow, dataset: Dataset) -> Estimates:
-    """The coefficients estimated so far, by stage of the run and name; empty before the first checkpoint."""
+    """Return the values estimated so far (stage of the run, gene, value); empty before the first checkpoint."""
     with service.database.read() as session:
         checkpoint = store.checkpoint(session, row.id)
     return service.engine.found(store.spec(row), dataset, checkpoint) if checkpoint else {}
 
 
 def law(row: RunRow, dataset: Dataset) -> GlobalModel:
-    """The run's global model; a 409 with the reason if there is none."""
+    """Return the run's global model; raise a 409 with the reason if there is none."""
     if row.kind != "forces":
         raise conflict(f"run {row.id} is on tracks; only runs on forces predict")
     if row.result is None:

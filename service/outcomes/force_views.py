@@ -38,7 +38,7 @@ MN2 = 1e6
 
 
 def result(outcome: ForceResult, spec: CalibrationSpec, dataset: Dataset) -> f.ForceResult:
-    """The result of a calibration on forces as the JSON answer."""
+    """Return the JSON answer with the result of a calibration on forces."""
     model = outcome.global_model
     return answer(
         f.ForceResult,
@@ -52,13 +52,13 @@ def result(outcome: ForceResult, spec: CalibrationSpec, dataset: Dataset) -> f.F
 
 
 def stored(kind: str, result: Json) -> Result | f.ForceResult:
-    """The JSON answer for a ``result`` as stored in the database; ``kind`` is "tracks" or "forces"."""
+    """Return the JSON answer for ``result``, as stored in the database; ``kind`` is "tracks" or "forces"."""
     whole = {"kind": kind} | result
     return checked(Result, whole) if kind == "tracks" else checked(f.ForceResult, whole)
 
 
 def forces(found: ForceComparison, source: f.SourceOrGiven | None = None) -> f.Forces:
-    """Recorded and modelled forces over the beat; ``source`` replaces that of ``found``."""
+    """Return recorded and modelled forces over the beat as the JSON answer; ``source``, if any, replaces its source."""
     return {
         "recording": found.recording,
         "source": source or found.source,
@@ -74,7 +74,7 @@ def forces(found: ForceComparison, source: f.SourceOrGiven | None = None) -> f.F
 
 
 def law(stored: f.GlobalModel, dataset: Dataset) -> GlobalModel:
-    """The global model of a stored result; its conditions are those of the recordings that it names."""
+    """Convert ``stored``, a global model as JSON, back; its conditions are those of the recordings that it names."""
     return GlobalModel(
         genes=tuple(
             GlobalGene(
@@ -95,13 +95,13 @@ def law(stored: f.GlobalModel, dataset: Dataset) -> GlobalModel:
 
 
 def condition(requested: PredictionIn) -> Condition:
-    """The condition of a requested prediction, in SI."""
+    """Return the condition of a requested prediction, in SI units."""
     values = in_si(requested.model_dump())
     return Condition(phase_lag=0.0, angle_of_attack=values.pop("body_pitch"), **values)
 
 
 def prediction(found: Prediction) -> f.Prediction:
-    """Predicted forces as the JSON answer."""
+    """Return predicted forces over the beat as the JSON answer."""
     return {
         "coefficients": dict(found.values),
         "phase": np.round(found.phase, 9).tolist(),
@@ -115,7 +115,7 @@ def prediction(found: Prediction) -> f.Prediction:
 
 
 def models() -> f.Models:
-    """The presets and terms of the blade-element model."""
+    """Return the presets and the terms of the blade-element model as the JSON answer."""
     return {
         "presets": [answer(f.Preset, preset) for preset in PRESETS.values()],
         "terms": [answer(f.Term, term) for term in TERMS.values()],
@@ -135,7 +135,7 @@ def _estimate(found: LocalEstimate, spec: CalibrationSpec, dataset: Dataset) -> 
 
 
 def _fitted(noise: Matrix, recording: Recording, axes: tuple[str, ...]) -> Matrix:
-    """The block of ``noise`` (covariance of all force channels of ``recording``) that belongs to the ``axes``."""
+    """Return the part of ``noise``, the covariance of all force channels of ``recording``, for the fitted ``axes``."""
     fitted = [k for k, axis in enumerate(recording.forces) if axis in axes]
     return tuple(tuple(noise[i][j] for j in fitted) for i in fitted)
 
@@ -157,6 +157,6 @@ def _fraction(percent: float | None, nothing: Any) -> Any:
 
 
 def _named(series: Mapping[Quantity, Array], *, exact: bool = False) -> f.ByQuantity:
-    """Each series as a list, rounded unless ``exact``; series that contain infinity or NaN are omitted."""
+    """Return each series as a list, rounded unless ``exact``; series that contain infinity or NaN are omitted."""
     plain = (lambda values: values.tolist()) if exact else rounded
     return {name: plain(values) for name, values in series.items() if np.isfinite(values).all()}

@@ -1,4 +1,4 @@
-"""Answers about loads, from the simulator; the phase of the beat is that of the tracks."""
+"""Converts simulated loads to JSON answers. Phase 0: the reference markers cross the horizontal on the upstroke."""
 
 from __future__ import annotations
 
@@ -26,20 +26,20 @@ SIDE = np.array([0.0, 1.0, 0.0])
 
 
 def wanted(requested: bool | Iterable[OutputName]) -> tuple[OutputName, ...]:
-    """Names of the outputs that a request asks for: True means all, False none."""
+    """Return the names of the outputs that a request selects: True means all of them, False none."""
     if isinstance(requested, bool):
         return OUTPUT_NAMES if requested else ()
     return tuple(dict.fromkeys(requested))
 
 
 def condition(recorded: Condition, changes: ConditionIn) -> Condition:
-    """The recorded condition with the changes of a request, in SI."""
+    """Return the ``recorded`` condition with the ``changes`` of a request, in SI units."""
     return replace(recorded, **in_si(changes.model_dump(exclude_none=True)))
 
 
 @one_blas_thread
 def outputs(found: Outputs, names: Iterable[OutputName]) -> answers.Outputs:
-    """The outputs called ``names`` of a simulated beat as the JSON answer."""
+    """Return the outputs called ``names`` of ``found``, one simulated beat, as the JSON answer, ordered by phase."""
     phase = (found.phase - found.crossing) % 1.0
     order = np.argsort(phase)
     phases = {"phase": phase, "drive_phase": found.phase}
@@ -71,7 +71,7 @@ def _air(found: Outputs, put: Put) -> OutputGroups:
 
 
 def _aerodynamic(found: Outputs, force: Array) -> tuple[Array, Array, Array]:
-    """Lift, thrust and side component, [n] each, of ``force`` [n, 3]."""
+    """Return lift, thrust and side component, [n] each (n instants), of the ``force`` [n, 3] of the air."""
     return force @ found.lift_axis, force @ found.thrust_axis, force @ SIDE
 
 

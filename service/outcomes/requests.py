@@ -47,7 +47,7 @@ class ConditionIn(BaseModel):
 
 
 class WingIn(BaseModel):
-    """The simulation of a wing; genes not named keep their nominal value."""
+    """Settings of a simulation of a wing; genes that are not named keep their nominal value."""
 
     model_config = ConfigDict(extra="forbid")
 
@@ -67,7 +67,7 @@ class SimulationIn(VehicleModel, WingIn):
 
 
 class LoadsIn(WingIn):
-    """A simulation for its loads alone, under the recording's condition or one that differs from it."""
+    """A simulation of the loads alone, in the recording's condition or one that differs from it."""
 
     model_config = ConfigDict(
         json_schema_extra={"examples": [_EXAMPLE | {"condition": {"flap_frequency_hz": 5.0, "airspeed_m_s": 4.0}}]}

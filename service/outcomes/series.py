@@ -1,4 +1,4 @@
-"""Series in answers, rounded to significant digits."""
+"""Rounds series of numbers in JSON answers to significant digits."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ MOST_PLACES = 300  # a larger power of 10 is not a float
 
 
 def rounded(series: npt.NDArray[np.float64]) -> list[Any]:
-    """``series`` as nested lists, rounded to the decimal place that gives its largest magnitude DIGITS digits."""
+    """Return ``series`` as nested lists, rounded so that its largest number has DIGITS significant digits."""
     largest = float(np.abs(series).max())
     places = DIGITS - math.ceil(math.log10(largest)) if largest > 0 else 0
     return list((np.round(series, min(places, MOST_PLACES)) + 0.0).tolist())

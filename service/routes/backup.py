@@ -1,4 +1,4 @@
-"""Download of a backup while the service runs."""
+"""Route that returns a backup (a copy of the database) while the service runs."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ PIECE = 2**20
 
 
 async def _copy(request: Request, service: ServiceDep) -> AsyncIterator[BinaryIO]:
-    """A copy of the database, one at a time, which is removed when the request ends."""
+    """Yield a copy of the database, opened for reading; one at a time, and removed when the request ends."""
     async with service.backups.slot():
         if await request.is_disconnected():
             raise ProblemError(503, "busy", "the client of this backup is gone")

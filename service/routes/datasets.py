@@ -1,4 +1,4 @@
-"""Upload, list, fetch and delete datasets."""
+"""Routes that upload, list, fetch and delete datasets."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def list_datasets(service: ServiceDep, limit: http.Limit = 50, cursor: http.Curs
 
 @router.get("/{dataset_id}", response_model=a.Dataset, responses=http.errors(404), summary="Fetch a dataset")
 def fetch(service: ServiceDep, dataset_id: str, if_none_match: http.IfNoneMatch = None) -> Response:
-    """Describe one dataset."""
+    """Return the description of one dataset: its recordings, and the conditions under which they were made."""
     with service.database.read() as session:
         row = store.one(session, DatasetRow, dataset_id)
     return http.tagged(views.dataset(row), if_none_match)
@@ -104,7 +104,7 @@ def fetch(service: ServiceDep, dataset_id: str, if_none_match: http.IfNoneMatch 
     dependencies=[DOWNLOAD_SLOT],
 )
 def fetch_archive(service: ServiceDep, dataset_id: str, if_none_match: http.IfNoneMatch = None) -> Response:
-    """Return the bytes that were uploaded."""
+    """Return the uploaded file, byte for byte."""
     with service.database.read() as session:
         row = store.one(session, DatasetRow, dataset_id)
         tag = f'"{row.sha256}"'
@@ -119,7 +119,7 @@ def fetch_archive(service: ServiceDep, dataset_id: str, if_none_match: http.IfNo
 
 
 async def _pieces(database: Database, dataset_id: str, size: int) -> AsyncIterator[bytes]:
-    """Yield the archive in pieces; each is a separate read, because a long read makes the database's log file grow."""
+    """Yield the uploaded file in pieces; each is a separate read, because a long read makes the database's log grow."""
 
     def piece(start: int) -> bytes:
         with database.look() as connection:
@@ -131,7 +131,7 @@ async def _pieces(database: Database, dataset_id: str, size: int) -> AsyncIterat
 
 @router.delete("/{dataset_id}", status_code=204, responses=http.errors(404, 409), summary="Delete a dataset")
 def delete(service: ServiceDep, dataset_id: str) -> None:
-    """Delete a dataset that no run refers to."""
+    """Delete a dataset that no run or diagnosis refers to."""
     with service.database.write() as session:
         service.datasets.delete(session, dataset_id)
 

@@ -1,4 +1,4 @@
-"""Submit, list, fetch, watch, cancel and delete diagnoses; their findings and reports."""
+"""Routes that submit, list, fetch, watch, cancel and delete diagnoses, and return their findings and reports."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ def list_diagnoses(
     dependencies=[DOWNLOAD_SLOT],
 )
 def finding(service: ServiceDep, diagnosis_id: str, if_none_match: http.IfNoneMatch = None) -> Response:
-    """Return the finding of a diagnosis; see /v1/schemas/finding."""
+    """Return the finding (result) of a diagnosis that has succeeded; see /v1/schemas/finding."""
     return http.marked(json.dumps(finding_of(service, diagnosis_id)).encode(), http.JSON, if_none_match)
 
 
@@ -106,13 +106,13 @@ def finding(service: ServiceDep, diagnosis_id: str, if_none_match: http.IfNoneMa
     dependencies=[DOWNLOAD_SLOT],
 )
 def report(service: ServiceDep, diagnosis_id: str, if_none_match: http.IfNoneMatch = None) -> Response:
-    """Return the report: one HTML file without external resources."""
+    """Return the report on a diagnosis that has succeeded: one HTML file without external resources."""
     text = service.diagnoser.html(finding_of(service, diagnosis_id))
     return http.marked(text.encode(), "text/html", if_none_match, REPORT_HEADERS)
 
 
 def _run(service: Service, run_id: str | None) -> RunRow | None:
-    """The run that a body names, or a 422."""
+    """Return the run that the request names, None if it names none; raise a 422 if there is no such run."""
     if run_id is None:
         return None
     try:
@@ -134,7 +134,7 @@ def _dataset_id(body: DiagnosisIn, run: RunRow | None) -> str:
 
 
 def _genome(run: RunRow | None) -> dict[str, float]:
-    """The best genome of the run, or a 409 while it has none."""
+    """Return the best genome of ``run`` (empty if ``run`` is None); raise a 409 if the run has none yet."""
     if run is None:
         return {}
     if run.genome is None:
@@ -144,6 +144,6 @@ def _genome(run: RunRow | None) -> dict[str, float]:
 
 
 def finding_of(service: Service, diagnosis_id: str) -> dict[str, Any]:
-    """The finding as JSON; a 404, or a 409 before the diagnosis has succeeded."""
+    """Return the finding of a diagnosis as JSON; raise a 404, or a 409 before the diagnosis has succeeded."""
     with service.database.read() as session:
         return store.finding(session, diagnosis_id)

@@ -1,4 +1,4 @@
-"""The effects that a model can contain."""
+"""Routes that describe the effects (physics that can be added to a model)."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def list_effects() -> answers.Effects:
 
 @router.get("/{name}", responses=http.errors(404), summary="Fetch an effect")
 def fetch(name: str) -> answers.Effect:
-    """Describe one effect."""
+    """Return the description of one effect: its genes, its sources, and what it applies to."""
     if name not in EFFECTS:
         raise not_found("effect", name, f"there are {', '.join(EFFECTS)}")
     return _effect(EFFECTS[name])

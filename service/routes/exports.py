@@ -1,4 +1,4 @@
-"""Runs and diagnoses as files: JSON, CSV, NetCDF."""
+"""Routes that return runs and diagnoses as files: JSON, CSV, NetCDF."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ _RANKING = (
 
 
 def _described(example: str) -> dict[str, Any]:
-    """OpenAPI description of the answers as CSV (with ``example``) and NetCDF."""
+    """Return the OpenAPI description of an answer as CSV (with ``example``) or NetCDF."""
     saved = {"Content-Disposition": {"description": "name to save it under", "schema": {"type": "string"}}}
     return {
         "headers": saved,
@@ -74,7 +74,7 @@ async def export_run(
 
 
 async def _while_awaited(request: Request, make: Callable[[Callable[[], bool]], bytes]) -> bytes:
-    """Run ``make`` in a thread and return its result. Its argument, a function, says whether the client has left."""
+    """Run ``make(gone)`` in a thread and return its result; ``gone()`` says whether the client has hung up."""
     gone = threading.Event()
     making = asyncio.ensure_future(run_in_threadpool(make, gone.is_set))
     while not making.done():
@@ -106,7 +106,7 @@ def export_diagnosis(
     diagnosis_id: str,
     format: FormatQuery = "json",  # noqa: A002
 ) -> Response:
-    """Return a diagnosis that has succeeded as a file: all of it, its ranking, or its maps and misfits."""
+    """Return a diagnosis that has succeeded as a file: all of it, its ranking (CSV), or maps and misfits (NetCDF)."""
     exported, found = run_exports.of(service, DiagnosisRow, diagnosis_id), finding_of(service, diagnosis_id)
     body: str | bytes
     if format == "csv":

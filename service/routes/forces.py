@@ -1,4 +1,4 @@
-"""Results of a run on forces: forces over the beat and predictions; the available models."""
+"""Routes about runs on forces: forces over the beat, predictions, and the available models."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def forces(
         Source | None, Query(description="of the coefficients; default: the run's best for that recording")
     ] = None,
 ) -> Response:
-    """Return modelled beside recorded forces over the beat, and their spectra, of one recording."""
+    """Return the recorded and the modelled forces over the beat, and their spectra, of one recording."""
     row = run_row(service, run_id)
     if row.kind != "forces":
         raise conflict(f"run {run_id} is on tracks; /v1/runs/{run_id}/comparison has them")
@@ -63,7 +63,7 @@ def forces(
     dependencies=[SIMULATION_SLOT],
 )
 def predict(service: ServiceDep, run_id: str, body: PredictionIn) -> Response:
-    """Return the forces over a beat that the run's global model predicts; nothing is stored."""
+    """Return the forces over a beat that the run's global model predicts for a condition; nothing is stored."""
     row = run_row(service, run_id)
     law = coefficient_source.law(row, dataset := service.datasets.get(row.dataset_id))
     with simulating():

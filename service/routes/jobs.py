@@ -1,4 +1,4 @@
-"""The calls that runs and diagnoses share: submit, fetch, watch, cancel, delete."""
+"""Routes that runs and diagnoses share: fetch, watch, cancel, delete; and how their jobs are submitted."""
 
 from __future__ import annotations
 
@@ -27,11 +27,12 @@ Actions = Mapping[str, tuple[jobs.Event, str]]
 def submit_job(
     request: Request, service: Service, kind: JobKind, key: str | None, body: BaseModel, plan: Callable[[], JobRow]
 ) -> Response:
-    """Store the job of a request and queue it; return the answer. A repeated request gets the same answer again.
+    """Store the job that a request describes, queue it, and return the answer. A repeated request gets the same answer.
 
-    Two requests with one Idempotency-Key are equal if they contain the same fields with the same values. A default
-    written out differs from a field left out, because it overrides a run's setting. ``plan`` checks the request and
-    returns a job, not yet stored, with its dataset_id, kind, name and spec.
+    ``kind``: of the job; ``key``: the Idempotency-Key, if any; ``plan`` checks the request ``body`` and returns a job,
+    not yet stored, with its dataset_id, kind, name and spec. Two requests with one key are equal if they contain the
+    same fields with the same values. A default written out differs from a field left out, because it overrides a run's
+    setting.
     """
     again = http.repeat(request, key, body.model_dump_json(exclude_unset=True))
     with service.database.read() as session:
@@ -56,9 +57,11 @@ def submit_job(
 def add_job_routes(
     router: APIRouter, what: str, kind_of: KindOf, answer: type, actions: Actions, step: str, example: str
 ) -> None:
-    """Add the calls on one job of the resource ``what`` to ``router``.
+    """Add the routes of one job of a kind to ``router``: fetch, delete, watch, and one for each of ``actions``.
 
-    ``actions`` are the events that a user can apply, by name, with a description; the job's events are called ``step``.
+    ``what``: name of the resource, e.g. "run"; ``kind_of`` returns its kind of job; ``answer``: type of its JSON
+    answer; ``actions``: event that a user can apply and its description, by name; ``step``: name of the server-sent
+    event that reports a step; ``example``: of a stream of events.
     """
     in_path = Path(alias=f"{what}_id")
     job = f"/{{{what}_id}}"
@@ -119,7 +122,7 @@ def add_job_routes(
 
 
 def load(service: Service, dataset_id: str) -> Dataset:
-    """The dataset that a body names, or a 422."""
+    """Return the dataset that a request names; raise a 422 if there is no such dataset."""
     try:
         return service.datasets.get(dataset_id)
     except ProblemError as problem:

@@ -1,4 +1,4 @@
-"""API keys, and the session of a browser that has one."""
+"""Routes that list, create and revoke API keys, and that store a key in a browser's cookie."""
 
 from __future__ import annotations
 
@@ -46,13 +46,13 @@ def revoke(service: ServiceDep, key_id: str) -> Key:
 
 @router.get("/session", responses=http.errors(), summary="Who is calling")
 def session(service: ServiceDep) -> Session:
-    """Return whether keys are required, and the key of this request."""
+    """Return whether keys are required, and the id, owner and scopes of the key of this request."""
     return _session(service, CALLER.get())
 
 
 @router.post("/session", response_model=Session, responses=http.errors(401), summary="Let a browser in")
 def begin(service: ServiceDep, request: Request, body: SessionIn) -> Response:
-    """Store a key in a cookie that scripts cannot read and other sites cannot send."""
+    """Store a valid key in a cookie that scripts cannot read and other sites cannot send."""
     caller = service.keys.caller(body.key)
     if caller is None:
         raise ProblemError(401, "key", "this is not a key of this server, or one that was revoked")
@@ -65,7 +65,7 @@ def begin(service: ServiceDep, request: Request, body: SessionIn) -> Response:
 
 @router.delete("/session", status_code=204, responses=http.errors(), summary="Forget the key of a browser")
 def end() -> Response:
-    """Delete the cookie; the key stays valid."""
+    """Delete the cookie with the key; the key stays valid."""
     response = Response(status_code=204)
     response.delete_cookie(COOKIE)
     return response

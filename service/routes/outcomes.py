@@ -1,4 +1,4 @@
-"""Results of a run: history, genome, result, tracks, loads; and simulations of a given genome."""
+"""Routes about results of a run (history, genome, result, tracks, loads), and simulations of a given genome."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ async def history(
     after: Annotated[int, Query(ge=0, le=http.LARGEST_INTEGER, description="last sequence that the caller has")] = 0,
     limit: Annotated[int, Query(ge=1, le=http.LARGEST_HISTORY_PAGE)] = http.HISTORY_PAGE,
 ) -> Response:
-    """Return finished generations, ascending; ``next_cursor`` is the next ``after``."""
+    """Return finished generations, ascending; ``next_cursor`` is the value of ``after`` for the next page."""
     return await json_reads.answer(
         lambda: json_reads.history(service.database, run_id, after, limit), short=limit <= http.HISTORY_PAGE
     )
@@ -58,13 +58,13 @@ async def history(
     "/runs/{run_id}/genome", response_model=a.GenomeInfo, responses=http.errors(404, 409), summary="Best genome"
 )
 def genome(service: ServiceDep, run_id: str, if_none_match: http.IfNoneMatch = None) -> Response:
-    """Return the best genome so far, beside the nominal one."""
+    """Return every gene with its nominal value and its value in the best genome so far."""
     return http.tagged(best_genome.standing(service, run_row(service, run_id)), if_none_match)
 
 
 @router.get("/runs/{run_id}/result", response_model=AnyResult, responses=http.errors(404, 409), summary="Result")
 def result(service: ServiceDep, run_id: str, if_none_match: http.IfNoneMatch = None) -> Response:
-    """Return the outcome of a run that has succeeded."""
+    """Return the result of a run that has succeeded."""
     row = run_row(service, run_id)
     if row.result is None:
         raise conflict(_no_result(row), state=row.state)
@@ -84,7 +84,7 @@ def comparison(
     recording: Annotated[str | None, Query(max_length=200, description="default: the first of the dataset")] = None,
     genome: Literal["best", "nominal"] = "best",
 ) -> Response:
-    """Return simulated beside recorded markers over one recording."""
+    """Return the recorded and the simulated positions of the markers over one recording."""
     dataset, spec, wanted, values = _chosen(service, run_id, recording, genome)
     with simulating():
         tracks = service.engine.compare(spec, dataset, values, wanted)
@@ -107,7 +107,7 @@ def loads(
         list[OutputName] | None, Query(max_length=100, description="repeatable; default: all of them")
     ] = None,
 ) -> Response:
-    """Return motor torques, forces, powers and energies over one beat under a recording's condition."""
+    """Return torques, forces, powers and energies over one beat, simulated in the condition of a recording."""
     dataset, spec, wanted, values = _chosen(service, run_id, recording, genome)
     with simulating():
         found = service.engine.loads(spec, dataset, values, dataset.recording(wanted))
@@ -122,7 +122,7 @@ def loads(
     dependencies=[SIMULATION_SLOT],
 )
 def simulate(service: ServiceDep, body: SimulationIn) -> Response:
-    """Simulate a recording's condition with the genome of the request; nothing is stored."""
+    """Simulate the condition of a recording with the genome of the request; nothing is stored."""
     dataset = load(service, body.dataset_id)
     check_recording(dataset, body.recording, "body.recording")
     spec_views.refuse_foreign(body, dataset)
@@ -143,7 +143,7 @@ def simulate(service: ServiceDep, body: SimulationIn) -> Response:
     dependencies=[SIMULATION_SLOT],
 )
 def loads_under(service: ServiceDep, body: LoadsIn) -> Response:
-    """Simulate a genome of the caller's for its loads, under any condition; nothing is stored."""
+    """Simulate the loads of a wing with the genome and in the condition of the request; nothing is stored."""
     dataset = load(service, body.dataset_id)
     check_recording(dataset, body.recording, "body.recording")
     if dataset.kind != "tracks":
@@ -182,7 +182,7 @@ def _forces(
 
 
 def _genome_of(service: Service, dataset: Dataset, spec: CalibrationSpec, body: WingIn) -> dict[str, float]:
-    """The full genome of a simulation, or a 422."""
+    """Return the nominal genome with the genes of the request ``body``; raise a 422 if they do not fit the model."""
     known = gene_names(service.engine, spec, dataset)
     faults = spec_views.unknown_genes((("body.genome", name) for name in body.genome), known)
     if faults:
@@ -196,7 +196,10 @@ def _genome_of(service: Service, dataset: Dataset, spec: CalibrationSpec, body: 
 def _chosen(
     service: Service, run_id: str, recording: str | None, genome: Literal["best", "nominal"]
 ) -> tuple[Dataset, CalibrationSpec, str, dict[str, float]]:
-    """The dataset, specification, recording and genome of a simulation of a run."""
+    """Return the dataset, specification, recording name and genome with which to simulate a run.
+
+    ``recording`` None: the first of the dataset. Raises a 409 for a run on forces, a 422 for an unknown recording.
+    """
     row = run_row(service, run_id)
     if row.kind != "tracks":
         raise conflict(f"run {run_id} is on forces; /v1/runs/{run_id}/forces has them")
@@ -208,7 +211,7 @@ def _chosen(
 
 
 def run_row(service: Service, run_id: str) -> RunRow:
-    """The run, or a 404."""
+    """Return the database row of the run; raise a 404 if there is none."""
     with service.database.read() as session:
         return store.one(session, RunRow, run_id)
 
@@ -220,7 +223,7 @@ def _no_result(row: RunRow) -> str:
 
 
 def check_recording(dataset: Dataset, name: str, where: str) -> None:
-    """A 422 for a recording that the dataset does not have."""
+    """Raise a 422 if the dataset has no recording ``name``; ``where``: its place in the request, for the message."""
     known = [recording.name for recording in dataset.recordings]
     if name not in known:
         raise invalid("unknown recording", [error_item(where, name, f"unknown; known are {', '.join(known)}")])
@@ -228,7 +231,7 @@ def check_recording(dataset: Dataset, name: str, where: str) -> None:
 
 @contextmanager
 def simulating() -> Iterator[None]:
-    """A 409 with a remedy for a simulation that fails (ValueError) within the block."""
+    """Turn a ValueError within the block, a failed simulation, into a 409 that says what to do."""
     try:
         yield
     except ValueError as error:

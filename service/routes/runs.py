@@ -1,4 +1,4 @@
-"""Submit, list, fetch, control and delete runs."""
+"""Routes that submit, list, fetch, control and delete runs."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ async def list_runs(
 
 
 def _planned(service: Service, body: RunIn) -> tuple[Dataset, CalibrationSpec]:
-    """The dataset of a request, and its specification with every default filled in; or a 422."""
+    """Return the dataset of a request, and its specification with every default filled in; raise a 422 if invalid."""
     dataset = load(service, body.dataset_id)
     spec_views.refuse_foreign(body, dataset)
     spec_views.refuse_cutoff(body.low_pass_hz, dataset.recordings)

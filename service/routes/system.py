@@ -1,4 +1,4 @@
-"""Health, the schemas of datasets and findings, and a page that shows the API."""
+"""Routes about the service: health, metrics, the schemas of datasets and findings, and a page that shows the API."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ router = APIRouter(tags=["service"])
 
 @router.get("/v1/health", responses=http.errors(), summary="Health")
 async def health(service: ServiceDep) -> Health:
-    """Say whether the service is up, and whether it can compute."""
+    """Return whether the service answers, and whether it can compute."""
     return await service.health.now()
 
 
 @router.get("/v1/ready", responses=http.errors(503), summary="Readiness")
 async def ready(service: ServiceDep) -> Health:
-    """Say whether jobs are computed: 200 once the evaluator is ready and the database answers, else 503."""
+    """Return 200 once jobs can be computed (the evaluator is ready and the database answers), else 503."""
     health = await service.health.now()
     if health["status"] != "ok":
         detail = health["detail"] or "the evaluator is starting; jobs are accepted, and wait"
@@ -40,7 +40,7 @@ async def ready(service: ServiceDep) -> Health:
     summary="Metrics",
 )
 async def metrics(service: ServiceDep) -> PlainTextResponse:
-    """Return counters and gauges for Prometheus."""
+    """Return the counters and gauges of the service in the text format of Prometheus."""
     try:
         return PlainTextResponse(await service.metrics_text(), media_type=CONTENT_TYPE_LATEST)
     except TimeoutError:
@@ -57,7 +57,7 @@ def dataset_schema() -> dict[str, Any]:
 
 @router.get("/v1/schemas/finding", responses=http.errors(), summary="Schema of a finding")
 def finding_schema() -> dict[str, Any]:
-    """Return the JSON Schema of what a diagnosis finds."""
+    """Return the JSON Schema of a finding, the result of a diagnosis."""
     from wingfit.report.schema import finding_schema as schema
 
     return schema()
@@ -65,7 +65,7 @@ def finding_schema() -> dict[str, Any]:
 
 @router.get("/docs", include_in_schema=False)
 def docs(request: Request) -> HTMLResponse:
-    """Show the calls of the API. Plain HTML, because the usual viewers load their scripts from elsewhere."""
+    """Show the calls of the API as plain HTML, because the usual viewers load scripts from other sites."""
     specification: dict[str, Any] = request.app.openapi()
     sections = [
         _operation(method, path, operation)

@@ -1,1 +1,1 @@
-"""Calibration runs: specification, computation, schemas, exports."""
+"""Calibration runs: requests, specification, computation, JSON answers, exports."""

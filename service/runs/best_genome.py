@@ -11,14 +11,17 @@ from wingfit.service.storage.tables import RunRow
 
 
 def best(row: RunRow) -> dict[str, float]:
-    """The best genome so far (gene name to value); a 409 before the first generation."""
+    """Return the best genome of a run so far (gene name to value); raise a 409 before the first generation."""
     if row.genome is None:
         raise conflict("no generation has finished yet", state=row.state)
     return row.genome
 
 
 def standing(service: Service, row: RunRow) -> GenomeInfo:
-    """The best genome so far beside the nominal one, as the JSON answer; a 409 before the first generation."""
+    """Return, as the JSON answer, every gene with its nominal value and its value in the best genome so far.
+
+    Values are final, with standard errors, once the run has a result. Raises a 409 before the first generation.
+    """
     if row.result is not None:
         return GenomeInfo(genes=row.result["genes"], final=True)
     genes = service.engine.genes(store.spec(row), service.datasets.get(row.dataset_id), best(row))

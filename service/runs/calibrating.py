@@ -1,4 +1,4 @@
-"""Calibration runs as jobs; an interrupted one continues after its last stored generation."""
+"""Calibration runs as jobs of the runner; an interrupted run continues after its last stored generation."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from wingfit.workers import jobs
 
 
 class Calibrating(JobKind):
-    """The kind of job that is a calibration run: how the runner computes, stores and describes one."""
+    """The calibration run as a kind of job: how the runner computes, stores and describes a run."""
 
     what, path, prefix, step_event = "run", "/v1/runs", "run", "generation"
     table, step_table, step_answer = RunRow, GenerationRow, GenerationEvent
@@ -33,15 +33,15 @@ class Calibrating(JobKind):
         self._database, self._engine, self._datasets = database, engine, datasets
 
     def view(self, row: RunRow) -> Run:
-        """The answer that describes a run."""
+        """Return the JSON answer that describes the run stored in ``row``."""
         return views.run(row)
 
     def begin(self, session: Session, row: RunRow) -> Points:
-        """Return (elapsed s, progress) of the stored generations, after which the run continues."""
+        """Return (elapsed time in s, progress) of the stored generations, after which the run continues."""
         return [(g.elapsed_seconds, g.progress) for g in store.steps(session, GenerationRow, row.id)]
 
     def steps(self, row: RunRow, evaluator: Evaluator) -> Iterator[Step]:
-        """Search generation by generation, then evaluate the result on every recording."""
+        """Yield a step for each generation of the search, then one with the result on every recording."""
         spec, dataset = store.spec(row), self._datasets.get(row.dataset_id)
         with self._database.read() as session:
             checkpoint = store.checkpoint(session, row.id)
@@ -58,7 +58,7 @@ class Calibrating(JobKind):
 
 
 def _step(generation: Generation) -> Step:
-    """The step that stores one generation with its checkpoint and best genome."""
+    """Return the step that stores one generation, with the checkpoint and best genome of the run after it."""
 
     def store_step(session: Session, row: RunRow, eta: float | None) -> None:
         row.stage, row.genome = generation.stage, generation.genome

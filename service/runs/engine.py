@@ -1,4 +1,4 @@
-"""The functions of `wingfit.calibration` that the service calls, in a class that tests replace by a fast stub."""
+"""The functions of `wingfit.calibration` that the service calls, in a class that tests can replace by a fast stub."""
 
 from __future__ import annotations
 
@@ -22,29 +22,33 @@ from wingfit.sim.wing.outputs import Outputs
 
 
 class Engine:
-    """Calibrates the flexible wing on tracks, and the blade-element wing of a vehicle on forces.
+    """Calibrates and simulates the flexible wing (datasets of marker tracks) and vehicles (datasets of forces).
 
-    ValueError says what is wrong with a request.
+    ``spec`` describes model, method and settings; ``genome`` maps names of genes (model parameters) to values. Methods
+    raise a ValueError with a message for the user if a request cannot be fulfilled.
     """
 
     def load(self, data: bytes, filename: str) -> Dataset:
-        """Parse an uploaded zip; DatasetError says where it is malformed."""
+        """Parse ``data``, an uploaded zip called ``filename``; DatasetError says where it is malformed."""
         return load_archive(data, filename)
 
     def check(self, spec: CalibrationSpec, dataset: Dataset) -> CalibrationSpec:
-        """``spec`` with every default filled in; ValueError when it does not fit ``dataset``."""
+        """Return ``spec`` with every default filled in; raise ValueError if it does not fit ``dataset``."""
         return search.prepare(spec, dataset).spec
 
     def gene_names(self, spec: CalibrationSpec, dataset: Dataset) -> tuple[str, ...]:
-        """Genes of the model; ValueError for an impossible division or an unknown term."""
+        """Return the names of the model's genes; ValueError for an impossible discretisation or an unknown term."""
         return tuple(gene.name for gene in search.model_for(dataset, spec).genes)
 
     def genome(self, spec: CalibrationSpec, dataset: Dataset, values: Mapping[str, float]) -> dict[str, float]:
-        """The nominal genome with ``values`` changed; ValueError for a value out of bounds."""
+        """Return the nominal genome with ``values`` (by gene name) changed; ValueError for a value out of bounds."""
         return base_genome(search.model_for(dataset, spec), values).as_dict()
 
     def genes(self, spec: CalibrationSpec, dataset: Dataset, genome: Mapping[str, float]) -> tuple[GeneResult, ...]:
-        """The genes with their values in ``genome`` while the search runs, so without standard errors."""
+        """Return all genes with nominal value, bounds, and their value in ``genome`` as the best value so far.
+
+        Standard errors are None, because they are known only at the end of the search.
+        """
         ready = search.prepare(spec, dataset)
         model, searched = ready.model, ready.searched
         nominal, best = base_genome(model).normalised(), base_genome(model, genome).normalised()
@@ -67,42 +71,45 @@ class Engine:
     def calibrate(
         self, spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, checkpoint: dict[str, Any] | None
     ) -> Iterator[Generation]:
-        """Search stage by stage, from ``checkpoint`` if there is one."""
+        """Search stage by stage and yield each finished generation; continue from ``checkpoint`` unless it is None."""
         return search.calibrate(spec, dataset, evaluator, checkpoint)
 
     def found(self, spec: CalibrationSpec, dataset: Dataset, checkpoint: dict[str, Any]) -> dict[str, dict[str, float]]:
-        """The best genome of each stage so far, by the stage's name."""
+        """Return the best genome of each stage so far (stage name, gene name, value), from ``checkpoint``."""
         return search.found(spec, dataset, checkpoint)
 
     def summarise(
         self, spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, checkpoint: dict[str, Any]
     ) -> Result | ForceResult:
-        """The result of the search with this last ``checkpoint``, on every recording."""
+        """Evaluate the best genome of the search that ended with ``checkpoint`` on all recordings; return results."""
         return summary.summarise(spec, dataset, evaluator, checkpoint)
 
     def compare(
         self, spec: CalibrationSpec, dataset: Dataset, genome: Mapping[str, float], recording: str
     ) -> Comparison:
-        """Simulate one recording's condition with ``genome``; return recorded and simulated tracks."""
+        """Simulate the condition of ``recording`` with ``genome``; return recorded and simulated marker tracks."""
         return result.compare(spec, dataset, genome, recording)
 
     def loads(
         self, spec: CalibrationSpec, dataset: Dataset, genome: Mapping[str, float], recording: Recording
     ) -> Outputs:
-        """Simulate one recording's condition; return forces, torques, powers and energies over one beat."""
+        """Simulate the condition of ``recording`` with ``genome``; return loads, powers and energies over one beat."""
         model = wing_model(dataset, spec)
         return simulate_outputs(model, base_genome(model, genome).values, recording)
 
     def forces(
         self, spec: CalibrationSpec, dataset: Dataset, genome: Mapping[str, float], recording: str, source: Source
     ) -> ForceComparison:
-        """Compute one recording's forces, low-passed like the recording."""
+        """Compute the forces in the condition of ``recording`` with ``genome``, low-passed as in the calibration.
+
+        ``source`` says where the genome comes from; it is only stored in the result.
+        """
         return estimation.compare_forces(spec, dataset, recording, source, genome)
 
     def agreements(
         self, spec: CalibrationSpec, dataset: Dataset, genome: Mapping[str, float], recording: str
     ) -> tuple[Agreement, ...]:
-        """Compute one recording's forces; return their agreement with the recorded ones, one entry per quantity."""
+        """Compute one recording's forces with ``genome``; return how well each quantity agrees with the recording."""
         model, record = vehicle_model(dataset, spec), as_fitted(spec, dataset.recording(recording))
         observed = model.observe([base_genome(model, genome).values], record)
         if observed.reasons[0] is not None:
@@ -110,5 +117,5 @@ class Engine:
         return agreements(record, observed.channels[0], "nominal")
 
     def predict(self, spec: CalibrationSpec, dataset: Dataset, law: GlobalModel, condition: Condition) -> Prediction:
-        """Compute the forces with the coefficients that ``law`` gives."""
+        """Compute the forces in ``condition``, with the coefficients that the global model ``law`` gives for it."""
         return estimation.predict(spec, dataset, law, condition)

@@ -1,6 +1,6 @@
-"""Exports of a run: its history as a table, or all of it as one document.
+"""Exports of a run: its history as a CSV table, or the whole run as one JSON document.
 
-Both are computed while they are sent, ``BLOCK`` generations at a time.
+Both are made piece by piece while they are sent, from ``BLOCK`` generations at a time.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class Exported(Generic[AnyJob]):
     at: str
 
     def heading(self, schema: str) -> Export:
-        """The fields that the exports of runs and of diagnoses share; ``schema`` names the kind of export."""
+        """Return the fields that all exports share; ``schema``: kind of export, e.g. "run-export"."""
         return Export(
             schema_id=f"urn:wingfit:schema:{schema}:1",
             wingfit_version=wingfit_version(),
@@ -50,16 +50,16 @@ class Exported(Generic[AnyJob]):
 
 
 def of(service: Service, table: type[AnyJob], job_id: str) -> Exported[AnyJob]:
-    """The job of ``table`` as it is now, or a 404."""
+    """Return the job of ``table`` with id ``job_id`` and its dataset, as they are now; raise a 404 if there is none."""
     with service.database.read() as session:
         row = store.one(session, table, job_id)
         return Exported(row, store.one(session, DatasetRow, row.dataset_id), store.now())
 
 
 def blocks(database: Database, row: RunRow) -> Iterator[list[GenerationRow]]:
-    """The generations of ``row``, ascending; each block is a separate short read.
+    """Yield the generations of the run ``row``, ascending, in lists of up to ``BLOCK``; each is a separate short read.
 
-    A 404 if the run is deleted meanwhile; the client then sees that the answer is incomplete.
+    Raises a 404 if the run is deleted meanwhile; the client then sees that the answer is incomplete.
     """
     for after in range(0, row.generations, BLOCK):
         with database.read() as session:
@@ -69,7 +69,7 @@ def blocks(database: Database, row: RunRow) -> Iterator[list[GenerationRow]]:
 
 
 def table(database: Database, row: RunRow) -> Iterator[str]:
-    """The history as CSV, one generation per row; the names of columns end in units."""
+    """Yield the history as CSV text, one generation per line; the names of columns with a unit end in the unit."""
     square, misfit = ("m2", "best_mm") if row.kind == "tracks" else ("n2", "best_mn")
     fields = (*COLUMNS, misfit, *MORE_COLUMNS)
     yield csv_text.lines([[f"{name}_{square}" if name in SQUARES else name for name in fields]])
@@ -78,7 +78,10 @@ def table(database: Database, row: RunRow) -> Iterator[str]:
 
 
 def document(service: Service, exported: Exported[RunRow]) -> Iterator[str]:
-    """A RunExport as JSON; the part that needs the dataset is computed at once, the history while it is sent."""
+    """Return the whole run as JSON (a RunExport) in pieces of text.
+
+    The head, which needs the dataset, is computed before this function returns; the history while it is sent.
+    """
     row, run = exported.row, views.run(exported.row)
     without_history = RunExport(
         **exported.heading("run-export"),
@@ -100,7 +103,7 @@ def _filled(database: Database, row: RunRow, head: str) -> Iterator[str]:
 
 
 def request(run: Run) -> dict[str, object]:
-    """The body of POST /v1/runs that repeats a run."""
+    """Return the body of POST /v1/runs that submits the same run again."""
     return {"dataset_id": run["dataset_id"], "name": run["name"], **run["spec"]}
 
 

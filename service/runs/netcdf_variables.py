@@ -1,6 +1,6 @@
-"""NetCDF-4 with CF conventions: every variable has its unit and a description.
+"""Writes NetCDF-4 files by the CF conventions: every variable has a unit and a description.
 
-Files are written in memory: HDF5 aborts the process if a disk is full while it writes.
+Files are written in memory, because HDF5 aborts the process if the disk becomes full while it writes.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ Dimensions = tuple[str, ...]
 
 
 def made(write: Callable[[Any], None], attributes: dict[str, Any]) -> bytes:
-    """The bytes of a NetCDF-4 file with global ``attributes``, whose contents ``write(root group)`` adds."""
+    """Return the bytes of a NetCDF-4 file with global ``attributes``; ``write(root group)`` adds its contents."""
     buffer = io.BytesIO()
     with h5netcdf.File(buffer, "w") as file:
         describe(file, {"Conventions": CONVENTIONS, **attributes})
@@ -35,7 +35,10 @@ def made(write: Callable[[Any], None], attributes: dict[str, Any]) -> bytes:
 
 
 def provenance(row: RunRow | DiagnosisRow, dataset: DatasetRow, model: str, exported_at: str) -> dict[str, Any]:
-    """Attributes that document the origin of a file."""
+    """Return the global attributes that document where the data of a file come from.
+
+    ``model``: what was calibrated, in words; ``exported_at``: RFC 3339 time.
+    """
     version = wingfit_version()
     ended = [f"{row.finished_at} {row.state}"] if row.finished_at else []
     return {
@@ -50,7 +53,7 @@ def provenance(row: RunRow | DiagnosisRow, dataset: DatasetRow, model: str, expo
 
 
 def describe(what: Any, attributes: dict[str, Any]) -> None:
-    """Set attributes of ``what``, a group or a variable."""
+    """Set ``attributes`` (name to value) of ``what``, a group or a variable."""
     for name, value in attributes.items():
         what.attrs[name] = _storable(value) if isinstance(value, str) else value
 
@@ -66,7 +69,11 @@ def numbers(
     kind: str = "f8",
     **attributes: Any,
 ) -> Any:
-    """Add a numeric variable to ``group``; NaN is the fill value of floats. Without ``data`` it is filled later."""
+    """Add a numeric variable to ``group`` and return it; NaN is the fill value of floats.
+
+    ``meaning``: its description; ``data``: its values, None if the caller sets them later; ``kind``: numpy type code;
+    ``attributes``: further attributes of the variable.
+    """
     options: dict[str, Any] = {"fillvalue": np.nan} if kind.startswith("f") else {}
     if dimensions:
         options |= {"compression": "gzip", "shuffle": True}
@@ -77,7 +84,7 @@ def numbers(
 
 
 def flags(group: Any, name: str, dimension: str, meaning: str, data: Iterable[bool | None]) -> None:
-    """Add a variable of flags to ``group``: yes, no, or unknown (None)."""
+    """Add a variable of flags to ``group``: yes, no, or unknown (None); ``meaning``: its description."""
     values = [FLAGS["unknown"] if one is None else int(one) for one in data]
     variable = numbers(group, name, (dimension,), NO_UNIT, meaning, values, kind="i1")
     stated = {"flag_values": np.array(list(FLAGS.values()), dtype=np.int8), "flag_meanings": " ".join(FLAGS)}
@@ -85,7 +92,7 @@ def flags(group: Any, name: str, dimension: str, meaning: str, data: Iterable[bo
 
 
 def texts(group: Any, name: str, dimension: str, meaning: str, data: Iterable[str] | None = None) -> Any:
-    """Add a variable of strings to ``group``."""
+    """Add a variable of strings to ``group`` and return it; without ``data`` the caller sets its values later."""
     given = None if data is None else text_array(data)
     variable = group.create_variable(name, (dimension,), dtype=h5py.string_dtype(), data=given)
     describe(variable, {"units": NO_UNIT, "long_name": meaning})
@@ -93,12 +100,12 @@ def texts(group: Any, name: str, dimension: str, meaning: str, data: Iterable[st
 
 
 def text_array(data: Iterable[str]) -> npt.NDArray[np.object_]:
-    """Strings as the object array that h5netcdf stores."""
+    """Return the strings as an array of objects, the type that h5netcdf stores."""
     return np.array([_storable(text) for text in data], dtype=object)
 
 
 def or_nan(values: Iterable[float | None]) -> npt.NDArray[np.float64]:
-    """``values`` as an array, with NaN for None."""
+    """Return ``values`` as an array of floats, with NaN for None."""
     return np.array([np.nan if value is None else value for value in values], dtype=np.float64)
 
 

@@ -10,7 +10,7 @@ from wingfit.service.runs.spec_views import unknown_genes
 
 
 def gene_names(engine: Engine, spec: CalibrationSpec, dataset: Dataset) -> tuple[str, ...]:
-    """Genes of the requested model, or a 422."""
+    """Return the names of the genes of the requested model; raise a 422 if there is no such model for ``dataset``."""
     try:
         return engine.gene_names(spec, dataset)
     except EstimateError as error:
@@ -23,7 +23,7 @@ def gene_names(engine: Engine, spec: CalibrationSpec, dataset: Dataset) -> tuple
 
 
 def refuse_unknown(spec: CalibrationSpec, dataset: Dataset, known_genes: tuple[str, ...]) -> None:
-    """A 422 for recordings that the dataset does not have, and for genes that the model does not have."""
+    """Raise a 422 for recordings that the dataset does not have, and genes not in ``known_genes``, the model's."""
     genes = [(f"body.genes.{place}", name) for place, name in enumerate(spec.genes)]
     genes += [(f"body.fixed.{name}", name) for name in spec.fixed]
     recordings = tuple(recording.name for recording in dataset.recordings)
@@ -32,7 +32,10 @@ def refuse_unknown(spec: CalibrationSpec, dataset: Dataset, known_genes: tuple[s
 
 
 def _unknown_recordings(names: tuple[str, ...], known: tuple[str, ...]) -> list[ErrorItem]:
-    """An error item per name that is not in ``known`` (the dataset's recordings); only the first lists ``known``."""
+    """Return an error item for each of the requested ``names`` that is not in ``known``, the dataset's recordings.
+
+    Only the first item lists the known names.
+    """
     unknown = [(place, name) for place, name in enumerate(names) if name not in known]
     remedies = [f"known are {', '.join(known)}", *["see those named above"] * len(unknown)]
     return [

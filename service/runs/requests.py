@@ -82,7 +82,7 @@ Accuracy = Annotated[
 
 
 def once(names: list[AnyName]) -> list[AnyName]:
-    """``names`` unchanged; ValueError if one of them occurs twice."""
+    """Return ``names`` unchanged; raise a validation error if one of them occurs twice."""
     for name in names:
         if names.count(name) > 1:
             raise PydanticCustomError("repeated", "must name each once; {name} is there twice", {"name": name})
@@ -107,7 +107,7 @@ Effects = Annotated[
 
 
 class VehicleModel(BaseModel):
-    """The model of a vehicle, and how recorded forces are filtered; none of it applies to a wing."""
+    """Settings for the model of a vehicle, and the filter of its recorded forces; a wing has none of these settings."""
 
     preset: Annotated[Preset, Field(description="vehicles only: blade-element model, see /v1/models")] = "proposed"
     without: Annotated[list[Name], Field(max_length=100, description="vehicles only: terms to leave out")] = []
@@ -121,7 +121,7 @@ class VehicleModel(BaseModel):
 
 
 class JobSettings(VehicleModel):
-    """The settings that runs and diagnoses share; see `wingfit.calibration.spec.CalibrationSpec`."""
+    """Settings that runs and diagnoses share; see `wingfit.calibration.spec.CalibrationSpec`."""
 
     division: Division = "11"
     seed: Annotated[Whole, Field(ge=0, le=LARGEST_SEED)] = 1

@@ -1,9 +1,9 @@
-"""A run as NetCDF: its history and genome, and every recording beside its simulation with the best genome.
+"""A run as NetCDF: its history, its genes, and every recording together with its simulation with the best genome.
 
-Layout: at the root the history along ``generation`` and the genes along ``gene``; a group ``recordings/<name>`` with
-tracks along ``time, marker, axis``, or forces along ``quantity, phase``, the modelled ones also along ``source``.
-Numbers and names are those of the API. The file is made in memory: some hundreds of bytes a generation, and the dataset
-twice, a recording at a time.
+Layout: the root group has the history (dimension ``generation``) and the genes (dimension ``gene``); each group
+``recordings/<name>`` has marker tracks (``time, marker, axis``) or forces (``quantity, phase``; modelled forces also
+``source``: where the coefficients come from). Numbers and names are those of the API. The file is made in memory, one
+recording at a time; it takes some hundred bytes per generation and twice the size of the dataset.
 """
 
 from __future__ import annotations
@@ -43,7 +43,10 @@ GENE_NUMBERS = (
 
 
 def file(service: Service, exported: Exported[RunRow], genome: GenomeInfo, gone: Callable[[], bool]) -> bytes:
-    """The file; a 503 before the next recording once the client is ``gone``."""
+    """Return the bytes of the NetCDF file; ``genome``: the genes as in the JSON answer.
+
+    ``gone()`` says whether the client has hung up; the next recording is then not simulated, and a 503 raised.
+    """
     dataset = service.datasets.get(exported.row.dataset_id)
 
     def write(root: Any) -> None:
@@ -164,7 +167,7 @@ def _forces(
 
 
 def _beats(group: Any, beats: dict[str, Forces]) -> None:
-    """Write recorded and modelled forces of one recording; ``beats`` maps each source of coefficients to its forces."""
+    """Write the recorded and modelled forces of one recording; ``beats``: forces by source of their coefficients."""
     first = next(iter(beats.values()))
     quantities, phase = tuple(first["recorded_n"]), first["phase"]
     group.dimensions = {"source": len(beats), "quantity": len(quantities), "phase": len(phase)}

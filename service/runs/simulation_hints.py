@@ -1,4 +1,4 @@
-"""Remedies for failed simulations, added to the messages of the simulator."""
+"""What a user can do about a failed simulation, added to the simulator's error message."""
 
 from __future__ import annotations
 
@@ -22,6 +22,6 @@ REMEDIES = (
 
 
 def with_remedy(reason: str) -> str:
-    """``reason`` followed by its remedy, if there is one."""
+    """Return ``reason``, an error message of the simulator, followed by what the user can do about it, if known."""
     remedy = next((remedy for words, remedy in REMEDIES if words in reason), None)
     return f"{reason}. Remedy: {remedy}" if remedy else reason

@@ -1,4 +1,4 @@
-"""Settings of a run that apply only to one kind of dataset, or only to a search."""
+"""Names of settings of a run that apply only to one kind of dataset, or only to the genetic search and CMA-ES."""
 
 from __future__ import annotations
 

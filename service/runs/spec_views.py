@@ -1,4 +1,4 @@
-"""Specifications of calibrations from requests and in answers; refusal of settings that do not fit the dataset."""
+"""Converts requests to specifications of calibrations, and these to JSON; refuses settings that do not fit the data."""
 
 from __future__ import annotations
 
@@ -32,12 +32,15 @@ LONGEST_NAME = 200
 
 
 def run_settings(spec: CalibrationSpec) -> RunSpec:
-    """The settings of a run as JSON answers contain them (units of the API)."""
+    """Return the settings of a run as the JSON answers contain them, in the API's units."""
     return answer(RunSpec, spec, accuracy_mm=tidy_mm(spec.accuracy))
 
 
 def calibration_spec(body: BaseModel, base: CalibrationSpec | None = None) -> CalibrationSpec:
-    """The specification that a request gives; fields that it does not give are those of ``base``, or the defaults."""
+    """Return the specification that the request ``body`` describes.
+
+    Fields that the request does not contain are those of ``base``, or the defaults if ``base`` is None.
+    """
     given = in_si({name: getattr(body, name) for name in body.model_fields_set})
     changes: dict[str, Any] = {
         name: tuple(value) if isinstance(value, list) else value for name, value in given.items() if name in SPEC_FIELDS
@@ -46,12 +49,12 @@ def calibration_spec(body: BaseModel, base: CalibrationSpec | None = None) -> Ca
 
 
 def simulation_spec(body: WingIn) -> CalibrationSpec:
-    """The model that a request for a simulation gives."""
+    """Return the specification of the model in ``body``, a request for a simulation, with the widest gene bounds."""
     return replace(calibration_spec(body), bounds_factor=WIDEST_BOUNDS)
 
 
 def refuse_cutoff(low_pass_hz: float | None, recordings: Iterable[Recording]) -> None:
-    """A 422 for a low-pass below the flap frequency."""
+    """Raise a 422 if the low-pass cut-off is below the flap frequency of a recording (None, 0: none to check)."""
     for recording in recordings:
         flap = recording.condition.flap_frequency
         if low_pass_hz and low_pass_hz < flap:
@@ -63,8 +66,9 @@ def refuse_cutoff(low_pass_hz: float | None, recordings: Iterable[Recording]) ->
 
 
 def refuse_effects(names: Sequence[str], dataset: Dataset, vehicle: VehicleModel | None = None) -> None:
-    """A 422 for effects that are unknown, named twice, not applicable to the dataset, or already terms of the model.
+    """Raise a 422 for effects that are unknown, repeated, not applicable to the dataset, or already in the model.
 
+    ``names``: the requested effects; ``vehicle``: the requested model of a vehicle, whose terms may include an effect.
     Only the first fault lists the known effects.
     """
     faults, listed = [], set[str]()
@@ -82,7 +86,10 @@ def refuse_effects(names: Sequence[str], dataset: Dataset, vehicle: VehicleModel
 
 
 def unknown_genes(named: Iterable[tuple[str, str]], known: Sequence[str]) -> list[ErrorItem]:
-    """An error item per gene in ``named`` (place in request, name) that is not ``known``; the first lists ``known``."""
+    """Return an error item for each gene in ``named`` that is not in ``known``, the names of the model's genes.
+
+    ``named``: (place in the request, gene name). Only the first item lists the known genes.
+    """
     faults, remedy = [], f"known are {', '.join(known)}"
     for where, name in named:
         if name in known:
@@ -100,7 +107,10 @@ def unknown_genes(named: Iterable[tuple[str, str]], known: Sequence[str]) -> lis
 
 
 def refuse_foreign(body: BaseModel, dataset: Dataset) -> None:
-    """A 422 for settings of a wing in a request about a vehicle, or the reverse, unless they have their default."""
+    """Raise a 422 for settings that apply only to vehicles in a request about a wing, and the reverse.
+
+    Settings that have their default value are ignored.
+    """
     what, names = ("wing", VEHICLE_ONLY) if dataset.kind == "tracks" else ("vehicle", WING_ONLY)
     message = f"means nothing for a {what}, which the dataset describes; leave it out"
     if faults := _given(body, names, message):
@@ -108,7 +118,10 @@ def refuse_foreign(body: BaseModel, dataset: Dataset) -> None:
 
 
 def refuse_idle(body: RunIn, method: str | None) -> None:
-    """A 422 for settings of a search in a request for Gauss-Newton, unless they have their default."""
+    """Raise a 422 for settings that apply only to a population search, if ``method`` is Gauss-Newton.
+
+    Settings that have their default value are ignored.
+    """
     if method != "gauss_newton":
         return
     message = (
@@ -119,7 +132,7 @@ def refuse_idle(body: RunIn, method: str | None) -> None:
 
 
 def run_name(dataset: Dataset, spec: CalibrationSpec) -> str:
-    """Default name of a run, made of the settings in which runs on the same dataset usually differ."""
+    """Return the default name of a run, made of the settings in which runs on the same dataset usually differ."""
     unusual = spec.method not in (None, USUAL[dataset.kind])
     method = METHODS.get(spec.method or "", spec.method) if unusual else None
     if spec.finish:
@@ -129,7 +142,7 @@ def run_name(dataset: Dataset, spec: CalibrationSpec) -> str:
 
 
 def model_name(dataset: Dataset, spec: CalibrationSpec) -> str:
-    """The model, for names of runs and diagnoses."""
+    """Return the model in words for names of runs and diagnoses, e.g. "division 11 with hinge_offset"."""
     model = f"division {spec.division}" if dataset.kind == "tracks" else spec.preset
     if spec.without:
         model += f" without {', '.join(spec.without)}"
@@ -139,7 +152,10 @@ def model_name(dataset: Dataset, spec: CalibrationSpec) -> str:
 
 
 def _refuse_terms(name: str, dataset: Dataset, vehicle: VehicleModel | None) -> None:
-    """ValueError if the model of a vehicle already has the effect as a term, or the effect does not apply to it."""
+    """Raise ValueError if the vehicle's model already has effect ``name`` as a term or the effect does not fit it.
+
+    Does nothing for a wing.
+    """
     if vehicle is None or dataset.kind != "forces" or set(vehicle.without) - set(PRESETS[vehicle.preset].terms):
         return  # unknown terms are reported by another check
     terms = terms_of(vehicle.preset, tuple(vehicle.without))
@@ -152,7 +168,7 @@ def _refuse_terms(name: str, dataset: Dataset, vehicle: VehicleModel | None) -> 
 
 
 def _given(body: BaseModel, names: Iterable[str], message: str) -> list[ErrorItem]:
-    """An error item with ``message`` for each setting in ``names`` that differs from its default."""
+    """Return an error item with ``message`` for each setting in ``names`` that differs from its default."""
     fields = type(body).model_fields
     given = [name for name in names if name in fields and getattr(body, name) != fields[name].default]
     return [error_item(f"body.{name}", getattr(body, name), message) for name in given]

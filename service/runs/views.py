@@ -1,4 +1,4 @@
-"""Converts database rows and results of calibrations to the API's JSON answers about datasets, runs and tracks."""
+"""Converts database rows and calibration results to the API's JSON answers about datasets, runs and tracks."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ PHASE_DECIMALS = 9
 
 
 def dataset(row: DatasetRow) -> a.Dataset:
-    """The JSON answer that describes a dataset, from its row."""
+    """Return the JSON answer that describes the dataset stored in ``row``."""
     recordings = [BEFORE_FORCES | record for record in row.recordings]
     return checked(a.Dataset, columns(row) | {"recordings": recordings})
 
 
 def recording(record: Recording, held_out: bool) -> a.RecordingInfo:
-    """One recording with its condition."""
+    """Return the JSON answer about one recording and its condition; ``held_out``: used for validation only."""
     tracked = record.kind == "tracks"
     seen = np.isfinite(record.positions).all(axis=2) if tracked else record.valid
     return answer(
@@ -53,39 +53,42 @@ def recording(record: Recording, held_out: bool) -> a.RecordingInfo:
 
 
 def recordings(loaded: Dataset) -> list[a.RecordingInfo]:
-    """All recordings of a dataset, as they are stored in its row."""
+    """Return the JSON descriptions of all recordings of a dataset, as its database row stores them."""
     return [recording(r, r.name in loaded.held_out) for r in loaded.recordings]
 
 
 def run(row: RunRow) -> a.Run:
-    """The JSON answer that describes a run, from its row."""
+    """Return the JSON answer that describes the run stored in ``row``."""
     return run_of(columns(row))
 
 
 def run_of(values: Mapping[str, Any]) -> a.Run:
-    """The JSON answer that describes a run, from ``values``: column name of its row to value."""
+    """Return the JSON answer that describes a run; ``values``: its database row, column name to value."""
     return job_of(a.Run, values, run_settings(store.spec_from(values["spec"])))
 
 
 def job_of(shape: type[T], values: Mapping[str, Any], spec: object) -> T:
-    """The JSON answer ``shape`` about a run or diagnosis, from its row (``values`` by column) and its settings."""
+    """Return the JSON answer about a run or diagnosis, a typed dict ``shape``.
+
+    ``values``: its database row, column name to value; ``spec``: its settings as the answer contains them.
+    """
     action = None if values["wish"] == Wish.NONE else values["wish"]
     return checked(shape, {**values, "pending_action": action, "steps": values["generations"], "spec": spec})
 
 
 def gene(estimated: tracks_result.GeneResult) -> a.GeneInfo:
-    """One gene after the calibration; its relative standard error becomes a percentage."""
+    """Return the JSON answer about one gene after a calibration, with its standard error in its unit and in percent."""
     error = estimated.absolute_error
     return answer(a.GeneInfo, estimated, standard_error=None if error is None else finite(error))
 
 
 def result(outcome: tracks_result.Result) -> a.Result:
-    """The result of a calibration on tracks as the JSON answer."""
+    """Return the JSON answer with the result of a calibration on marker tracks."""
     return answer(a.Result, outcome, kind="tracks", genes=[gene(one) for one in outcome.genes])
 
 
 def comparison(tracks: tracks_result.Comparison) -> Comparison:
-    """Recorded and simulated tracks as the JSON answer (mm)."""
+    """Return recorded and simulated marker tracks as the JSON answer (mm); of long ones every ``stride``-th sample."""
     stride = max(1, -(-tracks.recorded.size // MOST_COORDINATES))
     return {
         "recording": tracks.recording,
@@ -99,7 +102,7 @@ def comparison(tracks: tracks_result.Comparison) -> Comparison:
 
 
 def numerics(tracks: tracks_result.Comparison) -> Numerics:
-    """Time steps, beats and error of a simulation as the JSON answer."""
+    """Return time steps per beat, number of beats and estimated error of a simulation as the JSON answer."""
     return {
         "accuracy_mm": tidy_mm(tracks.accuracy),
         "estimated_error_mm": mm(tracks.solution.error),
@@ -109,25 +112,25 @@ def numerics(tracks: tracks_result.Comparison) -> Numerics:
 
 
 def mean_distance_mm(tracks: tracks_result.Comparison) -> float | None:
-    """Mean distance (mm) over the recorded markers and frames; None where nothing was recorded."""
+    """Return the mean distance (mm) between simulated and recorded markers; None if no marker was recorded."""
     distance = np.linalg.norm(tracks.simulated - tracks.recorded, axis=2)
     seen = np.isfinite(distance)
     return mm(float(distance[seen].mean())) if seen.any() else None
 
 
 def misfit(kind: str, distance: float) -> dict[str, float | None]:
-    """``distance`` as ``best_mm`` of tracks (from m) or as ``best_mn`` of forces (from N); the other is null."""
+    """Return ``distance`` as ``best_mm`` (of tracks, from m) or ``best_mn`` (of forces, from N); the other is None."""
     tracks = kind == "tracks"
     return {"best_mm": mm(distance) if tracks else None, "best_mn": None if tracks else mn(distance)}
 
 
 def track_mm(positions: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    """Positions (m) in mm, rounded as in answers."""
+    """Convert ``positions`` (m) to mm, rounded to the digits that JSON answers contain."""
     return np.round(positions * MM, TRACK_DECIMALS)
 
 
 def tidy_phase(phase: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    """Phases (fraction of the beat), rounded as in answers."""
+    """Round phases (fraction of the beat) to the digits that JSON answers contain."""
     return np.round(phase, PHASE_DECIMALS)
 
 
@@ -138,5 +141,5 @@ def _track(positions: npt.NDArray[np.float64]) -> list[list[list[float | None]]]
 
 
 def columns(row: object) -> dict[str, Any]:
-    """The columns of a database row as a dict: attribute name to value."""
+    """Return the columns of a database row as a dict, attribute name to value."""
     return {column.key: getattr(row, column.key) for column in class_mapper(type(row)).column_attrs}

@@ -1,4 +1,4 @@
-"""Backup and restore: copies of the database, taken while the service runs, and checked."""
+"""Makes backups (checked copies of the database, taken while the service runs), and restores them."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ STAGING = "restore-"
 
 
 class BackupError(RuntimeError):
-    """A backup that cannot be made or restored; the message says why and what to do."""
+    """Raised when a backup cannot be made or restored; the message says why and what to do."""
 
 
 def snapshot(folder: Path) -> Path:
-    """Copy the database in ``folder`` to a new file there, and check it; the caller removes the file.
+    """Copy the database in ``folder`` to a new file there, check it, and return its path; the caller removes the file.
 
-    The copy is one read transaction: later writes are not delayed, and are not in the copy.
+    The copy is the state at one moment: later writes are not delayed, and are not in the copy. BackupError on failure.
     """
     try:
         handle, name = mkstemp(SUFFIX, "copy-", folder)
@@ -54,13 +54,13 @@ def snapshot(folder: Path) -> Path:
 
 
 def forget_snapshots(folder: Path) -> None:
-    """Remove copies that a killed process left in ``folder``."""
+    """Remove the copies of the database in ``folder`` that a killed process did not remove."""
     for left in folder.glob(f"copy-*{SUFFIX}"):
         left.unlink(missing_ok=True)
 
 
 def check(path: Path) -> None:
-    """BackupError unless ``path`` is a complete database of this service."""
+    """Raise BackupError unless the file ``path`` is a complete, undamaged database of this service."""
     with _opened(path, path) as copy:
         versions = copy.execute("SELECT version_num FROM alembic_version").fetchall()
         if len(versions) != 1:
@@ -69,7 +69,7 @@ def check(path: Path) -> None:
 
 
 def restore(backup: Path, folder: Path, *, keep_keys: bool = False) -> Contents:
-    """Restore a backup into a data folder that has no database; BackupError if that is not possible.
+    """Restore the file ``backup`` into the data folder ``folder``, which must hold no database; BackupError on failure.
 
     The backup is not trusted: it must be undamaged, and its schema must be exactly that of wingfit. Its API keys are
     revoked unless ``keep_keys``, because others may have them. Returns the keys that were valid in the backup and the
@@ -95,10 +95,10 @@ def restore(backup: Path, folder: Path, *, keep_keys: bool = False) -> Contents:
 
 
 def _put(backup: Path, target: Path, keep_keys: bool) -> Contents:
-    """Copy ``backup`` to ``target`` if the copy passes all checks.
+    """Copy ``backup`` to the file ``target`` if the copy passes all checks; return its keys and the owners of its data.
 
-    The copy is checked, not the original, which others may change; and in a separate folder, so that an interrupted
-    process leaves no unchecked database where a server would open it.
+    The copy is checked, not the original, which other processes may change; and in a separate folder, so that a crash
+    leaves no unchecked database where a server would open it. ``keep_keys``: whether the API keys stay valid.
     """
     for left in target.parent.glob(f"{STAGING}*"):  # by a process that was killed
         shutil.rmtree(left, ignore_errors=True)
@@ -119,7 +119,10 @@ def _put(backup: Path, target: Path, keep_keys: bool) -> Contents:
 
 
 def _examined(copy: Path, name: Path) -> Contents:
-    """Check a ``copy`` of file ``name``; return its keys and owners. BackupError if it is no database of wingfit."""
+    """Check the file ``copy``; return its keys and the owners of its data. BackupError if it is no database of wingfit.
+
+    ``name``: the original file, which messages name.
+    """
     with _opened(copy, name) as opened:
         try:
             check_schema(opened)  # first: reading a table could run SQL of the schema
@@ -131,7 +134,10 @@ def _examined(copy: Path, name: Path) -> Contents:
 
 @contextmanager
 def _opened(path: Path, name: Path, mode: str = "ro&immutable=1") -> Iterator[sqlite3.Connection]:
-    """Open a database that is not trusted; errors of SQLite become a BackupError about the file ``name``."""
+    """Open the database file ``path``, which is not trusted, read-only unless ``mode`` ("rw") says otherwise.
+
+    Errors of SQLite within the block become a BackupError about ``name``, the file that the user knows.
+    """
     try:
         with closing(sqlite3.connect(f"file:{quote(str(path))}?mode={mode}", uri=True)) as copy:
             copy.text_factory = lambda text: text.decode(errors="replace")
@@ -149,7 +155,7 @@ def _check_pages(copy: sqlite3.Connection, name: Path) -> None:
 
 
 def move(copy: Path, target: Path) -> None:
-    """Move ``copy`` to ``target``, also to another file system; only its owner can read it."""
+    """Move the file ``copy`` to ``target``, also to another file system; only its owner can read it."""
     try:
         copy.replace(target)
     except OSError as error:
@@ -161,7 +167,7 @@ def move(copy: Path, target: Path) -> None:
 
 
 def _copied(backup: Path, target: Path) -> None:
-    """Copy ``backup`` to the new file ``target``; an incomplete copy is removed."""
+    """Copy the file ``backup`` to the new file ``target``; if that fails, remove the incomplete copy."""
     try:
         with backup.open("rb") as source, open_new(target) as into:
             shutil.copyfileobj(source, into)

@@ -1,4 +1,4 @@
-"""The valid API keys in a backup, and the owners of its data."""
+"""Reads which API keys are valid in a backup, and which owners its data have."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ TABLES = ("dataset", "run", "diagnosis")
 
 
 class ContentsError(ValueError):
-    """Keys that wingfit did not make; the message says which."""
+    """Raised for an API key in a backup that wingfit did not make; the message says which."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class BackupKey:
 
 @dataclass(frozen=True)
 class BackupOwner:
-    """Numbers of datasets and jobs of ``owner`` in a backup; owner None: created while no key was required."""
+    """Numbers of datasets, runs and diagnoses of one owner in a backup; owner None: made while no key was required."""
 
     owner: str | None
     datasets: int
@@ -42,19 +42,19 @@ class BackupOwner:
 
 @dataclass(frozen=True)
 class Contents:
-    """The valid API keys in a backup, oldest first, and the owners of its data, sorted by name."""
+    """Keys and owners in a backup: its valid API keys, oldest first, and the owners of its data, sorted by name."""
 
     keys: tuple[BackupKey, ...]
     owners: tuple[BackupOwner, ...]
 
 
 def contents(database: sqlite3.Connection) -> Contents:
-    """Read a database whose schema was checked; ContentsError for a key that wingfit cannot have made."""
+    """Read keys and owners in ``database``, whose schema was checked; ContentsError for a key not made by wingfit."""
     return Contents(tuple(_keys(database)), tuple(_owners(database)))
 
 
 def revoke_keys(database: sqlite3.Connection) -> None:
-    """Revoke all keys."""
+    """Revoke all API keys in ``database``, a backup that is being restored."""
     if _columns(database, "key"):
         database.execute("UPDATE key SET revoked_at = ? WHERE revoked_at IS NULL", (now(),))
 
@@ -101,5 +101,5 @@ def _owners(database: sqlite3.Connection) -> Iterator[BackupOwner]:
 
 
 def _columns(database: sqlite3.Connection, table: str) -> set[str]:
-    """Names of the columns of ``table``; none if the database has no such table."""
+    """Return the names of the columns of ``table``; an empty set if the database has no such table."""
     return {str(name) for (name,) in database.execute("SELECT name FROM pragma_table_info(?)", (table,))}

@@ -1,4 +1,4 @@
-"""Checks that the server can read every dataset, run and diagnosis of a database that is not trusted."""
+"""Checks that the server can read every dataset, run and diagnosis of a restored database, which is not trusted."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ LONGEST_CAUSE = 200
 
 
 class RowError(ValueError):
-    """A row that the server cannot read; the message says which and why."""
+    """Raised for a row that the server cannot read; the message says which row and why."""
 
 
 def check_rows(database: Database) -> None:
-    """Read each row as the server does for lists and at its start; RowError for the first unreadable row."""
+    """Read each row as the server does for its lists and at its start; raise RowError for the first unreadable row."""
     with database.read() as session:
         for table, read in _READERS.items():
             for number in session.scalars(select(table.number).order_by(table.number)).all():

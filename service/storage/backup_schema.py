@@ -1,7 +1,7 @@
-"""Checks that a database that is not trusted has exactly the schema of its version of wingfit.
+"""Checks that a backup, which is not trusted, has exactly the database schema of its version of wingfit.
 
 SQL in a schema (triggers, views, virtual tables, checks, defaults) would run in the server when it uses the tables.
-Therefore every object is compared with that of an empty database of the same version.
+Therefore every table, index, trigger and view is compared with those of an empty database of the same version.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ Objects = dict[tuple[str, str], tuple[str, tuple[str, ...]]]
 
 
 class SchemaError(ValueError):
-    """A schema that wingfit does not make; the message names the difference."""
+    """Raised for a schema that wingfit does not make; the message names the difference."""
 
 
 def check_schema(database: sqlite3.Connection) -> None:
-    """SchemaError unless the schema is exactly that of the version that the database states."""
+    """Raise SchemaError unless the schema is exactly that of the schema version that the database states."""
     rows = database.execute(OBJECTS).fetchall()
     present = _objects(rows)
     if len(present) != len(rows):  # SQLite uses the SQL of each, whatever its name
@@ -62,7 +62,7 @@ def _version(database: sqlite3.Connection) -> str:
 
 @lru_cache
 def _expected(revision: str) -> Objects:
-    """The schema of an empty database of ``revision``."""
+    """Return the tables, indices, triggers and views of an empty database whose schema version is ``revision``."""
     engine = create_engine("sqlite://", poolclass=StaticPool)
     try:
         migrate(engine, revision)
@@ -77,5 +77,5 @@ def _objects(rows: Sequence[Sequence[Any]]) -> Objects:
 
 
 def _normal(sql: str) -> tuple[str, ...]:
-    """The words of ``sql``: without spaces, case, and quotes around names, which depend on how a table was made."""
+    """Split ``sql`` into tokens, names unquoted and in upper case, so that equivalent schemas give equal tokens."""
     return tuple(token if token[0] == "'" else token.strip('"`[]').upper() or token for token in TOKENS.findall(sql))

@@ -27,16 +27,16 @@ def _wall() -> datetime:
 
 
 def _steady() -> float:
-    """Seconds of a monotonic clock, where possible of one that also counts while the system is suspended."""
+    """Return the seconds of a monotonic clock: where possible one that also counts while the computer is suspended."""
     boot = getattr(time, "CLOCK_BOOTTIME", None)
     return time.monotonic() if boot is None else time.clock_gettime(boot)
 
 
 class ServiceClock:
-    """Seconds that one service has run over all its processes; never decreases.
+    """Clock that counts the seconds for which the service has run, over all its processes; never decreases.
 
     It is never ahead of true time, except that each start of a process may add up to one day too much if the wall clock
-    jumped ahead.
+    jumped ahead. ``wall``, ``steady``: functions that return the wall time (UTC), and seconds of a monotonic clock.
     """
 
     def __init__(self, wall: Callable[[], datetime] = _wall, steady: Callable[[], float] = _steady) -> None:
@@ -44,7 +44,7 @@ class ServiceClock:
         self._last: tuple[datetime, float] | None = None
 
     def advance(self, session: Session) -> float:
-        """Advance the clock to now, store its reading, and return it (s)."""
+        """Advance the clock to the present time, store its reading in the database, and return it (s)."""
         wall, steady = self._wall(), self._steady()
         row = session.get(ClockRow, ROW)
         if row is None:
@@ -60,7 +60,10 @@ class ServiceClock:
 
 
 def _elapsed(before: tuple[datetime, float], now: tuple[datetime, float]) -> float:
-    """Seconds between two moments of one process by the steady clock; logs a jump of the wall clock."""
+    """Return the seconds between two moments of one process, by the monotonic clock; log a jump of the wall clock.
+
+    ``before`` and ``now``: (wall time, seconds of the monotonic clock).
+    """
     elapsed = max(now[1] - before[1], 0.0)
     jumped = (now[0] - before[0]).total_seconds() - elapsed
     if abs(jumped) > DAY:
@@ -73,7 +76,10 @@ def _elapsed(before: tuple[datetime, float], now: tuple[datetime, float]) -> flo
 
 
 def _stopped(stored: str, wall: datetime) -> float:
-    """Seconds from the ``stored`` wall time of an earlier process to ``wall``, limited to [0, 1 day]."""
+    """Return the seconds for which no process ran, from ``stored`` to ``wall``, limited to [0, 1 day].
+
+    ``stored``: wall time (RFC 3339) that an earlier process stored last; an unreadable one gives 0.
+    """
     try:
         gap = (wall - datetime.fromisoformat(stored)).total_seconds()
     except (TypeError, ValueError):  # no time, or one without a zone

@@ -39,15 +39,15 @@ READERS = 16
 
 
 class DataFolderError(RuntimeError):
-    """The data folder cannot be used; the message says why and what to do."""
+    """Raised when the data folder cannot be used; the message says why and what to do."""
 
 
 class DatabaseClosedError(RuntimeError):
-    """The service is stopping; unstored steps are computed again after the next start."""
+    """Raised by reads and writes while the service stops; steps not stored are computed again after the next start."""
 
 
 def is_full(error: Exception) -> bool:
-    """Whether a write failed because the disk is full or fails, so that it may succeed later."""
+    """Return whether ``error`` means that the disk is full or had an I/O error, so that a later attempt may succeed."""
     if isinstance(error, OSError):
         return error.errno in FULL
     text = str(getattr(error, "orig", error))
@@ -57,10 +57,10 @@ def is_full(error: Exception) -> bool:
 
 
 class FolderLock:
-    """Locks a data folder for this process.
+    """Lock on a data folder, which only one server process may use at a time; held until :meth:`close`.
 
     A POSIX record lock ends with its process and is not inherited by worker processes. It does not stop the same
-    process from locking twice; a set of locked folders does.
+    process from locking twice, therefore the class attribute ``_held`` lists the files that this process has locked.
     """
 
     _held: ClassVar[set[Path]] = set()
@@ -105,12 +105,12 @@ class FolderLock:
 
 
 class Database:
-    """Read sessions, and the one write session."""
+    """The open database of a data folder. Many sessions can read at a time, only one can write."""
 
     def __init__(self, folder: Path) -> None:
-        """Lock ``folder`` (created if missing), bring its database to the newest schema and open it.
+        """Lock ``folder`` (created if missing), migrate its database to the newest schema and open it.
 
-        Only the user who runs the process can read the folder and the database.
+        Only the user who runs the process can then read the folder. DataFolderError if it cannot be used.
         """
         try:
             make_folder(folder)
@@ -140,7 +140,10 @@ class Database:
 
     @contextmanager
     def write(self) -> Iterator[Session]:
-        """One write transaction at a time; durable when the block has ended. Filtered by owner like :meth:`read`."""
+        """Open a session for one write transaction: stored durably when the block ends, undone if the block raises.
+
+        Only one write runs at a time. Queries return only the rows that the caller may see, as in :meth:`read`.
+        """
         with self._guard:
             if self._closed:
                 raise DatabaseClosedError("the service is stopping")
@@ -154,7 +157,10 @@ class Database:
 
     @contextmanager
     def read(self) -> Iterator[Session]:
-        """One consistent snapshot of the rows that :data:`wingfit.service.auth.access.CALLER` may see."""
+        """Open a session for reading one consistent snapshot of the database.
+
+        Queries return only the rows that :data:`wingfit.service.auth.access.CALLER`, who sent the request, may see.
+        """
         if self._closed:
             raise DatabaseClosedError("the service is stopping")
         with OwnSession(self._readers, expire_on_commit=False) as session:
@@ -162,7 +168,10 @@ class Database:
 
     @contextmanager
     def look(self) -> Iterator[sqlite3.Connection]:
-        """One consistent snapshot of all rows through a plain connection: for reads that must be fast."""
+        """Open a plain SQLite connection for fast reads of one consistent snapshot of the database.
+
+        Queries return the rows of all owners, unless they select the caller's own rows themselves.
+        """
         if self._closed:
             raise DatabaseClosedError("the service is stopping")
         with closing(self._lookers.raw_connection()) as pooled:
@@ -174,9 +183,9 @@ class Database:
                 connection.execute("ROLLBACK")
 
     def close(self, seconds: float = -1) -> bool:
-        """Refuse further reads and writes, finish the current write, unlock the folder.
+        """Refuse further reads and writes; after the current write, close all connections and unlock the folder.
 
-        Returns whether the current write ended within ``seconds`` (negative: no limit); if not, all stays open.
+        Returns whether the current write ended within ``seconds`` (negative: no limit); if not, everything stays open.
         """
         self._closed = True
         if not self._guard.acquire(timeout=seconds):
@@ -194,12 +203,12 @@ class Database:
 
 
 def make_folder(folder: Path) -> None:
-    """Create a data folder, or make it private."""
+    """Create the data folder ``folder``, or remove other users' access to an existing one."""
     private_files.make_folder(folder, FILE_NAME, LOCK_NAME)
 
 
 def _close_to_others(path: Path) -> None:
-    """Let only the owner read the database at ``path`` (created if missing) and its log."""
+    """Let only the owner read the database file at ``path`` (created if missing) and SQLite's files beside it."""
     private_files.make_file(path)
     for name in (f"{path}-wal", f"{path}-shm"):  # SQLite creates them with the permissions of the database
         with suppress(FileNotFoundError):
@@ -207,7 +216,7 @@ def _close_to_others(path: Path) -> None:
 
 
 def revisions() -> list[str]:
-    """The versions of the schema that this wingfit knows, oldest first."""
+    """Return the versions of the database schema that this wingfit knows, e.g. "0003", oldest first."""
     return [script.revision for script in ScriptDirectory.from_config(_migrations()).walk_revisions()][::-1]
 
 
@@ -218,7 +227,7 @@ def _migrations() -> Config:
 
 
 def migrate(engine: Engine, revision: str = "head") -> None:
-    """Migrate the schema to ``revision``."""
+    """Migrate the database schema to ``revision``; DataFolderError if a newer wingfit wrote the database."""
     config = _migrations()
     script = ScriptDirectory.from_config(config)
     with engine.connect() as connection:
@@ -234,7 +243,10 @@ def migrate(engine: Engine, revision: str = "head") -> None:
 
 
 def _engine(url: str, begin: str, pragmas: Sequence[str], **pool: Any) -> Engine:
-    """Connections whose transactions start with the statement ``begin``."""
+    """Create the SQLAlchemy engine for ``url``; each new connection runs the SQLite ``pragmas``.
+
+    ``begin``: the SQL statement that starts each transaction; ``pool``: arguments about the connection pool.
+    """
     engine = create_engine(url, connect_args={"check_same_thread": False, "timeout": BUSY_SECONDS}, **pool)
 
     def prepare(connection: sqlite3.Connection, _record: Any) -> None:

@@ -1,4 +1,4 @@
-"""Messages for operating system errors that mean a full disk: the folder and the remedy."""
+"""Texts of the error messages that name the folder when the server's disk is full, and say what to do."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ REMEDY = "make room there, or set TMPDIR to a folder with room and restart the s
 
 
 def while_spooling(error: BaseException | None) -> str | None:
-    """Message for an error while a request was read; None for errors of another kind.
+    """Return the message for an error that occurred while a request was read; None for errors of another kind.
 
-    The framework writes the large parts of a request to temporary files.
+    The web framework writes large parts of a request to temporary files, which fails if their disk is full.
     """
     if not isinstance(error, OSError):
         return None
@@ -29,7 +29,7 @@ def while_spooling(error: BaseException | None) -> str | None:
 
 
 def anywhere(error: BaseException) -> str | None:
-    """Message for an error anywhere in a request; None unless the disk is full."""
+    """Return the message for an error that occurred anywhere in a request; None unless the disk is full."""
     if not isinstance(error, OSError):
         return None
     if isinstance(error, FileNotFoundError) and "temporary directory" in str(error.strerror):

@@ -1,6 +1,6 @@
-"""Points at which tests can kill the process: WINGFIT_FAIL_POINT=committed:17 kills it after the 17th commit.
+"""Places in the code where tests can kill the process: WINGFIT_FAIL_POINT=committed:17 kills it after the 17th commit.
 
-Without the variable a point costs one comparison.
+If the variable is not set, passing such a place costs one comparison.
 """
 
 from __future__ import annotations
@@ -19,6 +19,6 @@ _LEFT = count(int(COUNT or 1) - 1, -1)  # passes that are still survived; next()
 
 
 def passing(place: Place) -> None:
-    """Count a pass of ``place``; kill the process if WINGFIT_FAIL_POINT names this place and this count."""
+    """Count a pass of ``place``; kill the process if WINGFIT_FAIL_POINT names this place and this number of passes."""
     if place == PLACE and next(_LEFT) <= 0:
         os.kill(os.getpid(), signal.SIGKILL)

@@ -22,12 +22,11 @@ TABLES: tuple[JobTable, ...] = (DiagnosisRow, RunRow)
 
 
 class Housekeeping:
-    """Deletes stored answers and, if configured, jobs that ended long ago: at the start and every hour.
+    """Thread that deletes old data at the start and every hour: stored answers, and jobs that ended long ago.
 
-    Datasets are never deleted.
-
-    The service clock measures how long ago a job ended, from the first pass that found it ended. The wall time of the
-    end is not used, because the wall clock may have been wrong.
+    Jobs are deleted only if ``keep_days`` is not None, datasets never; ``on_deleted`` is called with the id of each
+    job. The service clock (`clock.py`) measures how long ago a job ended, from the first pass that found the job ended.
+    The wall time of the end is not used, because the wall clock may have been wrong.
     """
 
     def __init__(
@@ -47,11 +46,11 @@ class Housekeeping:
         self._thread.start()
 
     def stop(self) -> None:
-        """Delete nothing more."""
+        """Make the thread end before it deletes anything more."""
         self._stop.set()
 
     def tidy(self) -> int:
-        """Delete once; returns the number of deleted jobs."""
+        """Make one pass: delete old answers and, if configured, old jobs; return the number of deleted jobs."""
         with self._database.write() as session:
             store.forget_answers(session)
             now = self._clock.advance(session)
@@ -92,7 +91,7 @@ class Housekeeping:
 
 
 def _note_ends(session: Session, now: float) -> None:
-    """Store the time of the service clock with the jobs that have ended since the last pass."""
+    """Store ``now``, the reading of the service clock (s), with the jobs that have ended since the last pass."""
     for table in TABLES:
         new = table.finished_at.is_not(None), table.ended_at_service_seconds.is_(None)
         session.execute(update(table).where(*new).values(ended_at_service_seconds=now))

@@ -1,4 +1,4 @@
-"""Queries and changes of the database. Functions take the caller's session, so the caller defines the transaction."""
+"""Queries and changes of the database. Functions take the caller's ``session``, so the caller sets the transaction."""
 
 from __future__ import annotations
 
@@ -50,17 +50,17 @@ Step = TypeVar("Step", bound=StepOfJob)
 
 
 def now() -> str:
-    """The present time, RFC 3339 in UTC."""
+    """Return the present time in UTC as RFC 3339 text with microseconds, e.g. 2026-01-31T12:00:00.000000Z."""
     return timestamp(datetime.now(UTC))
 
 
 def timestamp(moment: datetime) -> str:
-    """A time in UTC as it is stored: RFC 3339, which sorts by time."""
+    """Format ``moment`` (in UTC) as it is stored: RFC 3339 text, whose alphabetical order is the order in time."""
     return moment.isoformat(timespec="microseconds").replace("+00:00", "Z")
 
 
 def new_id(prefix: str) -> str:
-    """A random id that cannot be guessed."""
+    """Return a new random id that cannot be guessed: ``prefix`` (e.g. "run"), "_" and 16 hexadecimal digits."""
     return f"{prefix}_{secrets.token_hex(8)}"
 
 
@@ -68,7 +68,7 @@ def new_id(prefix: str) -> str:
 
 
 def one(session: Session, table: type[Row], row_id: str) -> Row:
-    """The row with the id, or a 404."""
+    """Return the row of ``table`` whose id is ``row_id``; raise a 404 if the caller may see no such row."""
     found = session.scalar(select(table).where(table.id == row_id))
     if found is None:
         raise not_found(table.__tablename__, row_id)
@@ -81,7 +81,11 @@ def one(session: Session, table: type[Row], row_id: str) -> Row:
 def page(
     session: Session, table: type[Row], limit: int, cursor: str | None, **equal: str | None
 ) -> tuple[list[Row], str | None]:
-    """Up to ``limit`` rows, newest first, and the cursor to the next ones."""
+    """Return up to ``limit`` rows of ``table``, newest first, and the cursor of the next page (None: no more).
+
+    ``cursor``: where the page begins, as returned with the page before; None: at the newest row. ``equal``: value that
+    a column must have, by column name; columns with the value None are not compared.
+    """
     query = select(table).order_by(table.number.desc()).limit(limit + 1)
     if cursor is not None:
         query = query.where(table.number < number(cursor))
@@ -94,12 +98,12 @@ def page(
 
 
 def cursor_before(number: int) -> str:
-    """The page cursor (opaque text) for the rows created before row ``number``."""
+    """Return the page cursor (text that clients pass back unchanged) for the rows created before row ``number``."""
     return f"{BEFORE}{number}"
 
 
 def number(cursor: str) -> int:
-    """The row number that a cursor encodes; a 422 for an invalid cursor."""
+    """Return the row number in ``cursor``, text made by :func:`cursor_before`; raise a 422 for any other text."""
     if re.fullmatch(rf"{BEFORE}[0-9]{{1,18}}", cursor):
         return int(cursor.removeprefix(BEFORE))
     item = error_item("query.cursor", cursor, "use next_cursor of the last page")
@@ -110,7 +114,7 @@ def number(cursor: str) -> int:
 
 
 def archive(session: Session, dataset_id: str) -> bytes:
-    """The dataset's bytes as uploaded, or a 404."""
+    """Return the bytes of the dataset's file as uploaded; raise a 404 if there is no such dataset."""
     body = session.scalar(select(ArchiveRow.body).where(ArchiveRow.dataset_id == dataset_id))
     if body is None:
         raise not_found("dataset", dataset_id)
@@ -118,23 +122,26 @@ def archive(session: Session, dataset_id: str) -> bytes:
 
 
 def parsed(session: Session, dataset_id: str) -> bytes | None:
-    """The dataset in its parsed form (bytes), or None if that form is not stored."""
+    """Return the dataset in the internal format of `records/files/parsed.py` (bytes), or None if none is stored."""
     return session.scalar(select(ParsedRow.body).where(ParsedRow.dataset_id == dataset_id))
 
 
 def has_parsed(connection: sqlite3.Connection, dataset_id: str) -> bool:
-    """Whether the parsed form of the dataset is stored."""
+    """Return whether the dataset is stored in the internal format of `records/files/parsed.py`."""
     return connection.execute("SELECT 1 FROM parsed WHERE dataset_id = ?", (dataset_id,)).fetchone() is not None
 
 
 def keep_parsed(session: Session, dataset_id: str, body: bytes) -> None:
-    """Store the parsed form of a dataset, unless it was deleted meanwhile."""
+    """Store ``body``, a dataset in the format of `records/files/parsed.py`, unless the dataset was deleted since."""
     if session.scalar(select(ArchiveRow.dataset_id).where(ArchiveRow.dataset_id == dataset_id)):
         session.merge(ParsedRow(dataset_id=dataset_id, body=body))
 
 
 def archive_piece(connection: sqlite3.Connection, dataset_id: str, start: int, size: int) -> bytes:
-    """``size`` bytes of the dataset's archive from ``start``, without reading the rest; a 404 if it is deleted."""
+    """Return ``size`` bytes of the uploaded file from offset ``start``, without reading the rest of the file.
+
+    Raises a 404 if the dataset was deleted.
+    """
     row = connection.execute("SELECT rowid FROM archive WHERE dataset_id = ?", (dataset_id,)).fetchone()
     if row is None:
         raise not_found("dataset", dataset_id)
@@ -144,7 +151,10 @@ def archive_piece(connection: sqlite3.Connection, dataset_id: str, start: int, s
 
 
 def make_room(session: Session, owner: str | None, size: int, most_mb: int) -> None:
-    """A 429 if the archives of an owner and their parsed forms would take more than ``most_mb``."""
+    """Raise a 429 if the stored datasets of ``owner`` and ``size`` further bytes would exceed ``most_mb`` (10^6 bytes).
+
+    Both the uploaded files and their forms in the internal format count. ``owner`` None: datasets without an owner.
+    """
     held = session.scalar(select(func.sum(DatasetRow.size_bytes)).where(_of(DatasetRow, owner))) or 0
     beside = select(func.sum(func.length(ParsedRow.body))).join(DatasetRow, DatasetRow.id == ParsedRow.dataset_id)
     held += session.scalar(beside.where(_of(DatasetRow, owner))) or 0
@@ -158,7 +168,7 @@ def make_room(session: Session, owner: str | None, size: int, most_mb: int) -> N
 
 
 def delete_dataset(session: Session, dataset_id: str) -> None:
-    """Delete a dataset that no run or diagnosis refers to."""
+    """Delete a dataset; raise a 409 while a run or diagnosis refers to it, a 404 if there is no such dataset."""
     row = one(session, DatasetRow, dataset_id)
     for table, what in ((RunRow, "run(s)"), (DiagnosisRow, "diagnosis(es)")):
         count = session.scalar(select(func.count()).where(table.dataset_id == dataset_id)) or 0
@@ -171,7 +181,10 @@ def delete_dataset(session: Session, dataset_id: str) -> None:
 
 
 def delete_job(session: Session, table: type[JobRow], job_id: str) -> None:
-    """Delete a job that has ended, with its steps and results; a 409 for one that has not."""
+    """Delete a job (run or diagnosis) that has ended, with its steps and results.
+
+    Raises a 409 for a job that is queued, running or paused, a 404 if ``table`` has no such job.
+    """
     row = one(session, table, job_id)
     if row.state in ACTIVE:
         raise conflict(f"{table.__tablename__} {row.id} is {row.state}; cancel it first", state=row.state)
@@ -179,18 +192,21 @@ def delete_job(session: Session, table: type[JobRow], job_id: str) -> None:
 
 
 def steps(session: Session, table: type[Step], job_id: str, after: int = 0, limit: int | None = None) -> list[Step]:
-    """Generations of a run, or steps of a diagnosis, after sequence ``after``, ascending."""
+    """Return up to ``limit`` steps (generations of a run, steps of a diagnosis) with sequence numbers above ``after``.
+
+    They are in ascending order; ``limit`` None returns all of them.
+    """
     query = select(table).where(table.job_id == job_id, table.sequence > after)
     return list(session.scalars(query.order_by(table.sequence).limit(limit)))
 
 
 def checkpoint(session: Session, run_id: str) -> dict[str, Any] | None:
-    """The checkpoint from which the run continues, or None at its start."""
+    """Return the stored state of the search, from which the run continues; None before its first generation."""
     return session.scalar(select(CheckpointRow.body).where(CheckpointRow.run_id == run_id))
 
 
 def finding(session: Session, diagnosis_id: str) -> dict[str, Any]:
-    """The finding of a diagnosis as JSON; a 404, or a 409 before it has succeeded."""
+    """Return the finding (result) of a diagnosis as JSON; raise a 404, or a 409 if the diagnosis has not succeeded."""
     row = one(session, DiagnosisRow, diagnosis_id)
     body: dict[str, Any] | None = session.scalar(select(FindingRow.body).where(FindingRow.diagnosis_id == diagnosis_id))
     if body is None:
@@ -200,7 +216,10 @@ def finding(session: Session, diagnosis_id: str) -> dict[str, Any]:
 
 
 def admitted(session: Session, dataset_id: str, most: int) -> str | None:
-    """The owner of a dataset, who will own a job on it; a 429 if ``most`` jobs of that owner have not ended."""
+    """Return the owner of a dataset, who will also own a new job on the dataset; None for a dataset without an owner.
+
+    Raises a 429 if ``most`` jobs of this owner have not ended, a 404 if there is no such dataset.
+    """
     owner = one(session, DatasetRow, dataset_id).owner
     unfinished = (
         select(func.count()).select_from(table).where(table.state.in_(ACTIVE), _of(table, owner))
@@ -218,7 +237,7 @@ def _of(table: type[OwnedRow], owner: str | None) -> ColumnElement[bool]:
 
 
 def jobs_in(session: Session, table: type[JobRow], state: State) -> list[JobRow]:
-    """Jobs in ``state``, oldest first; unreadable rows are logged and skipped."""
+    """Return the jobs of ``table`` in ``state``, oldest first. Rows that cannot be read are logged and skipped."""
     numbers = session.scalars(select(table.number).where(table.state == state.value).order_by(table.number)).all()
     return [row for number in numbers if (row := _readable(session, table, number))]
 
@@ -236,7 +255,7 @@ def _readable(session: Session, table: type[JobRow], number: int) -> JobRow | No
 
 
 def job(row: JobRow) -> Job:
-    """The job of a row; ValueError or TypeError for values that a server cannot have stored."""
+    """Return the job that ``row`` stores; raise ValueError or TypeError for values that the server never stores."""
     starts = row.starts or 0
     numbers: tuple[object, ...] = (row.generations, starts, row.progress)
     times: tuple[object, ...] = (row.created_at, row.started_at, row.finished_at)
@@ -249,7 +268,7 @@ def job(row: JobRow) -> Job:
 
 
 def put_job(row: JobRow, after: Job) -> None:
-    """Store a job in its row, and the times that follow from its state."""
+    """Store ``after``, the job as it is after an event, in ``row``; set the start and end times that follow."""
     row.state, row.wish = after.state.value, after.wish.value
     row.generations, row.progress, row.error, row.starts = after.generations, after.progress, after.error, after.starts
     if after.state is State.RUNNING and row.started_at is None:
@@ -261,17 +280,20 @@ def put_job(row: JobRow, after: Job) -> None:
 
 
 def spec(row: RunRow) -> CalibrationSpec:
-    """The specification of a run from its row."""
+    """Return the specification (model, method and settings) of the run stored in ``row``."""
     return spec_from(row.spec)
 
 
 def spec_from(values: dict[str, Any]) -> CalibrationSpec:
-    """A specification from its JSON form."""
+    """Return the specification of a run from ``values``, its stored JSON; missing fields get their defaults."""
     return _SPEC.validate_python(BEFORE_METHODS | values)
 
 
 def spec_json(given: CalibrationSpec | DiagnosisSpec) -> dict[str, Any]:
-    """The specification of a run or diagnosis as JSON, without the thresholds of a diagnosis: no request sets them."""
+    """Return the specification of a run or diagnosis as JSON to be stored.
+
+    The decision thresholds of a diagnosis (``policy``) are omitted, because no request can set them.
+    """
     plain: dict[str, Any] = json.loads(json.dumps(asdict(given)))
     plain.pop("policy", None)
     return plain
@@ -286,7 +308,11 @@ _MADE: dict[str, type[OwnedRow]] = {"datasets": DatasetRow, "runs": RunRow, "dia
 
 @dataclass(frozen=True)
 class Repeat:
-    """The path and Idempotency-Key of a request, and the hash of its contents."""
+    """Identifies a request, so that its repetition is recognised.
+
+    ``path``: of the request, with the caller's owner if keys are required; ``key``: value of its Idempotency-Key
+    header; ``fingerprint``: SHA-256 of its contents (hexadecimal).
+    """
 
     path: str
     key: str
@@ -295,7 +321,7 @@ class Repeat:
 
 @dataclass(frozen=True)
 class Answer:
-    """The answer to a request that created a resource."""
+    """The HTTP response to a request that created a resource: status, path of the resource, and JSON body."""
 
     status: int
     location: str
@@ -303,9 +329,10 @@ class Answer:
 
 
 def earlier_answer(session: Session, repeat: Repeat | None) -> Answer | None:
-    """The earlier answer to the same request; a 422 if the key was used for another request.
+    """Return the stored answer to an earlier request with the same ``repeat``; None if there is none or no key.
 
-    A 409 if the resource was deleted since: it neither exists nor should a repetition create it again.
+    Raises a 422 if the Idempotency-Key was used for a request with other contents; a 409 if the created resource was
+    deleted since, because a repetition must not create the resource again.
     """
     row = session.get(AnswerRow, (repeat.path, repeat.key)) if repeat else None
     if row is None or repeat is None:
@@ -322,11 +349,11 @@ def earlier_answer(session: Session, repeat: Repeat | None) -> Answer | None:
 
 
 def keep_answer(session: Session, repeat: Repeat | None, answer: Answer) -> None:
-    """Store an answer in the transaction that creates its resource."""
+    """Store ``answer`` in the transaction that creates its resource; does nothing if ``repeat`` is None (no key)."""
     if repeat:
         session.add(AnswerRow(**vars(repeat), **vars(answer), created_at=now()))
 
 
 def forget_answers(session: Session) -> None:
-    """Delete answers that are older than ANSWERS_KEPT."""
+    """Delete answers to repeatable requests that are older than ANSWERS_KEPT."""
     session.execute(delete(AnswerRow).where(AnswerRow.created_at < timestamp(datetime.now(UTC) - ANSWERS_KEPT)))

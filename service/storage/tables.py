@@ -1,4 +1,4 @@
-"""Tables of the database; `service/storage/migrations` creates and changes them."""
+"""Tables of the database as SQLAlchemy classes; the migrations in `service/storage/migrations` create them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ NAMING = {
 
 
 class Table(DeclarativeBase):
-    """Base of all tables. Times are RFC 3339 text in UTC; ``number`` is the order of creation."""
+    """Base of all tables. Times are RFC 3339 text in UTC; ``number`` counts the rows of a table as they are created."""
 
     metadata = MetaData(naming_convention=NAMING)
     type_annotation_map = {dict[str, Any]: JSON, list[dict[str, Any]]: JSON}  # noqa: RUF012  # read by SQLAlchemy
@@ -25,7 +25,11 @@ class Table(DeclarativeBase):
 class OwnedRow:
     """The columns that datasets and jobs share.
 
-    ``owner`` is that of the key that made a dataset, None where no key was required; a job has that of its dataset.
+    Attributes:
+        id: public id, e.g. "run_5c1e07a94bd83f26".
+        owner: of a dataset, the owner of the API key that uploaded it, None if no key was required; of a job, the owner
+            of its dataset.
+        kind: "tracks" (markers of a flexible wing) or "forces" (of a vehicle).
     """
 
     __tablename__: Any
@@ -39,7 +43,10 @@ class OwnedRow:
 
 
 class KeyRow(Table):
-    """An API key. Of its secret only ``sha256`` is stored; revoked keys stay listed."""
+    """An API key; revoked keys stay in the table, with the time ``revoked_at``.
+
+    The secret itself is not stored, only its hash ``sha256``. ``scopes``: what the key permits (read, write, admin).
+    """
 
     __tablename__ = "key"
     __table_args__ = {"sqlite_autoincrement": True}  # noqa: RUF012
@@ -55,7 +62,11 @@ class KeyRow(Table):
 
 
 class DatasetRow(OwnedRow, Table):
-    """The description of an uploaded dataset; ``kind`` is "tracks" or "forces"; its bytes: :class:`ArchiveRow`."""
+    """The description of an uploaded dataset; its bytes are in :class:`ArchiveRow`.
+
+    ``filename``, ``sha256`` and ``size_bytes`` are those of the uploaded file; ``markers`` is the number of markers on
+    the wing (0 for forces); ``recordings`` describes each recording as JSON.
+    """
 
     __tablename__ = "dataset"
 
@@ -68,7 +79,7 @@ class DatasetRow(OwnedRow, Table):
 
 
 class ArchiveRow(Table):
-    """The bytes of a dataset as they were uploaded."""
+    """The uploaded file of a dataset, byte for byte."""
 
     __tablename__ = "archive"
 
@@ -77,7 +88,10 @@ class ArchiveRow(Table):
 
 
 class ParsedRow(Table):
-    """A dataset in the parsed form (`records/files/parsed.py`), if its archive must not be opened again."""
+    """A dataset in the internal format of `records/files/parsed.py`; stored for NetCDF uploads only.
+
+    A damaged NetCDF file can hang its reader, so the uploaded file is opened only once.
+    """
 
     __tablename__ = "parsed"
 
@@ -86,7 +100,7 @@ class ParsedRow(Table):
 
 
 class ClockRow(Table):
-    """The service clock, one row: seconds that the service has run, and the wall time when they were stored."""
+    """The service clock, a single row: seconds that the service has run, and the wall time when they were stored."""
 
     __tablename__ = "clock"
 
@@ -96,9 +110,16 @@ class ClockRow(Table):
 
 
 class JobRow(OwnedRow):
-    """The columns of every job: state, wish, generations, progress, error and starts are those of `workers.jobs.Job`.
+    """The columns that runs and diagnoses share.
 
-    ``ended_at_service_seconds`` is the service clock (s) when the end of the job was first noticed.
+    Attributes:
+        spec: the specification (model, method, settings) as JSON.
+        state, wish, generations, progress, error, starts: those of `workers.jobs.Job`.
+        stage: name of the present stage of the search.
+        eta_seconds: estimated remaining time (s), None if unknown.
+        evaluations: number of simulated individuals so far.
+        elapsed_seconds: computing time up to the last stored step (s).
+        ended_at_service_seconds: reading of the service clock (s) when the end of the job was first noticed.
     """
 
     dataset_id: Mapped[str] = mapped_column(ForeignKey("dataset.id", ondelete="RESTRICT"), index=True)
@@ -119,7 +140,14 @@ class JobRow(OwnedRow):
 
 
 class RunRow(JobRow, Table):
-    """A calibration run."""
+    """A calibration run.
+
+    Attributes:
+        best_mm, best_mn: misfit of the best genome (of the present stage, at the end of the result): mm for tracks, mN
+            for forces.
+        genome: best genome so far, gene name to value; None before the first generation.
+        result: result as JSON; None unless the run has succeeded.
+    """
 
     __tablename__ = "run"
 
@@ -130,7 +158,11 @@ class RunRow(JobRow, Table):
 
 
 class DiagnosisRow(JobRow, Table):
-    """A diagnosis. ``generations`` counts its steps; ``run_id`` is the run it began with, None once deleted."""
+    """A diagnosis; ``generations`` counts its steps.
+
+    ``run_id``: the run whose best genome the diagnosis starts from, None if there is none or the run was deleted.
+    ``verdict`` and ``summary`` come from the finding; None before the diagnosis has succeeded.
+    """
 
     __tablename__ = "diagnosis"
 
@@ -140,7 +172,7 @@ class DiagnosisRow(JobRow, Table):
 
 
 class FindingRow(Table):
-    """The finding of a diagnosis that has succeeded; in its own table, because lists do not need it."""
+    """The finding (result as JSON) of a succeeded diagnosis; not in DiagnosisRow, because lists do not need it."""
 
     __tablename__ = "finding"
 
@@ -149,7 +181,11 @@ class FindingRow(Table):
 
 
 class StepOfJob:
-    """The columns that generations and steps share; ``sequence`` counts from 1 over all stages and restarts."""
+    """The columns that generations of runs and steps of diagnoses share: the progress of the job at that step.
+
+    ``sequence`` counts the steps of a job from 1, over all stages and restarts; ``elapsed_seconds``: computing time so
+    far.
+    """
 
     job_id: Mapped[str]
     sequence: Mapped[int] = mapped_column(primary_key=True)
@@ -161,7 +197,7 @@ class StepOfJob:
 
 
 class StepRow(StepOfJob, Table):
-    """The progress of a diagnosis at some time."""
+    """One step of a diagnosis: its progress at that time."""
 
     __tablename__ = "step"
 
@@ -171,7 +207,7 @@ class StepRow(StepOfJob, Table):
 
 
 class CheckpointRow(Table):
-    """The state of the search after the last stored generation of a run."""
+    """The state of a run's search after its last stored generation, as JSON; the run continues from it."""
 
     __tablename__ = "checkpoint"
 
@@ -180,7 +216,14 @@ class CheckpointRow(Table):
 
 
 class GenerationRow(StepOfJob, Table):
-    """One finished generation of a run."""
+    """One finished generation of a run.
+
+    Attributes:
+        generation: number of the generation within its stage, from 0.
+        best, mean: sum of squares (m^2 or N^2) of the best individual, and its mean over those that did not fail.
+        best_mm, best_mn: misfit of the best individual, of tracks (mm) or of forces (mN); the other is None.
+        failed, reasons: number of individuals whose simulation failed, and why.
+    """
 
     __tablename__ = "generation"
 
@@ -196,7 +239,10 @@ class GenerationRow(StepOfJob, Table):
 
 
 class AnswerRow(Table):
-    """The answer to a request that carried an ``Idempotency-Key``, stored with what the request created."""
+    """The answer to a request that carried an ``Idempotency-Key``, stored with what the request created.
+
+    The columns are those of `store.Repeat` and `store.Answer`, and the time of storing.
+    """
 
     __tablename__ = "answer"
 

@@ -1,1 +1,1 @@
-"""Schema changes, applied at start-up in the order of their revisions."""
+"""Changes of the database schema, made when the server starts, in the order of their revisions."""

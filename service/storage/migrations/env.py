@@ -1,4 +1,4 @@
-"""Runs the migrations on the connection that the service hands over."""
+"""Runs the database migrations (Alembic executes this file), on the connection that `database.migrate` sets."""
 
 from __future__ import annotations
 

@@ -10,7 +10,7 @@ down_revision = None
 
 
 def upgrade() -> None:
-    """Create the tables."""
+    """Create the tables of the first schema."""
     _datasets()
     _runs()
     op.create_table(

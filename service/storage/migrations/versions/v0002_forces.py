@@ -1,4 +1,4 @@
-"""Forces: the kind of a dataset and of a run, and misfits in mN beside those in mm."""
+"""Adds what force recordings need: the kind of a dataset and of a run, and misfits in mN beside those in mm."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Diagnoses: their jobs, progress and findings."""
+"""Adds the tables of diagnoses: the jobs, their progress and findings."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ down_revision = "0002"
 
 
 def upgrade() -> None:
-    """Create the tables."""
+    """Create the tables of diagnoses, findings and steps."""
     op.create_table(
         "diagnosis",
         sa.Column("number", sa.Integer, primary_key=True),
@@ -51,6 +51,6 @@ def upgrade() -> None:
 
 
 def _belonging(table: str, *columns: sa.Column[object]) -> None:
-    """Create a table whose rows are deleted with their diagnosis."""
+    """Create ``table``, with these further ``columns``, whose rows are deleted together with their diagnosis."""
     owner = sa.ForeignKey("diagnosis.id", ondelete="CASCADE")
     op.create_table(table, sa.Column("diagnosis_id", sa.String, owner, primary_key=True), *columns)

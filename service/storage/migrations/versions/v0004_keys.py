@@ -1,4 +1,4 @@
-"""API keys, and the owners of datasets and jobs."""
+"""Adds the table of API keys, and the owners of datasets and jobs."""
 
 from __future__ import annotations
 

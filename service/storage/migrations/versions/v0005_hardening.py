@@ -1,4 +1,4 @@
-"""Number of starts of each job, parsed forms of datasets, and the service clock."""
+"""Adds the number of starts of each job, the internal format of NetCDF datasets, and the service clock."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ JOBS = ("run", "diagnosis")
 
 
 def upgrade() -> None:
-    """Add the columns and tables; existing jobs get zero starts, and no end time of the service clock yet."""
+    """Add the columns and tables; existing jobs get zero starts and no end time of the service clock (NULL) yet."""
     for table in JOBS:
         op.add_column(table, sa.Column("starts", sa.Integer, nullable=False, server_default="0"))
         op.add_column(table, sa.Column("ended_at_service_seconds", sa.Double))
