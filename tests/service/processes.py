@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
+import runpy
 import signal
 import socket
 import subprocess
@@ -19,6 +21,51 @@ from tests.service.conftest import Api
 
 ROOT = Path(__file__).parents[2]
 
+# Importing what a server needs takes seconds of a processor. This process does it once, and servers of tests are its
+# forks; servers of users are started as users start them.
+_FORKS = multiprocessing.get_context("forkserver")
+_FORKS.set_forkserver_preload(["pytest", "wingfit.service.server", "tests.service.toy", "tests.service.toy_diagnosis"])
+
+
+class ForkedProcess:
+    """What tests use of :class:`subprocess.Popen`, of ``python -m MODULE ARGUMENTS`` in a fork."""
+
+    def __init__(self, module: Sequence[str], env: Mapping[str, str], log: Path) -> None:
+        self._process = _FORKS.Process(target=_run, args=(list(module), dict(env), str(log)))
+        self._process.start()
+        assert self._process.pid is not None
+        self.pid = self._process.pid
+
+    def poll(self) -> int | None:
+        return self._process.exitcode
+
+    def wait(self, seconds: float | None = None) -> int:
+        self._process.join(seconds)
+        if (code := self._process.exitcode) is None:
+            raise subprocess.TimeoutExpired("the server", seconds or 0.0)
+        return code
+
+    def send_signal(self, number: int) -> None:
+        if self.poll() is None:
+            os.kill(self.pid, number)
+
+    def terminate(self) -> None:
+        self.send_signal(signal.SIGTERM)
+
+    def kill(self) -> None:
+        self.send_signal(signal.SIGKILL)
+
+
+def _run(module: list[str], env: dict[str, str], log: str) -> None:
+    with open(log, "wb", buffering=0) as out:
+        os.dup2(out.fileno(), 1)
+        os.dup2(out.fileno(), 2)
+    os.environ.clear()
+    os.environ.update(env)
+    os.chdir(ROOT)
+    sys.argv = module
+    runpy.run_module(module[0], run_name="__main__", alter_sys=True)
+
 
 def free_port() -> int:
     with socket.socket() as probe:
@@ -27,22 +74,24 @@ def free_port() -> int:
 
 
 class ServerProcess:
-    """Started on entering, stopped on leaving; ``kill`` is kill -9."""
+    """``python -m MODULE ARGUMENTS``, started on entering, stopped on leaving; ``kill`` is kill -9."""
 
     def __init__(self, data: Path, module: Sequence[str], env: Mapping[str, str] | None = None) -> None:
         self.port = free_port()
         self._log = data.parent / f"server-{self.port}.log"
-        self._command = [sys.executable, "-m", *module]
+        self._module = module
         self._env = {**os.environ, "WINGFIT_DATA": str(data), "WINGFIT_PORT": str(self.port), **(env or {})}
-        self.process: subprocess.Popen[bytes]
+        self.process: subprocess.Popen[bytes] | ForkedProcess
         self.client = httpx.Client(base_url=f"http://127.0.0.1:{self.port}", timeout=30.0)
         self.api = Api(self.client)
 
     def __enter__(self) -> Self:
-        with self._log.open("wb") as log:
-            self.process = subprocess.Popen(
-                self._command, env=self._env, cwd=ROOT, stdout=log, stderr=subprocess.STDOUT
-            )
+        if self._module[0].startswith("tests."):
+            self.process = ForkedProcess(self._module, self._env, self._log)
+        else:
+            with self._log.open("wb") as log:
+                command = [sys.executable, "-m", *self._module]
+                self.process = subprocess.Popen(command, env=self._env, cwd=ROOT, stdout=log, stderr=subprocess.STDOUT)
         deadline = time.monotonic() + 60
         while not self._answers():
             assert self.process.poll() is None, self.log
