@@ -1,4 +1,4 @@
-"""Clients of a server that is killed: they repeat a request until it is answered, and record what was acknowledged."""
+"""Clients of a server that is killed: they repeat requests until there is an answer, and record every answer."""
 
 from __future__ import annotations
 

@@ -40,7 +40,7 @@ V3 = tuple[float, float, float]
 
 SIZE = 13  # numbers per body
 P, Q, V, W = 0, 3, 7, 10  # offsets of position, quaternion, velocity, angular velocity
-_TURN = math.sin(math.radians(15.0))  # of the angle within which lift changes sign in reversed flow
+_TURN = math.sin(math.radians(15.0))  # lift changes sign within 15 degrees of flow normal to the chord
 _STILL = 1e-9  # m/s, keeps the angle of attack defined without flow
 
 
