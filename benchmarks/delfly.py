@@ -1,8 +1,7 @@
 """Fits the quasi-steady model with clap-and-peel to a simulated balance (force sensor) with known coefficients.
 
 ``python -m benchmarks.delfly [--json] [--no-estimators] [--seed N]``; with ``--json`` the last line is one JSON object.
-``--example FOLDER`` only writes the example campaign. The conditions are the eight tests of the DelFly, a vehicle with
-flapping wings, by Armanini et al. (2016).
+``--example FOLDER`` only writes the example campaign. Conditions are the eight tests of Armanini et al. (2016).
 """
 
 from __future__ import annotations
@@ -68,9 +67,8 @@ LIFT_CORRELATION = (0.97, 0.97, 0.97, 0.96, 0.96, 0.94, 0.92, 0.85)
 class Fitted:
     """A model fitted to one recording.
 
-    ``trial``: the test, with the true coefficients; ``problem``: has the estimate as its base; ``agreement``:
-    correlation and error of each force; ``misfit_range``: interval of the beat (fractions t*) in which the model misses
-    physics, or None.
+    ``problem``: its base genome is the estimate; ``agreement``: correlation and error of each force; ``misfit_range``:
+    interval of the beat (start, end; fractions) in which the model misses physics, or None.
     """
 
     trial: Trial
@@ -95,10 +93,7 @@ class Fitted:
 
 
 def problem_of(model: BladeElementWing, recording: Recording) -> Problem:
-    """Return the fit problem of ``model`` for ``recording``, as in Armanini et al. (2016).
-
-    The lift coefficients are estimated from the force along x, with fixed drag coefficients.
-    """
+    """Return the fit of lift coefficients to the force along x, with fixed drag, as in Armanini et al. (2016)."""
     drag = {name: value for name, value in DRAG.items() if name in {gene.name for gene in model.genes}}
     return Problem(model, (recording,), model.searched, base_genome(model, drag), ("x",))
 
@@ -114,11 +109,7 @@ def fit(model: BladeElementWing, recording: Recording, trial: Trial, evaluator: 
 
 
 def corners(model: BladeElementWing, fitted: list[Fitted], evaluator: Evaluator) -> float:
-    """Return the percentage of fits, from extreme starts, that end at the estimate.
-
-    The starts are all corners of the search box (each coefficient at one of its bounds), for every recording of
-    ``fitted``.
-    """
+    """Return the percentage of fits that end at the estimate if started from all corners of the search box."""
     good, total = 0, 0
     for one in fitted:
         problem = problem_of(model, one.recording)
@@ -133,11 +124,7 @@ def corners(model: BladeElementWing, fitted: list[Fitted], evaluator: Evaluator)
 def coverage(
     model: BladeElementWing, beats: list[Array], balance: Balance, repetitions: int, seed: int, evaluator: Evaluator
 ) -> dict[str, float]:
-    """Return the percentage of 90 % intervals that contain the true value, by coefficient.
-
-    ``beats``: true forces of each test; ``balance``: errors of the recordings; the noise differs in each of
-    ``repetitions``.
-    """
+    """Return the percentage of 90 % intervals that contain the true value, by coefficient, with different noise."""
     held = dict.fromkeys(COEFFICIENTS, 0)
     for k in range(repetitions):
         trial, beat = TRIALS[k % len(TRIALS)], beats[k % len(TRIALS)]
@@ -149,10 +136,7 @@ def coverage(
 
 
 def luck(model: BladeElementWing, beats: list[Array], seed: int, evaluator: Evaluator) -> dict[str, float]:
-    """Return the largest error (per cent) of any coefficient: median and maximum over random seeds of the noise.
-
-    ``beats``: true forces of each test. There are DRAWS seeds.
-    """
+    """Return median and maximum, over random seeds of the noise, of the largest error (per cent) of any coefficient."""
     largest = []
     for draw in range(DRAWS):
         errors = []
@@ -189,10 +173,7 @@ def systematic(model: BladeElementWing, evaluator: Evaluator) -> dict[str, float
 
 
 def milliseconds(model: BladeElementWing, batch: int = 64, rounds: int = 7) -> float:
-    """Return the processor time (ms) of one individual with a wing motion of its own, simulated in a batch.
-
-    ``batch``: individuals in it; the best of ``rounds``.
-    """
+    """Return the processor time (ms) of one individual in a batch of different motions; best of ``rounds``."""
     rng, best = np.random.default_rng(0), np.inf
     nominal = np.array([gene.nominal for gene in model.genes])
     width = np.array([gene.upper - gene.lower for gene in model.genes])
@@ -237,10 +218,7 @@ def widest(ranges: list[tuple[float, float] | None]) -> list[float] | None:
 def fits(
     seed: int, models: Mapping[str, BladeElementWing], evaluator: Evaluator
 ) -> tuple[dict[str, list[Fitted]], dict[str, Fitted]]:
-    """Fit each of ``models`` to recordings of all tests low-passed at CUTOFF, and of one test at FINER_CUTOFF.
-
-    Returns the former and the latter fits, by name of the model.
-    """
+    """Fit the models to recordings of all tests at CUTOFF, and of one test at FINER_CUTOFF; return both sets."""
     vehicle = delfly()
     found: dict[str, list[Fitted]] = {name: [] for name in models}
     finer: dict[str, Fitted] = {}
@@ -255,10 +233,7 @@ def fits(
 
 
 def agreement_figures(fitted: Mapping[str, list[Fitted]], finer: Mapping[str, Fitted]) -> dict[str, Any]:
-    """Return figures for the report: errors of coefficients, where models miss physics, agreement of lift.
-
-    ``fitted``, ``finer``: of :func:`fits`.
-    """
+    """Return figures: errors of coefficients, interval of the beat where models miss physics, agreement of lift."""
     figures: dict[str, Any] = {
         "coefficient_error_percent": max(abs(e) for one in fitted["proposed"] for e in one.errors.values()),
         "misfit_tstar_range": widest([one.misfit_range for one in fitted["without_fling"]]),
@@ -280,10 +255,7 @@ def agreement_figures(fitted: Mapping[str, list[Fitted]], finer: Mapping[str, Fi
 
 
 def global_figures(fitted: list[Fitted]) -> dict[str, Any]:
-    """Return figures for the report: differences between the global model and the local estimates.
-
-    The global model is fitted with and without weights, and to the printed Table 8 of Armanini et al. (2016).
-    """
+    """Return differences (per cent) of the global model from local estimates and from the printed Table 8."""
     local, conditions = [one.local for one in fitted], [one.trial.condition for one in fitted]
     law, plain = fit_global(local, conditions), fit_global(local, conditions, weighted=False)
     return {
@@ -301,11 +273,7 @@ def global_figures(fitted: list[Fitted]) -> dict[str, Any]:
 
 
 def repeated_figures(model: BladeElementWing, repetitions: int, seed: int, evaluator: Evaluator) -> dict[str, Any]:
-    """Return figures for the report that need many fits.
-
-    They are the coverage of intervals with and without systematic errors, convergence from the corners of the search
-    box, and errors with other noise and with systematic errors.
-    """
+    """Return figures of many fits: coverage of intervals, convergence from corners, errors with other noise."""
     beats = [true_beat(model.vehicle, trial) for trial in TRIALS]
     covered = coverage(model, beats, TOLD_BY_RESIDUALS, repetitions, seed, evaluator)
     starts = [
@@ -328,10 +296,7 @@ def repeated_figures(model: BladeElementWing, repetitions: int, seed: int, evalu
 
 
 def rows(fitted: Mapping[str, list[Fitted]]) -> list[dict[str, Any]]:
-    """Return one row per test: estimated and true coefficients, agreement of lift and drag, and results without fling.
-
-    ``fitted``: of :func:`fits`.
-    """
+    """Return one row per test: estimated and true coefficients, agreement of lift and drag, results without fling."""
     return [
         {
             "condition": one.trial.name,

@@ -36,7 +36,7 @@ INTERRUPTED = 130
 
 
 def main(words: list[str] | None = None) -> int:
-    """Run the demo; 0 on success."""
+    """Run the demo with the options ``words``, by default those of the process; return the exit code, 0 on success."""
     parser = argparse.ArgumentParser(prog="python -m examples.demo", description=__doc__)
     parser.add_argument("--keep", action="store_true", help="keep the server running until Ctrl-C")
     options = parser.parse_args(words)

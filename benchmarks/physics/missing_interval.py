@@ -16,8 +16,8 @@ from wingfit.records.blas_threads import one_blas_thread
 SHARE = 0.9
 """Fraction of the excess squared misfit that the interval of :func:`located` must explain.
 
-With a larger fraction the interval would also include the ringing of the low-pass filter around an event; with a smaller
-one it would shrink to the core of the event.
+With a larger fraction the interval would also include the ringing of the low-pass filter around an event; with a
+smaller one it would shrink to the core of the event.
 """
 SIGNIFICANCE = 0.01
 FEWEST_BEATS = 5  # needed to estimate the noise from the scatter between beats

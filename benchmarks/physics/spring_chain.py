@@ -52,7 +52,7 @@ class _Chain:
         self.n, self.state = strips, at_rest(self.structure)
         self.tip = np.array([0.0, beam.length - self.state.p[strips - 1, 1, 0], 0.0])
         w = self.structure.wiring
-        # arms of the joint on the root side of each body; the first joint is that of the first rod (the second coincides)
+        # arms of the joint on the root side of each body; the first joint is on the first rod (the second coincides)
         inner = np.array([np.flatnonzero(w.second == k)[0] for k in range(strips)])
         self.a, self.b = w.a[inner], w.b[inner]
 
