@@ -1,9 +1,10 @@
 """Error of the discretisation into rigid bodies: beams against beam theory, the Robird's wing against finer divisions.
 
-``python -m benchmarks.beams [--json | --table] [--quick]`` Natural frequencies are computed from the stiffness of the
-compiled connectors at rest and the bodies' masses, large deflections from equilibrium with the compiled spring forces,
-the wing's motion with the simulator itself. A division "16x4" has 16 strips along the span with 4 bodies each along the
-chord.
+``python -m benchmarks.beams [--json | --table] [--quick]``
+
+Natural frequencies are computed from the stiffness of the compiled connectors at rest and the bodies' masses, large
+deflections from equilibrium with the compiled spring forces, the wing's motion with the simulator itself. A division
+"16x4" has 16 strips along the span with 4 bodies each along the chord.
 """
 
 from __future__ import annotations
@@ -156,9 +157,9 @@ def frequency_table(strips: tuple[int, ...] = STRIPS) -> list[Row]:
 def torsion_carried(structure: Structure) -> float:
     """Return the fraction of the section's torsional stiffness that a uniform sheet's connectors carry.
 
-    The sheet has uniform twist: kappa (rad/m) rotates neighbours along the span, and neighbours along the chord, by
-    kappa times their distance. The result is the energy of both kinds of connectors per length, for one strip in the
-    middle, divided by G J kappa^2 / 2 (shear modulus G, torsion constant J).
+    Under a uniform twist kappa (rad/m), neighbours along the span, and neighbours along the chord, rotate relative to
+    each other by kappa times their distance. The result is the energy of both kinds of connectors per length, for one
+    strip in the middle, divided by G J kappa^2 / 2 (shear modulus G, torsion constant J).
     """
     n, strip = structure.division.bodies[0], len(structure.division.bodies) // 2
     station = structure.wing.stations[0]

@@ -93,7 +93,7 @@ class Fitted:
 
 
 def problem_of(model: BladeElementWing, recording: Recording) -> Problem:
-    """Return the fit of lift coefficients to the force along x, with fixed drag, as in Armanini et al. (2016)."""
+    """Return the problem of fitting lift coefficients to the force along x, drag fixed (Armanini et al. 2016)."""
     drag = {name: value for name, value in DRAG.items() if name in {gene.name for gene in model.genes}}
     return Problem(model, (recording,), model.searched, base_genome(model, drag), ("x",))
 
@@ -109,7 +109,7 @@ def fit(model: BladeElementWing, recording: Recording, trial: Trial, evaluator: 
 
 
 def corners(model: BladeElementWing, fitted: list[Fitted], evaluator: Evaluator) -> float:
-    """Return the percentage of fits that end at the estimate if started from all corners of the search box."""
+    """Return the percentage of fits from all corners of the search box, in all tests, that end at the estimate."""
     good, total = 0, 0
     for one in fitted:
         problem = problem_of(model, one.recording)
@@ -124,7 +124,7 @@ def corners(model: BladeElementWing, fitted: list[Fitted], evaluator: Evaluator)
 def coverage(
     model: BladeElementWing, beats: list[Array], balance: Balance, repetitions: int, seed: int, evaluator: Evaluator
 ) -> dict[str, float]:
-    """Return the percentage of 90 % intervals that contain the true value, by coefficient, with different noise."""
+    """Return the percentage of 90 % intervals, over fits with other noise, that contain the truth, by coefficient."""
     held = dict.fromkeys(COEFFICIENTS, 0)
     for k in range(repetitions):
         trial, beat = TRIALS[k % len(TRIALS)], beats[k % len(TRIALS)]
@@ -218,7 +218,7 @@ def widest(ranges: list[tuple[float, float] | None]) -> list[float] | None:
 def fits(
     seed: int, models: Mapping[str, BladeElementWing], evaluator: Evaluator
 ) -> tuple[dict[str, list[Fitted]], dict[str, Fitted]]:
-    """Fit the models to recordings of all tests at CUTOFF, and of one test at FINER_CUTOFF; return both sets."""
+    """Fit each model to all tests, low-passed at CUTOFF, and to one at FINER_CUTOFF; return both sets, by model."""
     vehicle = delfly()
     found: dict[str, list[Fitted]] = {name: [] for name in models}
     finer: dict[str, Fitted] = {}
@@ -233,7 +233,7 @@ def fits(
 
 
 def agreement_figures(fitted: Mapping[str, list[Fitted]], finer: Mapping[str, Fitted]) -> dict[str, Any]:
-    """Return figures: errors of coefficients, interval of the beat where models miss physics, agreement of lift."""
+    """Return, for the report, errors of coefficients, where in the beat models miss physics, agreement of lift."""
     figures: dict[str, Any] = {
         "coefficient_error_percent": max(abs(e) for one in fitted["proposed"] for e in one.errors.values()),
         "misfit_tstar_range": widest([one.misfit_range for one in fitted["without_fling"]]),
@@ -255,7 +255,7 @@ def agreement_figures(fitted: Mapping[str, list[Fitted]], finer: Mapping[str, Fi
 
 
 def global_figures(fitted: list[Fitted]) -> dict[str, Any]:
-    """Return differences (per cent) of the global model from local estimates and from the printed Table 8."""
+    """Return, for the report, differences of the global model from local estimates and from Table 8."""
     local, conditions = [one.local for one in fitted], [one.trial.condition for one in fitted]
     law, plain = fit_global(local, conditions), fit_global(local, conditions, weighted=False)
     return {
@@ -273,7 +273,7 @@ def global_figures(fitted: list[Fitted]) -> dict[str, Any]:
 
 
 def repeated_figures(model: BladeElementWing, repetitions: int, seed: int, evaluator: Evaluator) -> dict[str, Any]:
-    """Return figures of many fits: coverage of intervals, convergence from corners, errors with other noise."""
+    """Return, for the report, coverage of intervals, convergence from corners, errors with other noise."""
     beats = [true_beat(model.vehicle, trial) for trial in TRIALS]
     covered = coverage(model, beats, TOLD_BY_RESIDUALS, repetitions, seed, evaluator)
     starts = [

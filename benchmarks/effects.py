@@ -199,7 +199,8 @@ def angle(a: Array, b: Array) -> float:
 def freed(rig: Rig, one: Moved, known: Array) -> Array:
     """Return an orthonormal basis [D, R] of an effect's changes without those that the nominal genes can make.
 
-    ``one``: the changes; ``known``: basis of :func:`nominal_directions`. Changes that are then below SEEN are omitted.
+    ``one``: the changes; ``known``: basis of :func:`nominal_directions`. R is the number of the effect's size genes
+    less those whose remaining change is below SEEN, which are omitted.
     """
     free = one.columns - known @ (known.T @ one.columns)
     seen = [rig.unit * rig.rms(column) > SEEN for column in free.T]

@@ -1,4 +1,4 @@
-"""Creates valid objects on the server for the fuzzer: datasets of both kinds, finished runs, a diagnosis, a key."""
+"""Creates valid objects on the server for the fuzzer: datasets of tracks and forces, runs, a diagnosis, a key."""
 
 from __future__ import annotations
 

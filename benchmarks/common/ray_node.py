@@ -31,9 +31,10 @@ IMPATIENT = {
 
 
 def environment(token: Path, **more: str) -> dict[str, str]:
-    """Return environment variables as in a container of the deployment, with ``more``, without RAY_ ones set here.
+    """Return the environment variables of this process, those of a container of the deployment, and ``more``.
 
-    ``token``: file with the access token of the Ray cluster.
+    Variables of this process that begin with RAY_ are omitted. ``token``: file with the access token of the Ray
+    cluster.
     """
     clean = {name: value for name, value in os.environ.items() if not name.startswith("RAY_")}
     return clean | {

@@ -18,8 +18,7 @@ class KnownRun:
         work: name of its workload.
         generations: entries of its history, by sequence number, as first seen.
         endings: allowed final states: at first SUCCEEDED; also CANCELLED once a cancellation was requested; only
-            CANCELLED
-        once the cancellation was acknowledged.
+            CANCELLED once the cancellation was acknowledged.
         final: its final state; None until a client has seen it.
     """
 

@@ -1,4 +1,4 @@
-"""The jobs to submit: small calibrations of both kinds, and a diagnosis. Each has one result if it is not disturbed."""
+"""The jobs to submit: small calibrations with tracks or forces, and a diagnosis, which all give repeatable results."""
 
 from __future__ import annotations
 

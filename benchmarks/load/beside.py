@@ -98,7 +98,7 @@ def _trial(
 
 
 def _figures(load: Load, trials: Sequence[Trial], alone: Sequence[Trial]) -> Json:
-    """Figures of the report for one load.
+    """Return the figures of the report for one load.
 
     ``trials``: those with this load; ``alone``: those of the reference load in the same rounds.
     """
@@ -131,10 +131,9 @@ def _figures(load: Load, trials: Sequence[Trial], alone: Sequence[Trial]) -> Jso
 
 
 def per_read_us(loaded: Json, watched: Json) -> float | None:
-    """Processor time of the server per read, in microseconds; None if there were no reads.
+    """Return the processor time of the server per read, in microseconds; None if there were no reads.
 
-    ``loaded`` and ``watched``: figures of the load with event streams and reads, and of the one with event streams
-    only.
+    ``loaded``: figures of the load with event streams and reads; ``watched``: of the load with event streams only.
     """
     number = loaded["reads"]["of"]
     more = loaded["server_processor_seconds"] - watched["server_processor_seconds"]
@@ -142,13 +141,13 @@ def per_read_us(loaded: Json, watched: Json) -> float | None:
 
 
 def processor_seconds(pid: int) -> float:
-    """Processor time (s) so far of the process ``pid`` with its threads, without the processes that it started."""
+    """Return the processor time (s) so far of the process ``pid``, without the processes that it started."""
     fields = (Path("/proc") / str(pid) / "stat").read_text().rsplit(")", 1)[1].split()
     return (int(fields[11]) + int(fields[12])) / TICKS
 
 
 def _of_kind(trials: Sequence[Trial], kind: str) -> list[float]:
-    """Response times (s) of the reads of one ``kind`` in all ``trials``."""
+    """Return the response times (s) of the reads of one ``kind`` in all ``trials``."""
     return [seconds for trial in trials for number, seconds in trial.observed.latencies if trial.kinds[number] == kind]
 
 

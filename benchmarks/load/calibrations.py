@@ -12,7 +12,7 @@ ROBIRD = EXAMPLES / "robird"
 
 
 def search(division: str, population: int, generations: int, **more: Any) -> Json:
-    """Request body of a genetic search that always computes all its ``generations``.
+    """Return the request body of a genetic search that always computes all its ``generations``.
 
     ``division``: discretisation of the wing, such as "11" bodies; ``population``: individuals per generation.
     """

@@ -14,7 +14,7 @@ def percentile(values: Sequence[float], percent: float) -> float | None:
 
 
 def milliseconds(seconds: Sequence[float]) -> dict[str, float | None]:
-    """Median, 99th percentile and maximum, in ms, of times in ``seconds``; None each if there are no times."""
+    """Return median, 99th percentile and maximum, in ms, of times in ``seconds``; None each if there are none."""
     return {
         name: None if (found := percentile(seconds, percent)) is None else round(1e3 * found, 2)
         for name, percent in (("p50_ms", 50), ("p99_ms", 99), ("max_ms", 100))

@@ -99,7 +99,7 @@ def _copies(original: Values, datasets: list[str], number: int) -> list[Values]:
 
 
 def _ending(place: int) -> Values:
-    """Return the changed columns of the copy number ``place``: none if it succeeds, as 8 of 10 do, or how it ended."""
+    """Return the columns of the copy number ``place`` that differ from those of a success: none for 8 of 10 copies."""
     if place % 10 < SUCCEEDED:
         return {}
     if place % 2:

@@ -155,7 +155,8 @@ def spring_loads(wing: PeerWing, R: Array, p: Array, v: Array, w: Array, load: A
 def _lift_and_drag(wing: PeerWing, strip: int, chord: V3, normal: V3, flow: V3) -> tuple[V3, V3]:
     """Return lift and drag (N, world axes) of a strip (thesis Eqs. 8-11).
 
-    ``chord``, ``normal``: unit vectors along and across the strip; ``flow``: velocity of the air relative to it, m/s.
+    ``chord``, ``normal``: unit vectors along the chord and normal to the strip; ``flow``: velocity of the air relative
+    to the strip, m/s.
     """
     along, across = _dot(flow, chord), _dot(flow, normal)
     speed = math.sqrt(along * along + across * across + _STILL * _STILL)

@@ -49,8 +49,7 @@ class Settings:
     Attributes:
         steps: integration steps per beat, a multiple of SAMPLES.
         law: law of the springs: "angles" (Exudyn's default, on Tait-Bryan angles), "logarithm" (Exudyn's intrinsic one,
-            on
-        the logarithm of the relative pose at mid-frame) or "energy" (wingfit's, called from Python).
+            on the logarithm of the relative pose at mid-frame) or "energy" (wingfit's, called from Python).
         spectral_radius: spectral radius of the generalised-alpha method at infinite frequency.
         newton: relative tolerance of Newton's method.
     """

@@ -165,9 +165,9 @@ def _sufficient(
     reference: Run,
     clock: Callable[[], None],
 ) -> list[Cost]:
-    """Return the costs with the two loosest neighbouring ``tolerances`` that both keep the error.
+    """Return the costs with the two loosest neighbouring ``tolerances`` whose errors are at most ``tolerance_mm``.
 
-    Fewer are returned if the tolerances end before. ``clock``: as for :func:`simulate`.
+    ``clock``: as for :func:`simulate`. One cost or none is returned if too few tolerances suffice.
     """
     found: list[Cost] = []
     for tolerance in tolerances:

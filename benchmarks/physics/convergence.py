@@ -81,7 +81,7 @@ class Subject:
 
 @dataclass(frozen=True)
 class Passed:
-    """One integrated beat of the first lane: recorded motion, state at its start.
+    """One integrated beat of the first lane: ``trace``, its motion and energy; ``start``, the state at its start.
 
     ``distance``: estimated distance (m) of that state from the periodic motion; infinite if it is not known.
     """
