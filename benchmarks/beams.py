@@ -1,8 +1,10 @@
 """Error of the discretisation into rigid bodies: beams against beam theory, the Robird's wing against finer divisions.
 
 ``python -m benchmarks.beams [--json | --table] [--quick]``
-Frequencies are computed from the compiled connectors at rest and the bodies' masses, the elastica from the compiled
-spring forces in equilibrium, the wing with the simulator itself.
+
+Natural frequencies are computed from the stiffness of the compiled connectors at rest and the bodies' masses, large
+deflections from equilibrium with the compiled spring forces, the wing's motion with the simulator itself. A division
+"16x4" has 16 strips along the span with 4 bodies each along the chord.
 """
 
 from __future__ import annotations
@@ -58,7 +60,7 @@ DIVISIONS = ("4", "11", "24", "64x1", "32x2", "32x3", "32x4", "20x6", "12x8")
 WING_NUMERICS = Numerics(steps=480, max_beats=60, periodic=2e-6)
 # Which of a body's six coordinates (rotation x, y, z, then translation) move together in a flat wing.
 _OUT_OF_PLANE, _IN_PLANE = (0, 1, 5), (2, 3, 4)
-_KEPT = 24  # lowest modes that are examined
+_KEPT = 24  # number of the lowest modes that are examined
 _ABSENT = 0.5  # relative error above which a frequency belongs to another mode
 
 
@@ -66,7 +68,8 @@ _ABSENT = 0.5  # relative error above which a frequency belongs to another mode
 class Row:
     """Relative errors of the first three frequencies of one family of modes for one discretisation.
 
-    NaN where a discretisation has too few bodies for a mode.
+    ``strips``: number of strips along the span; ``chordwise``: bodies along the chord in each. An error is NaN where
+    there are too few bodies for the mode.
     """
 
     case: str
@@ -77,10 +80,10 @@ class Row:
 
 
 def modes(structure: Structure, moduli: dict[str, float], held: int) -> dict[Family, Array]:
-    """Natural frequencies (Hz, rising) of the bodies on their springs, by family of modes.
+    """Return the natural frequencies (Hz, rising) of the bodies on their springs, by family of modes.
 
-    ``moduli``: gene values by name; the first ``held`` bodies are fixed. A mode belongs to the family whose motion of
-    rigid strips (along the chord) has most of its kinetic energy.
+    ``moduli``: gene values by name; the first ``held`` bodies are fixed. A mode belongs to a family if more than half
+    of its kinetic energy is in that family's motion of strips that are rigid along the chord; other modes are omitted.
     """
     n = len(structure.bodies)
     K = stiffness_matrix(structure, moduli).reshape(n, 6, n, 6)[held:, :, held:, :]
@@ -118,8 +121,9 @@ def modes(structure: Structure, moduli: dict[str, float], held: int) -> dict[Fam
 def frequency_errors(
     name: str, beam: Beam, families: tuple[Family, ...], slender: bool, chordwise: int, strips: int
 ) -> list[Row]:
-    """Frequency errors of one discretisation of ``beam`` into ``strips`` times ``chordwise`` bodies, by family.
+    """Return the frequency errors of ``beam``, called ``name``, in one discretisation, by family of modes.
 
+    There are ``strips`` times ``chordwise`` bodies. ``slender``: whether the reference omits shear and rotary inertia.
     With one body along the chord the beam hangs on the rods at the root. The two rods cannot hold more than two bodies,
     so otherwise the first strip is held instead, and the beam begins at that strip's middle.
     """
@@ -137,7 +141,7 @@ def frequency_errors(
 
 
 def frequency_table(strips: tuple[int, ...] = STRIPS) -> list[Row]:
-    """Frequency errors of all beams and discretisations, in the order of ``CASES``."""
+    """Return the frequency errors of all beams with all numbers of ``strips``, in the order of ``CASES``."""
     rows = [
         row
         for name, beam, families, slender in CASES
@@ -151,11 +155,11 @@ def frequency_table(strips: tuple[int, ...] = STRIPS) -> list[Row]:
 
 
 def torsion_carried(structure: Structure) -> float:
-    """Fraction of the section's torsion constant that the connectors of a uniform sheet carry under uniform twist.
+    """Return the fraction of the section's torsional stiffness that a uniform sheet's connectors carry.
 
-    A twist kappa (rad/m) rotates neighbours along the span, and neighbours along the chord, by kappa times their
-    distance. The result is the energy of both kinds of connectors per length, for one strip in the middle, divided by
-    G J kappa^2 / 2.
+    Under a uniform twist kappa (rad/m), neighbours along the span, and neighbours along the chord, rotate relative to
+    each other by kappa times their distance. The result is the energy of both kinds of connectors per length, for one
+    strip in the middle, divided by G J kappa^2 / 2 (shear modulus G, torsion constant J).
     """
     n, strip = structure.division.bodies[0], len(structure.division.bodies) // 2
     station = structure.wing.stations[0]
@@ -171,7 +175,11 @@ def torsion_carried(structure: Structure) -> float:
 
 
 def twist_rate(beam: Beam, division: str) -> float:
-    """Twist per length in the middle half of a divided beam under tip moment T, relative to Saint-Venant's T / G J."""
+    """Return the twist per length of a divided beam under a tip moment, relative to Saint-Venant's T / (G J).
+
+    T is the moment, G the shear modulus, J the torsion constant; the twist is that of the middle half of the beam.
+    ``division``: the discretisation.
+    """
     structure = cut_beam(beam, division)
     n, strips = structure.division.bodies[0], len(structure.division.bodies)
     load = np.zeros((len(structure.bodies), 6))
@@ -183,7 +191,7 @@ def twist_rate(beam: Beam, division: str) -> float:
 
 
 def twist_table() -> list[dict[str, Any]]:
-    """:func:`twist_rate` of the uniform sheet and of a plate as thick as the wing."""
+    """Return rows of :func:`twist_rate` for the uniform sheet and a plate as thick as the wing, by division."""
     return [
         {"plate": name, "division": division, "twist": twist_rate(beam, division)}
         for name, beam, strips in (("uniform sheet", UNIFORM_SHEET, (16, 32)), ("thick plate", THICK_PLATE, (16, 32)))
@@ -192,12 +200,18 @@ def twist_table() -> list[dict[str, Any]]:
 
 
 def observed_order(coarse: float, fine: float, refinement: float = 2.0) -> float:
-    """Order p of an error proportional to the p-th power of the strips' width; NaN if an error is missing."""
+    """Return the order p of an error that is proportional to the p-th power of the strips' width.
+
+    ``coarse``, ``fine``: errors before and after refinement by the factor ``refinement``; NaN if one of them is NaN.
+    """
     return math.log(abs(coarse / fine)) / math.log(refinement)
 
 
 def elastica_table(strips: tuple[int, ...] = STRIPS) -> list[dict[str, float]]:
-    """Error of the rigid-body chain's tip deflection and shortening under large loads, relative to its length."""
+    """Return the errors of tip deflection and shortening of chains of rigid bodies under large loads.
+
+    They are relative to the length; one row per load P L^2 / (E I) in LOADS and number of ``strips``.
+    """
     rows = []
     for load in LOADS:
         truth = elastica(load)
@@ -210,7 +224,7 @@ def elastica_table(strips: tuple[int, ...] = STRIPS) -> list[dict[str, float]]:
 
 
 def rods_to_the_tip(wing: Wing) -> Wing:
-    """The wing with its rods extended along their lines to the tip station."""
+    """Return a copy of ``wing`` with its rods extended along their lines to the tip station."""
     rods = []
     for rod in wing.rods:
         y = wing.stations[-1].y
@@ -223,7 +237,10 @@ WINGS = {"robird": robird_wing(), "rods to the tip": rods_to_the_tip(robird_wing
 
 
 def wing_tracks(wing: Wing, division: str, numerics: Numerics = WING_NUMERICS) -> Array:
-    """Periodic marker tracks [n, M, 3] (m) at 3 Hz in 10 mbar, nominal genes, 3 degrees of lag."""
+    """Simulate and return the periodic marker tracks [n, M, 3] (m) of M markers at n instants of the beat.
+
+    Flapping at 3 Hz at a pressure of 10 mbar, with nominal genes and a phase lag of 3 degrees between the rods.
+    """
     model = FlexibleWing(wing, division, numerics=numerics)
     recording = blank_recording(model.wing, vacuum(10.0, math.radians(3.0), 3.0))
     beat = model.beat([g.nominal for g in model.genes], recording)
@@ -233,10 +250,11 @@ def wing_tracks(wing: Wing, division: str, numerics: Numerics = WING_NUMERICS) -
 
 
 def wing_table(strips: dict[int, tuple[int, ...]], numerics: Numerics = WING_NUMERICS) -> list[dict[str, Any]]:
-    """Mean and largest distance (m) over a beat between markers with n and with 2 n strips, one row per discretisation.
+    """Return the mean and largest distance (m) over a beat between markers with n and with 2 n strips.
 
-    ``order``: convergence order from two successive mean distances. The distance from the limit of many strips is the
-    sum of this and all following distances.
+    ``strips``: numbers of strips, by number of bodies along the chord. One row per discretisation; ``order``:
+    convergence order from two successive mean distances. The distance from the limit of many strips is the sum of a
+    row's distance and all following ones.
     """
     rows: list[dict[str, Any]] = []
     for name, wing in WINGS.items():
@@ -257,7 +275,10 @@ def wing_table(strips: dict[int, tuple[int, ...]], numerics: Numerics = WING_NUM
 
 
 def chord_table(divisions: tuple[str, ...]) -> list[dict[str, Any]]:
-    """Mean and largest distance (m) over a beat of the Robird's markers from those with the discretisation FINEST."""
+    """Return the mean and largest distance (m) of the Robird's markers from those with the discretisation FINEST.
+
+    One row for each of ``divisions``, over a beat.
+    """
     finest, rows = wing_tracks(WINGS["robird"], FINEST), []
     for division in divisions:
         distance = np.linalg.norm(wing_tracks(WINGS["robird"], division) - finest, axis=-1)
@@ -275,7 +296,7 @@ def _markdown(head: list[str], rows: list[str]) -> str:
 
 
 def frequency_markdown(rows: list[Row]) -> str:
-    """Markdown table: a row per family, number of bodies along the chord, and mode.
+    """Return a markdown table of frequency errors: a row per family, number of bodies along the chord, and mode.
 
     Columns: error in per cent by number of strips, and the convergence order of the last refinement.
     """
@@ -292,7 +313,7 @@ def frequency_markdown(rows: list[Row]) -> str:
 
 
 def table(figures: dict[str, Any], rows: list[Row]) -> str:
-    """All ``figures`` and frequency errors ``rows`` as tables in markdown."""
+    """Return all ``figures``, and the frequency errors ``rows``, as tables in markdown."""
     mm = 1e3
     bent = [
         f"{r['load']:g} | {r['strips']} | {100 * r['deflection']:+.4f} | {100 * r['shortening']:+.4f}"
@@ -322,7 +343,7 @@ def table(figures: dict[str, Any], rows: list[Row]) -> str:
 
 
 def _without_nan(value: Any) -> Any:
-    """The value with None instead of NaN, which JSON does not have."""
+    """Return ``value`` with None in place of NaN and infinity, which JSON does not have."""
     if isinstance(value, dict):
         return {key: _without_nan(v) for key, v in value.items()}
     if isinstance(value, list | tuple):
@@ -332,7 +353,7 @@ def _without_nan(value: Any) -> Any:
 
 @one_blas_thread  # on such small matrices several threads take ten times as long
 def main() -> None:
-    """Command line."""
+    """Parse the command line, compute all tables, and print them."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.beams", description=__doc__)
     shown = parser.add_mutually_exclusive_group()
     shown.add_argument("--json", action="store_true", help="print only the JSON object")

@@ -1,7 +1,8 @@
-"""Accuracy and cost of the staged calibration of the example campaign, whose true genome it does not read.
+"""Accuracy and cost of the staged calibration of the example campaign, without knowledge of the true genome.
 
 ``python -m benchmarks.calibration [--json] [--joint] [--evaluator KIND]``. The misfit floor is the misfit of the true
-genome on the same recordings: tracking noise, and the error in the start of the beat estimated from noisy tracks.
+genome on the same recordings. It is caused by tracking noise, and by the error in the start of the beat, which is
+estimated from noisy tracks.
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ from wingfit.workers import EvaluatorKind, make_evaluator
 
 EXAMPLE = EXAMPLES / "robird"
 TRUTH = EXAMPLE.with_name("robird.truth.json")
-WITHIN = 0.15
+WITHIN = 0.15  # relative error up to which a gene counts as correct
 # Evaluators that must agree: kind, workers, and BLAS threads in this process (None: unchanged).
 RUNS: tuple[tuple[EvaluatorKind, int | None, int | None], ...] = (
     ("in_process", None, None),
@@ -62,7 +63,10 @@ class Outcome:
 
 
 def run(spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, label: str) -> Outcome:
-    """Calibrate, and compute the result's misfits and standard errors; progress goes to standard error."""
+    """Calibrate, and compute the misfits and standard errors of the result; progress goes to standard error.
+
+    ``label``: name of the calibration for the progress line.
+    """
     start, last = time.perf_counter(), None
     for last in calibrate(spec, dataset, evaluator):
         note = f"{label}: {last.stage}, generation {last.index}, {last.distance * 1e3:.3f} mm"
@@ -74,7 +78,10 @@ def run(spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, label: st
 
 
 def floor(spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, truth: Genome) -> tuple[float, float]:
-    """Mean distance (m) of markers simulated with the true genes from the recorded ones, fitted and held out."""
+    """Return the mean distances (m) between markers simulated with the true genes and recorded ones.
+
+    The first is over the recordings that are fitted, the second over those that are held out.
+    """
     found = judge(spec, dataset, evaluator, truth.as_dict())
     if found.held_out_after is None:
         raise ValueError("the campaign has no held-out recording")
@@ -82,7 +89,10 @@ def floor(spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, truth: 
 
 
 def gene_table(result: Result, truth: Genome) -> list[dict[str, Any]]:
-    """Relative error and standard error (per cent) of each gene; genes that are shares are normalised to sum 1."""
+    """Return one row per gene: estimate, true value, error and standard error (per cent), whether identifiable.
+
+    Genes that are shares of one quantity are normalised to sum to 1.
+    """
     true = truth.normalised()
     return [
         {
@@ -98,7 +108,10 @@ def gene_table(result: Result, truth: Genome) -> list[dict[str, Any]]:
 
 
 def thesis_campaign() -> Dataset:
-    """Simulated recordings as in van der Grinten's thesis (V-A): 24 bodies, one in vacuum and one in the tunnel."""
+    """Simulate recordings as in van der Grinten's thesis (section V-A), and return them as a dataset.
+
+    A wing of 24 bodies, one recording in the vacuum chamber and one in the wind tunnel.
+    """
     model = FlexibleWing(robird_wing(), "24", numerics=REFERENCE)
     truth, conditions = true_genome(model, 2), (vacuum(10.0, 0.0524, 3.0), tunnel(0.0524, 3.0, 6.0))
     recordings = tuple(
@@ -108,7 +121,10 @@ def thesis_campaign() -> Dataset:
 
 
 def resume_is_identical(dataset: Dataset, evaluator: Evaluator) -> bool:
-    """Whether a short calibration resumed from each stage's checkpoint (through JSON) gives the same generations."""
+    """Return whether a short calibration resumed from checkpoints gives the same generations as without.
+
+    It is resumed after its first and fourth generation, from checkpoints converted to JSON and back.
+    """
     spec = CalibrationSpec(division="11", population=16, max_generations=3, seed=5)
     whole = list(calibrate(spec, dataset, evaluator))
     return all(
@@ -118,7 +134,7 @@ def resume_is_identical(dataset: Dataset, evaluator: Evaluator) -> bool:
 
 
 def evaluators_are_identical(dataset: Dataset) -> bool:
-    """Whether all evaluators in RUNS return bit-identical results for the same individuals."""
+    """Return whether all evaluators in RUNS return bit-identical results for the same individuals."""
     spec = CalibrationSpec(division="11")
     model, stage = model_for(dataset, spec), prepare(spec, dataset).stages[1]
     problem = Problem(model, stage.recordings, stage.free, base_genome(model))
@@ -138,7 +154,10 @@ def evaluators_are_identical(dataset: Dataset) -> bool:
 
 
 def measure(kind: EvaluatorKind, seed: int, joint: bool) -> dict[str, Any]:
-    """All figures of the benchmark."""
+    """Calibrate by each variant and return all figures of the benchmark.
+
+    ``kind``: of the evaluator; ``joint``: whether to search all genes at once too.
+    """
     dataset = load_dataset(EXAMPLE)
     truth = read_truth(TRUTH)
     spec = CalibrationSpec(division="11", seed=seed)
@@ -184,7 +203,7 @@ def measure(kind: EvaluatorKind, seed: int, joint: bool) -> dict[str, Any]:
 
 
 def main() -> None:
-    """Command line."""
+    """Parse the command line, measure, and print the figures."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.calibration", description=__doc__)
     parser.add_argument("--json", action="store_true", help="print only the JSON object")
     parser.add_argument(

@@ -1,7 +1,7 @@
-"""The quasi-steady model with clap-and-peel, fitted to a virtual balance with known coefficients.
+"""Fits the quasi-steady model with clap-and-peel to a simulated balance (force sensor) with known coefficients.
 
 ``python -m benchmarks.delfly [--json] [--no-estimators] [--seed N]``; with ``--json`` the last line is one JSON object.
-``--example FOLDER`` only writes the example campaign.
+``--example FOLDER`` only writes the example campaign. Conditions are the eight tests of Armanini et al. (2016).
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ REPETITIONS = 200
 DRAWS = 20  # campaigns with other seeds
 CORNER_TOLERANCE = 1e-3  # relative
 SMALL = Balance(every=10, beats=40)  # for measurements that are repeated many times
-# Errors that are constant throughout a recording, which residuals do not show: resonance, slow drift.
+# Without the errors that are constant throughout a recording, which residuals do not show: resonance, slow drift.
 TOLD_BY_RESIDUALS = replace(SMALL, participation=0.0, drift=0.0)
 LIFT_RMSE_PERCENT = (13, 13, 13, 15, 17, 18, 50, 32)  # Table 7 of Armanini et al. (2016)
 LIFT_CORRELATION = (0.97, 0.97, 0.97, 0.96, 0.96, 0.94, 0.92, 0.85)
@@ -67,8 +67,8 @@ LIFT_CORRELATION = (0.97, 0.97, 0.97, 0.96, 0.96, 0.94, 0.92, 0.85)
 class Fitted:
     """A model fitted to one recording.
 
-    ``agreement``: correlation and error of each quantity; ``misfit_range``: interval of the beat (t*) in which it
-    misses physics, or None.
+    ``problem``: its base genome is the estimate; ``agreement``: correlation and error of each force; ``misfit_range``:
+    interval of the beat (start, end; fractions) in which the model misses physics, or None.
     """
 
     trial: Trial
@@ -80,26 +80,26 @@ class Fitted:
 
     @property
     def errors(self) -> dict[str, float]:
-        """Relative error of each coefficient with a known true value, per cent."""
+        """Relative error (per cent) of each coefficient with a known true value."""
         true = self.trial.coefficients
         return {name: 100 * (value / true[name] - 1) for name, value in self.estimate.values.items() if name in true}
 
     @property
     def local(self) -> LocalEstimate:
-        """The estimate in the form that the global model is fitted to."""
+        """The estimate and its standard errors in the form to which the global model is fitted."""
         found, name = self.estimate, self.recording.name
         bounds = dict(zip(found.free, np.sqrt(np.diag(found.uncertainty.covariance)).tolist(), strict=True))
         return LocalEstimate(name, (name,), found.values, bounds, (), (), found.uncertainty.cost, True, ())
 
 
 def problem_of(model: BladeElementWing, recording: Recording) -> Problem:
-    """Fit problem: lift coefficients estimated from the force along x with fixed drag, as in Armanini et al. (2016)."""
+    """Return the problem of fitting lift coefficients to the force along x, drag fixed (Armanini et al. 2016)."""
     drag = {name: value for name, value in DRAG.items() if name in {gene.name for gene in model.genes}}
     return Problem(model, (recording,), model.searched, base_genome(model, drag), ("x",))
 
 
 def fit(model: BladeElementWing, recording: Recording, trial: Trial, evaluator: Evaluator) -> Fitted:
-    """Estimate the coefficients, starting from their nominal values, and compute the agreement of the forces."""
+    """Estimate the coefficients, starting from their nominal values, and compare the forces with the recorded ones."""
     problem = problem_of(model, recording)
     found = estimate(problem, evaluator, {})
     best = replace(problem, base=problem.base.replace(found.values))
@@ -109,7 +109,7 @@ def fit(model: BladeElementWing, recording: Recording, trial: Trial, evaluator: 
 
 
 def corners(model: BladeElementWing, fitted: list[Fitted], evaluator: Evaluator) -> float:
-    """Percentage of starts (every corner of the search box under every condition) that end at the estimate."""
+    """Return the percentage of fits from all corners of the search box, in all tests, that end at the estimate."""
     good, total = 0, 0
     for one in fitted:
         problem = problem_of(model, one.recording)
@@ -124,7 +124,7 @@ def corners(model: BladeElementWing, fitted: list[Fitted], evaluator: Evaluator)
 def coverage(
     model: BladeElementWing, beats: list[Array], balance: Balance, repetitions: int, seed: int, evaluator: Evaluator
 ) -> dict[str, float]:
-    """Percentage of 90 % intervals that contain the truth, by coefficient, over repetitions with different noise."""
+    """Return the percentage of 90 % intervals, over fits with other noise, that contain the truth, by coefficient."""
     held = dict.fromkeys(COEFFICIENTS, 0)
     for k in range(repetitions):
         trial, beat = TRIALS[k % len(TRIALS)], beats[k % len(TRIALS)]
@@ -136,7 +136,7 @@ def coverage(
 
 
 def luck(model: BladeElementWing, beats: list[Array], seed: int, evaluator: Evaluator) -> dict[str, float]:
-    """Median and maximum, over DRAWS random seeds of the noise, of the largest error (per cent) of any coefficient."""
+    """Return median and maximum, over random seeds of the noise, of the largest error (per cent) of any coefficient."""
     largest = []
     for draw in range(DRAWS):
         errors = []
@@ -149,7 +149,7 @@ def luck(model: BladeElementWing, beats: list[Array], seed: int, evaluator: Eval
 
 
 def systematic(model: BladeElementWing, evaluator: Evaluator) -> dict[str, float]:
-    """Largest error (per cent) of any coefficient under any condition, by kind of systematic measurement error."""
+    """Return the largest error (per cent) of any coefficient in any test, by kind of systematic measurement error."""
     still = Balance(every=10, beats=10, sensor=0.0, participation=0.0, rattle=0.0, drift=0.0, scatter=0.0, timing=0.0)
     largest = dict.fromkeys(
         ("finer_truth", "resonance", "zero_off_by_1_mn", "phase_off_by_a_thousandth_of_a_beat"), 0.0
@@ -173,7 +173,7 @@ def systematic(model: BladeElementWing, evaluator: Evaluator) -> dict[str, float
 
 
 def milliseconds(model: BladeElementWing, batch: int = 64, rounds: int = 7) -> float:
-    """Processor time (ms) of one individual with its own wing motion, in a batch; the best of several rounds."""
+    """Return the processor time (ms) of one individual in a batch of different motions; best of ``rounds``."""
     rng, best = np.random.default_rng(0), np.inf
     nominal = np.array([gene.nominal for gene in model.genes])
     width = np.array([gene.upper - gene.lower for gene in model.genes])
@@ -189,12 +189,12 @@ def milliseconds(model: BladeElementWing, batch: int = 64, rounds: int = 7) -> f
 
 
 def global_errors(law: GlobalModel) -> dict[str, float]:
-    """Largest relative difference (per cent) of the global model from the local estimates, by coefficient."""
+    """Return the largest relative difference (per cent) of the global model from local estimates, by coefficient."""
     return {gene.name: 100 * gene.largest_error for gene in law.genes}
 
 
 def lift_by_law(fitted: list[Fitted], law: GlobalModel) -> float:
-    """RMS error of lift with the global model, mean over the conditions, per cent."""
+    """Return the RMS error (per cent) of lift with the global model ``law``, mean over the tests."""
     found = []
     for one in fitted:
         genome = one.problem.base.replace(at(law, one.trial.condition).values)
@@ -204,13 +204,13 @@ def lift_by_law(fitted: list[Fitted], law: GlobalModel) -> float:
 
 
 def mean_lift(fitted: list[Fitted]) -> tuple[float, float]:
-    """Correlation and RMS error (per cent) of lift, means over the conditions."""
+    """Return correlation and RMS error (per cent) of lift, means over the tests."""
     lift = [one.agreement["lift"] for one in fitted]
     return float(np.mean([a.correlation for a in lift])), float(np.mean([a.rmse_percent for a in lift]))
 
 
 def widest(ranges: list[tuple[float, float] | None]) -> list[float] | None:
-    """Smallest interval that contains all ``ranges``; None if one of them is None."""
+    """Return the smallest interval that contains all ``ranges``; None if one of them is None."""
     known = [one for one in ranges if one is not None]
     return [min(r[0] for r in known), max(r[1] for r in known)] if len(known) == len(ranges) else None
 
@@ -218,7 +218,7 @@ def widest(ranges: list[tuple[float, float] | None]) -> list[float] | None:
 def fits(
     seed: int, models: Mapping[str, BladeElementWing], evaluator: Evaluator
 ) -> tuple[dict[str, list[Fitted]], dict[str, Fitted]]:
-    """Fits of each model to recordings of all conditions at CUTOFF, and to one recording at FINER_CUTOFF, by model."""
+    """Fit each model to all tests, low-passed at CUTOFF, and to one at FINER_CUTOFF; return both sets, by model."""
     vehicle = delfly()
     found: dict[str, list[Fitted]] = {name: [] for name in models}
     finer: dict[str, Fitted] = {}
@@ -233,7 +233,7 @@ def fits(
 
 
 def agreement_figures(fitted: Mapping[str, list[Fitted]], finer: Mapping[str, Fitted]) -> dict[str, Any]:
-    """Figures: errors of the coefficients, interval of the beat where incomplete models fail, agreement of lift."""
+    """Return, for the report, errors of coefficients, where in the beat models miss physics, agreement of lift."""
     figures: dict[str, Any] = {
         "coefficient_error_percent": max(abs(e) for one in fitted["proposed"] for e in one.errors.values()),
         "misfit_tstar_range": widest([one.misfit_range for one in fitted["without_fling"]]),
@@ -255,7 +255,7 @@ def agreement_figures(fitted: Mapping[str, list[Fitted]], finer: Mapping[str, Fi
 
 
 def global_figures(fitted: list[Fitted]) -> dict[str, Any]:
-    """Differences between the global model and the local estimates: weighted, unweighted, and for the printed table."""
+    """Return, for the report, differences of the global model from local estimates and from Table 8."""
     local, conditions = [one.local for one in fitted], [one.trial.condition for one in fitted]
     law, plain = fit_global(local, conditions), fit_global(local, conditions, weighted=False)
     return {
@@ -273,7 +273,7 @@ def global_figures(fitted: list[Fitted]) -> dict[str, Any]:
 
 
 def repeated_figures(model: BladeElementWing, repetitions: int, seed: int, evaluator: Evaluator) -> dict[str, Any]:
-    """Coverage of intervals with and without systematic errors, and convergence from the corners."""
+    """Return, for the report, coverage of intervals, convergence from corners, errors with other noise."""
     beats = [true_beat(model.vehicle, trial) for trial in TRIALS]
     covered = coverage(model, beats, TOLD_BY_RESIDUALS, repetitions, seed, evaluator)
     starts = [
@@ -296,7 +296,7 @@ def repeated_figures(model: BladeElementWing, repetitions: int, seed: int, evalu
 
 
 def rows(fitted: Mapping[str, list[Fitted]]) -> list[dict[str, Any]]:
-    """One row per condition: coefficients, lift, drag, published values (Tables 7, 8), where fling is missed."""
+    """Return one row per test: estimated and true coefficients, agreement of lift and drag, results without fling."""
     return [
         {
             "condition": one.trial.name,
@@ -329,7 +329,7 @@ def rows(fitted: Mapping[str, list[Fitted]]) -> list[dict[str, Any]]:
 
 
 def measure(seed: int, repetitions: int, evaluator: Evaluator) -> dict[str, Any]:
-    """All figures of the benchmark except those of the estimators."""
+    """Measure and return all figures of the benchmark except those of the estimators."""
     start, vehicle = time.perf_counter(), delfly()
     models = {
         "proposed": BladeElementWing(vehicle),
@@ -345,7 +345,7 @@ def measure(seed: int, repetitions: int, evaluator: Evaluator) -> dict[str, Any]
 
 
 def table(conditions: list[dict[str, Any]]) -> str:
-    """The rows as text; in brackets the figures of Armanini et al. (2016) for their own measurements."""
+    """Return ``conditions`` (:func:`rows`) as text, with the figures of Armanini et al. (2016) in brackets."""
     head = (
         "condition  C_l est. (true)    C_r est. (true)    C_F est. (true)    lift: RMSE %    correlation   "
         "without fling: RMSE %  correlation  misfit at t*"
@@ -365,7 +365,7 @@ def table(conditions: list[dict[str, Any]]) -> str:
 
 
 def main() -> None:
-    """Command line."""
+    """Parse the command line, measure, and print the figures."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.delfly", description=__doc__)
     parser.add_argument("--json", action="store_true", help="print one JSON object as the last line")
     parser.add_argument("--no-estimators", action="store_true", help="do not compare search methods")

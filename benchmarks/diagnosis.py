@@ -1,8 +1,8 @@
 """Duration of one diagnosis: twelve recordings, a wing of 24 bodies, data of a finer discretisation.
 
-``python -m benchmarks.diagnosis --json`` simulates recordings with the plant of ``benchmarks.concealed`` under twelve
-conditions, with one hidden effect, and diagnoses the files as a user does. It prints the time, the longest interval
-between two progress reports, and the ratio of true to estimated remaining time at half of the work.
+``python -m benchmarks.diagnosis --json`` simulates recordings under twelve conditions with the separate wing model of
+``benchmarks.concealed``, in which one effect is hidden, and diagnoses the files as a user does. It prints the time, the
+longest interval between two progress reports, and the ratio of true to estimated remaining time at half of the work.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ HALF = 0.5  # fraction of the work at which the estimated remaining time is chec
 
 
 def recorded(division: str, plant: str, seed: int) -> Dataset:
-    """Dataset of twelve simulated recordings with random parameters; the same seed gives bit-identical data.
+    """Simulate twelve recordings with random parameters; the same seed gives bit-identical data.
 
     ``division``, ``plant``: discretisations of the model to be diagnosed and of the simulated wing.
     """
@@ -50,7 +50,10 @@ def recorded(division: str, plant: str, seed: int) -> Dataset:
 
 
 def measured(path: Path, division: str, evaluator: EvaluatorKind, workers: int) -> dict[str, Any]:
-    """Diagnose the file at ``path``: time, progress reports and verdict."""
+    """Diagnose the file at ``path`` and return time, progress reports and verdict.
+
+    ``division``: discretisation of the model; ``evaluator``, ``workers``: kind and number of processes that simulate.
+    """
     spec, pool = DiagnosisSpec(CalibrationSpec(division=division)), make_evaluator(evaluator, workers)
     reports: list[tuple[float, Progress]] = []
     began = time.perf_counter()
@@ -81,7 +84,10 @@ def measured(path: Path, division: str, evaluator: EvaluatorKind, workers: int) 
 
 
 def _stages(reports: Sequence[tuple[float, Progress]]) -> dict[str, float]:
-    """Seconds spent in each kind of stage; the kind is the first two words of the stage's label in ``reports``."""
+    """Return the seconds spent in each kind of stage: the first two words of the stage's name in ``reports``.
+
+    ``reports``: (time in s, progress) of each report.
+    """
     spent: dict[str, float] = {}
     for (at, one), (after, _) in pairwise(reports):
         name = " ".join(one.stage.split()[:2])
@@ -90,7 +96,7 @@ def _stages(reports: Sequence[tuple[float, Progress]]) -> dict[str, float]:
 
 
 def main() -> None:
-    """Command line."""
+    """Parse the command line, simulate, diagnose, and print the figures."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.diagnosis", description=__doc__)
     parser.add_argument("--json", action="store_true", help="print one JSON object as the last line")
     parser.add_argument("--division", default="24", help="discretisation of the model")

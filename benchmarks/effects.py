@@ -1,10 +1,11 @@
 """Cost of each effect, and the change it makes before and after a refit: ``python -m benchmarks.effects [--json]``.
 
-On the Robird's wing of 11 bodies over the small campaign (ten conditions), without noise, and on the DelFly over its
-eight tests. An effect is simulated at its typical size and the nominal genes are refitted; the residual is the part of
-the effect that can be detected at all. Residual directions of two effects are compared by the angle between them, after
-projecting out what the nominal genes can change. About twelve minutes on two cores; ``--quick`` uses three conditions,
-``--only a,b`` some of the effects.
+An effect is an optional piece of physics that can be added to the model. It is measured on the Robird's wing of 11
+bodies over the small campaign (ten conditions) and on the DelFly over its eight tests, without noise. The effect is
+simulated at its typical size and the nominal genes are refitted; the residual is the part of the effect that can be
+detected at all. Residuals of two effects are compared by the angle between them, after projecting out what the nominal
+genes can change. About twelve minutes on two cores; ``--quick`` uses three conditions, ``--only a,b`` some of the
+effects.
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ REPEATS = 4
 SPREAD = 0.1  # relative spread of the genes in a batch whose cost is measured
 SEEN = 1e-3  # mm or mN: smaller changes are within the simulation's error
 ITERATIONS = 12
-GAIN = 0.98  # iterations end when the sum of squares falls by less than this factor
+GAIN = 0.98  # iterations end when the sum of squares is above this fraction of the one before
 LENGTHS = np.array(
     [1.0, 0.7, 0.5, 0.35, 0.2, 0.1, 1.3, 1.6]
 )  # step lengths that are tried together, in one group of lanes
@@ -49,8 +50,8 @@ LENGTHS = np.array(
 class Moved:
     """Change that an effect makes to the recordings of a rig.
 
-    ``size``: RMS change; ``left``: RMS residual after the nominal genes are refitted, both mm or mN; ``columns`` [D,
-    sizes]: change by each of the effect's size parameters, m or N.
+    ``size``: RMS change; ``left``: RMS residual after the nominal genes are fitted to the changed recordings, both mm
+    or mN; ``columns`` [D, S]: change of all D recorded values by each of the effect's S size genes alone, m or N.
     """
 
     size: float
@@ -59,7 +60,10 @@ class Moved:
 
 
 def batch(rig: Rig, model: AnyModel, effect: Effect | None, seed: int = 1, count: int = 16) -> Array:
-    """Genomes [count, G] near the nominal one, each with a different motion; the effect has its typical size."""
+    """Return ``count`` genomes [count, G] near the nominal one, each with a different motion.
+
+    The genes of ``effect`` have their typical values; ``seed``: of the random numbers.
+    """
     values = np.array([gene.nominal for gene in model.genes])
     wobble = np.random.default_rng([seed, 1]).uniform(-1.0, 1.0, (count, len(values)))
     genomes = values * (1.0 + SPREAD * wobble)
@@ -72,9 +76,9 @@ def batch(rig: Rig, model: AnyModel, effect: Effect | None, seed: int = 1, count
 
 
 def cost_ratio(rig: Rig, effect: Effect) -> float:
-    """Processor time of a batch with the effect relative to one without.
+    """Return the processor time of a batch of simulations with the effect divided by that without.
 
-    Median of alternating repeats with new genomes.
+    Median over REPEATS alternating repetitions with new genomes.
     """
     without = rig.stands_for(effect)
     models = [(rig.by_default(one, without), one) for one in (None, effect)]
@@ -92,7 +96,10 @@ def cost_ratio(rig: Rig, effect: Effect) -> float:
 
 
 def displacement(rig: Rig, effect: Effect, values: dict[str, float], recordings: tuple[Recording, ...]) -> Array:
-    """Change [D] (m or N) of all recorded values by the effect with its genes at ``values``."""
+    """Return the change [D] (m or N) of all recorded values by the effect, one recording after the other.
+
+    ``values``: values of the effect's genes by name. ValueError if a simulation fails.
+    """
     model = rig.model(effect)
     genome = base_genome(model, values)
     changed = []
@@ -105,7 +112,11 @@ def displacement(rig: Rig, effect: Effect, values: dict[str, float], recordings:
 
 
 def moved(rig: Rig, effect: Effect) -> Moved:
-    """The change by ``effect`` at its typical size, the residual after a refit, and the change per parameter."""
+    """Compute the change by ``effect`` at its typical size.
+
+    The result includes the residual after a refit of the nominal genes, and the change by each of the effect's size
+    genes.
+    """
     recordings, typical = rig.recordings(rig.stands_for(effect)), effect.typical(rig.description)
     whole = displacement(rig, effect, typical, recordings)
     size = rig.unit * rig.rms(whole)
@@ -118,7 +129,10 @@ def moved(rig: Rig, effect: Effect) -> Moved:
 
 
 def refitted(rig: Rig, effect: Effect, recordings: tuple[Recording, ...], whole: Array) -> float:
-    """RMS residual (m or N) after the nominal genes are fitted to ``recordings`` changed by ``whole`` [D]."""
+    """Return the RMS residual (m or N) after the nominal genes are fitted to changed recordings.
+
+    ``whole`` [D]: the change, which is added to all values of ``recordings``.
+    """
     model = rig.model(None, without=rig.stands_for(effect))
     slopes, total, samples = sensitivities(rig, rig.stands_for(effect)), 0.0, 0
     for part, slope in zip(rig.parts(rig.changed(recordings, whole)), slopes, strict=True):
@@ -129,9 +143,9 @@ def refitted(rig: Rig, effect: Effect, recordings: tuple[Recording, ...], whole:
 
 
 def _fit(problem: Problem, slope: Array) -> tuple[float, int]:
-    """Least-squares fit with the constant Jacobian ``slope``, trying several step lengths at once.
+    """Fit the nominal genes by least squares with a constant Jacobian, trying several step lengths at once.
 
-    Returns the sum of squares and the number of samples.
+    ``slope``: Jacobian of :func:`sensitivities`. Returns the sum of squares (m^2 or N^2) and the number of samples.
     """
     genes, evaluator = free_genes(problem), InProcessEvaluator()
     unit, best, inverse = (
@@ -153,7 +167,10 @@ def _fit(problem: Problem, slope: Array) -> tuple[float, int]:
 
 @cache
 def sensitivities(rig: Rig, without: str) -> list[Array]:
-    """Jacobian [D, F] of the nominal genes, for each set of recordings that share a genome."""
+    """Return the Jacobian [D, F] of the D recorded values by the F nominal genes in unit coordinates.
+
+    There is one for each group of recordings that share a genome. ``without``: term that the model omits, or "".
+    """
     found = []
     for part in rig.parts(rig.recordings(without)):
         model = rig.model(None, without=without)
@@ -166,20 +183,24 @@ def sensitivities(rig: Rig, without: str) -> list[Array]:
 
 @cache
 def nominal_directions(rig: Rig, without: str) -> Array:
-    """Orthonormal basis [D, .] of the changes of all recorded values that the nominal genes can make (linearised)."""
+    """Return an orthonormal basis [D, R] of the changes of all recorded values that the nominal genes can make.
+
+    The changes are linearised; R is their rank. ``without``: term that the model omits, or "".
+    """
     basis, spread, _ = np.linalg.svd(block_diag(*sensitivities(rig, without)), full_matrices=False)
     return np.asarray(basis[:, spread > 1e-6 * spread[0]])
 
 
 def angle(a: Array, b: Array) -> float:
-    """Smallest angle (degrees) between two subspaces, given by orthonormal bases [D, .]."""
+    """Return the smallest angle (degrees) between two subspaces, given by orthonormal bases [D, any number] each."""
     return float(np.degrees(np.arccos(np.clip(np.linalg.norm(a.T @ b, 2), 0.0, 1.0))))
 
 
 def freed(rig: Rig, one: Moved, known: Array) -> Array:
-    """Orthonormal basis [D, .] of the effect's changes ``one`` without those that the nominal genes can make.
+    """Return an orthonormal basis [D, R] of an effect's changes without those that the nominal genes can make.
 
-    ``known``: of :func:`nominal_directions`. Changes below SEEN are omitted.
+    ``one``: the changes; ``known``: basis of :func:`nominal_directions`. R is the number of the effect's size genes
+    less those whose remaining change is below SEEN, which are omitted.
     """
     free = one.columns - known @ (known.T @ one.columns)
     seen = [rig.unit * rig.rms(column) > SEEN for column in free.T]
@@ -187,7 +208,11 @@ def freed(rig: Rig, one: Moved, known: Array) -> Array:
 
 
 def nearest(rig: Rig, name: str, found: dict[str, Moved]) -> tuple[str | None, float | None]:
-    """The effect with the most similar residual, and the angle to it; None if either residual is below SEEN."""
+    """Find the effect with the most similar residual: return its name and the angle (degrees) to it.
+
+    ``name``: effect to compare; ``found``: changes by all effects, by name. (None, None) if there is no residual above
+    SEEN to compare.
+    """
     known = nominal_directions(rig, rig.stands_for(EFFECTS[name]))
     own = freed(rig, found[name], known)
     others = {other: freed(rig, one, known) for other, one in found.items() if other != name}
@@ -203,7 +228,10 @@ def _task(kind: str, name: str, quick: bool) -> Moved:
 
 
 def measure(names: Iterable[str], *, quick: bool = False, costs: bool = True) -> dict[str, Any]:
-    """All rows of the table for the effects ``names``; progress goes to standard error."""
+    """Measure the effects ``names``; return the rows of the table and the conditions of the measurement.
+
+    Progress goes to standard error. ``costs``: whether to measure processor times too.
+    """
     names, began = list(names), time.monotonic()
     tasks = [(k, n) for k in RIGS for n in names if EFFECTS[n].applies_to(rig_of(k, quick).description)]
     ratios: dict[tuple[str, str], float | None] = dict.fromkeys(tasks)
@@ -225,7 +253,10 @@ def measure(names: Iterable[str], *, quick: bool = False, costs: bool = True) ->
 def row(
     name: str, found: dict[str, dict[str, Moved]], ratios: dict[tuple[str, str], float | None], *, quick: bool
 ) -> dict[str, Any]:
-    """One row of the table for effect ``name``: changes of tracks in mm, and of forces in mN."""
+    """Return one row of the table for effect ``name``: changes of tracks in mm, and of forces in mN.
+
+    ``found``: changes by kind of rig and name of the effect; ``ratios``: relative costs by (kind, name).
+    """
     line: dict[str, Any] = {"name": name, "family": EFFECTS[name].family}
     for kind, prefix, unit in (("wing", "", "mm"), ("vehicle", "vehicle_", "mn")):
         one = found[kind].get(name)
@@ -241,7 +272,7 @@ def row(
 
 
 def table(answer: dict[str, Any]) -> str:
-    """The rows in markdown, as in docs/effects.md."""
+    """Return the rows of :func:`measure` in markdown, as in docs/effects.md."""
 
     def cell(value: float | None, digits: int = 2) -> str:
         return "" if value is None else f"{value:.{digits}f}"
@@ -262,7 +293,7 @@ def table(answer: dict[str, Any]) -> str:
 
 
 def main() -> None:
-    """Command line."""
+    """Parse the command line, measure, and print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--json", action="store_true", help="print one JSON object as the last line")
     parser.add_argument("--quick", action="store_true", help="three conditions of each rig")

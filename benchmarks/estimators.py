@@ -1,7 +1,8 @@
 """Search methods on the example wing: cost until the misfit is as good as the best of all methods.
 
-``python -m benchmarks.estimators [--json] [--evaluator KIND] [--starts N]``. All genes at once on all fitted
-recordings of examples/robird, 11 bodies. The floor is the best misfit (thesis Eq. 14) that any method reaches.
+``python -m benchmarks.estimators [--json] [--evaluator KIND] [--starts N]``. All genes are fitted at once to all
+recordings of examples/robird that are not held out, with 11 bodies. The floor is the best misfit (a sum of squares, Eq.
+14 of van der Grinten's thesis) that any method reaches.
 """
 
 from __future__ import annotations
@@ -40,7 +41,7 @@ SEARCHES = {
 
 @dataclass(frozen=True)
 class Point:
-    """State of a search: individuals evaluated, seconds, sum of squares of the best so far (m^2)."""
+    """State of a search: individuals evaluated and seconds so far, and the least sum of squares so far (m^2)."""
 
     evaluations: int
     seconds: float
@@ -48,9 +49,10 @@ class Point:
 
 
 def trace(label: str, states: Iterable[tuple[int, float]]) -> list[Point]:
-    """Run the search ``states`` and return its points.
+    """Run a search to its end and return its states.
 
-    The search yields the number of individuals evaluated so far and a sum of squares.
+    ``states``: the search, which yields the number of individuals evaluated so far and a sum of squares (m^2);
+    ``label``: its name for the progress line.
     """
     start, points, best = time.perf_counter(), list[Point](), np.inf
     for evaluations, squares in states:
@@ -64,7 +66,7 @@ def trace(label: str, states: Iterable[tuple[int, float]]) -> list[Point]:
 def from_random(
     spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, seed: int
 ) -> Iterable[tuple[int, float]]:
-    """Gauss-Newton from a random start, uniform over the genes' ranges (in unit coordinates).
+    """Search by Gauss-Newton from a random start, uniform over the genes' ranges (in unit coordinates).
 
     Yields the number of individuals evaluated so far and the present sum of squares (m^2).
     """
@@ -80,12 +82,12 @@ def from_random(
 
 
 def reached(points: list[Point], floor: float) -> Point | None:
-    """The first point whose sum of squares is at most AS_GOOD times ``floor``; None if there is none."""
+    """Return the first point whose sum of squares is at most AS_GOOD times ``floor``; None if there is none."""
     return next((point for point in points if point.squares <= AS_GOOD * floor), None)
 
 
 def row(method: str, points: list[Point], floor: float) -> dict[str, Any]:
-    """Row of the table: cost of ``method`` until the floor is reached (None: never), and at the end of the search."""
+    """Return a row of the table: cost of ``method`` until the floor is reached (None: never), and until its end."""
     first = reached(points, floor)
     return {
         "method": method,
@@ -98,7 +100,11 @@ def row(method: str, points: list[Point], floor: float) -> dict[str, Any]:
 
 
 def estimators(kind: EvaluatorKind = "processes", starts: int = 4, seed: int = 1) -> list[dict[str, Any]]:
-    """One row per method; for random starts the median, with the number of starts that reached the floor."""
+    """Run all methods and return one row per method.
+
+    ``kind``: of the evaluator; ``starts``: number of random starts of Gauss-Newton, which have one row: the median of
+    those that reach the floor, with their number.
+    """
     dataset, evaluator = load_dataset(EXAMPLE), make_evaluator(kind)
     try:
         _warm(dataset, evaluator)
@@ -117,7 +123,7 @@ def estimators(kind: EvaluatorKind = "processes", starts: int = 4, seed: int = 1
 
 
 def _warm(dataset: Dataset, evaluator: Evaluator) -> None:
-    """Compile the kernels and build the wing before anything is timed."""
+    """Simulate once before anything is timed, so that the kernels are compiled and the wing is built."""
     (stage,), model = prepare(SPEC, dataset).stages, model_for(dataset, SPEC)
     problem = Problem(model, stage.recordings, stage.free, base_genome(model))
     genes = free_genes(problem)
@@ -125,7 +131,7 @@ def _warm(dataset: Dataset, evaluator: Evaluator) -> None:
 
 
 def _started(dataset: Dataset, evaluator: Evaluator, seed: int) -> list[Point]:
-    """Points of a search from a random start; empty if the start cannot be simulated."""
+    """Return the points of a search from a random start; empty if the start cannot be simulated."""
     try:
         return trace(f"Gauss-Newton from random start {seed}", from_random(SPEC, dataset, evaluator, seed))
     except ValueError as error:
@@ -143,7 +149,7 @@ def _random_row(drawn: list[list[Point]], floor: float) -> dict[str, Any]:
 
 
 def main() -> None:
-    """Command line."""
+    """Parse the command line, run all methods, and print the rows."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.estimators", description=__doc__)
     parser.add_argument("--json", action="store_true", help="print only the JSON object")
     parser.add_argument("--evaluator", choices=("in_process", "processes", "ray"), default="processes")

@@ -1,7 +1,7 @@
-"""``python -m benchmarks.screenshots``: screenshots of the web page for the README, taken from a running server.
+"""``python -m benchmarks.screenshots``: takes screenshots of the web page for the README from a running server.
 
-The data of the Robird example (a displaced axis and a wrong linkage) are recorded, uploaded, calibrated twice and
-diagnosed, and the page is photographed in Chromium. A few minutes.
+Data of the Robird example (a wing with a displaced axis and a wrong linkage) are simulated, uploaded, calibrated twice
+and diagnosed, and the page is opened in Chromium. Takes a few minutes.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ DRAWN_SECONDS = 60.0
 
 
 def main() -> None:
-    """Simulate the data, run the jobs, take the screenshots; the last line is one JSON object."""
+    """Simulate the data, run the jobs, take the screenshots; the last line of output is one JSON object."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.screenshots", description=__doc__)
     parser.add_argument("--json", action="store_true", help="one JSON object as the last line (always printed)")
     parser.add_argument("--out", type=Path, default=OUT, help="folder for the screenshots")
@@ -56,7 +56,10 @@ def main() -> None:
 
 
 def worked(url: str, dataset: Path) -> dict[str, tuple[str, str]]:
-    """Upload ``dataset``, run the jobs, and return for each page its address and the id of the figure drawn last."""
+    """Upload ``dataset`` (a file) to the server at ``url``, run two calibrations and a diagnosis, and return the pages.
+
+    They are (address after the #, id of the figure that is drawn last), by name of the screenshot.
+    """
     with Client(url) as client:
         its = client.upload_dataset(dataset)["id"]
         runs = [
@@ -83,7 +86,10 @@ def worked(url: str, dataset: Path) -> dict[str, tuple[str, str]]:
 
 
 def photographed(url: str, pages: dict[str, tuple[str, str]], out: Path) -> list[str]:
-    """Save screenshots to ``out``: each page in light colours, the diagnosis also dark and on a phone; file names."""
+    """Save screenshots of ``pages`` (of :func:`worked`) to the folder ``out``; return their file names.
+
+    Each page is in light colours, the diagnosis also in dark ones and on a phone.
+    """
     from playwright.sync_api import sync_playwright  # needed here alone
 
     path = next((found for name in NAMES if (found := shutil.which(name))), None)

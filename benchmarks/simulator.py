@@ -1,9 +1,10 @@
-"""Cost and accuracy of the simulator, with other engines: ``python -m benchmarks.simulator [--json] [--quick]``.
+"""Cost and accuracy of the simulator and of other engines: ``python -m benchmarks.simulator [--json] [--quick]``.
 
-Costs are processor times of one thread for one beat and one individual in a full group of lanes, with the fewest steps
-that keep all markers within 0.1 mm of the converged periodic motion. The other engines run in processes of their own
-(``python -m benchmarks.peers``) and are measured in the same way, each against its own converged run. ``--quick`` omits
-the other engines, the search and the two largest wings. The whole takes about ten minutes on two cores.
+Costs are processor times of one thread for one beat and one individual (the simulator computes several at once, in
+"lanes", all of which are used), with the fewest steps that keep all markers within 0.1 mm of the converged periodic
+motion. The other engines run in processes of their own (``python -m benchmarks.peers``) and are measured in the same
+way, each against its own converged run. ``--quick`` omits the other engines, the search and the two largest wings. The
+whole takes about ten minutes on two cores.
 """
 
 from __future__ import annotations
@@ -58,7 +59,7 @@ _SILENCE = 3.0  # multiple of its time limit after which a peer process is kille
 
 
 class Progress:
-    """Shows the number of the present stage and its remaining time on standard error."""
+    """Shows the number of the present stage, of ``stages``, and its remaining time on standard error."""
 
     def __init__(self, stages: int) -> None:
         self.stages, self.stage, self.label = stages, 0, ""
@@ -82,9 +83,10 @@ class Progress:
 
 
 def case(bodies: int, medium: str, operations: int) -> dict[str, Any]:
-    """One row of the table: cost and accuracy with ``bodies`` bodies in ``medium``; peak and other engines still None.
+    """Measure cost and accuracy of the simulator with ``bodies`` bodies in ``medium``: one row of the table.
 
-    ``operations``: of one step of LANES individuals, which are simulated at once.
+    ``operations``: floating-point operations of one step of LANES individuals, which are simulated at once. Fraction of
+    the peak rate and results of other engines are still None in the returned row.
     """
     subject = Subject(DIVISIONS[bodies], CONDITIONS[medium])
     converged = reference(subject, TOLERANCE)
@@ -117,7 +119,7 @@ def case(bodies: int, medium: str, operations: int) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Peer:
-    """A case to measure with another engine: its name, number of bodies, medium."""
+    """One case to measure with another engine: its name, the number of bodies and the medium."""
 
     engine: str
     bodies: int
@@ -125,9 +127,9 @@ class Peer:
 
 
 def run_peer(peer: Peer, seconds: float) -> dict[str, Any]:
-    """Run ``benchmarks.peers`` for the case ``peer`` in its own process and return its result.
+    """Measure the case ``peer`` by ``benchmarks.peers`` in a process of its own, and return the result.
 
-    Without a result within ``seconds``, ``cpu_ms_per_beat`` is None and there is a note.
+    ``seconds``: time limit. Without a result, ``cpu_ms_per_beat`` is None and ``note`` gives the reason.
     """
     command = [
         sys.executable, "-m", "benchmarks.peers", "--division", DIVISIONS[peer.bodies], "--medium", peer.medium,
@@ -150,7 +152,10 @@ def run_peer(peer: Peer, seconds: float) -> dict[str, Any]:
 
 
 def compare(cases: list[dict[str, Any]], seconds: float, progress: Progress) -> None:
-    """Add the results of the other engines to the cases: large ones first, WORKERS at a time, one thread each."""
+    """Measure all ``cases`` with the other engines and add the results to them.
+
+    Large cases come first, WORKERS at a time, on one thread each. ``seconds``: time limit of each.
+    """
     peers = [Peer(engine, row["bodies"], row["medium"]) for row in reversed(cases) for engine in ENGINES]
     with ThreadPoolExecutor(WORKERS) as pool:
         for done, (peer, found) in enumerate(
@@ -162,7 +167,7 @@ def compare(cases: list[dict[str, Any]], seconds: float, progress: Progress) -> 
 
 
 def add_peer(row: dict[str, Any], engine: str, found: dict[str, Any]) -> None:
-    """Add the result ``found`` of another engine to the table's ``row``."""
+    """Add the result ``found`` of another ``engine`` (of :func:`run_peer`) to the ``row`` of the table."""
     cost = found["cpu_ms_per_beat"]
     ratio = None if cost is None else cost / row["ms_per_beat"]
     row[engine] = {name: found.get(name) for name in ("cpu_ms_per_beat", "error_mm", "method", "settings", "note")} | {
@@ -175,7 +180,7 @@ def add_peer(row: dict[str, Any], engine: str, found: dict[str, Any]) -> None:
 
 
 def installed(package: str) -> str:
-    """Version of the installed ``package``, or "not installed"."""
+    """Return the version of the installed ``package``, or "not installed"."""
     try:
         return version(package)
     except PackageNotFoundError:
@@ -183,7 +188,10 @@ def installed(package: str) -> str:
 
 
 def cost_exponents(cases: list[dict[str, Any]]) -> dict[str, float]:
-    """Exponent p of the cost, proportional to bodies^p, by medium; fitted to cases with four bodies along the chord."""
+    """Return, by medium, the exponent p of the cost of a beat, which is proportional to bodies^p.
+
+    It is fitted to the cases with four bodies along the chord.
+    """
     slopes = {}
     for medium in CONDITIONS:
         rows = [row for row in cases if row["medium"] == medium and row["bodies"] in GROWING]
@@ -194,9 +202,10 @@ def cost_exponents(cases: list[dict[str, Any]]) -> dict[str, float]:
 
 
 def search_seconds() -> float:
-    """Duration (s) of the genetic search of van der Grinten's thesis.
+    """Return the duration (s) of the genetic search of van der Grinten's thesis.
 
-    24 bodies, population 50, until it stalls, one vacuum and one tunnel recording.
+    24 bodies, population 50, until the best has not improved for 10 generations, one recording in vacuum and one in the
+    tunnel.
     """
     evaluator = make_evaluator("processes", WORKERS)
     try:
@@ -207,7 +216,10 @@ def search_seconds() -> float:
 
 
 def energy_errors(cases: list[dict[str, Any]]) -> dict[str, float]:
-    """Relative energy error over 20 beats, by medium, with the number of steps of the default accuracy."""
+    """Return the relative energy error over 20 beats, by medium, of ``cases`` with ENERGY_BODIES bodies.
+
+    The number of steps is that which the simulator uses by default.
+    """
     rows = {row["medium"]: row for row in cases if row["bodies"] == ENERGY_BODIES}
     return {
         medium: energy_error(Subject(DIVISIONS[ENERGY_BODIES], CONDITIONS[medium]), row["default_steps"])
@@ -216,7 +228,7 @@ def energy_errors(cases: list[dict[str, Any]]) -> dict[str, float]:
 
 
 def light_damping() -> dict[str, int | None]:
-    """Beats to the periodic motion in vacuum with a fifth of the damping, with and without Anderson acceleration."""
+    """Return the numbers of beats until periodic in vacuum with LIGHT damping, with and without acceleration."""
     subject = Subject(DIVISIONS[ENERGY_BODIES], CONDITIONS["vacuum"], LIGHT)
     steps = len(by_default(subject).beat.tracks)
     windows = {"beats_to_periodic": Numerics().window, "beats_to_periodic_plain": 0}
@@ -224,7 +236,11 @@ def light_damping() -> dict[str, int | None]:
 
 
 def costs(sizes: tuple[int, ...], progress: Progress) -> tuple[list[dict[str, Any]], dict[str, float]]:
-    """Rows of :func:`case` for the numbers of bodies ``sizes`` in each medium, and figures common to all rows."""
+    """Measure all numbers of bodies ``sizes`` in each medium.
+
+    Returns the rows of :func:`case`, and figures common to all rows: the peak rate, and the largest relative difference
+    of a step's result in the counting code from that in the compiled code.
+    """
     peak, cases, differences = flops.peak_gflops(), [], []
     for bodies in sizes:
         counted = flops.count_step(DIVISIONS[bodies])
@@ -239,14 +255,20 @@ def costs(sizes: tuple[int, ...], progress: Progress) -> tuple[list[dict[str, An
 
 
 def outcomes_of_random_genomes(every: int, progress: Progress) -> dict[str, Any]:
-    """Summary of simulations of random gene values; only every ``every``-th genome and condition is used."""
+    """Simulate random gene values and summarise the outcomes.
+
+    Only every ``every``-th genome and condition is used.
+    """
     genomes = random_genomes.draw(FlexibleWing(robird_wing()).genes, GENOMES // every, SEED)
     todo = random_genomes.tasks(genomes, random_genomes.CAMPAIGN[::every])
     return random_genomes.summary(todo, random_genomes.run(todo, WORKERS, progress))
 
 
 def measure(*, quick: bool, peer_seconds: float) -> dict[str, Any]:
-    """All figures of the benchmark."""
+    """Measure and return all figures of the benchmark.
+
+    ``quick``: as the option --quick; ``peer_seconds``: time limit of each case with another engine, s.
+    """
     progress, search = Progress(3 if quick else 5), None
     with progress.during("cost of a beat"):
         cases, core = costs(QUICK if quick else tuple(DIVISIONS), progress)
@@ -279,7 +301,7 @@ def measure(*, quick: bool, peer_seconds: float) -> dict[str, Any]:
 
 
 def table(figures: dict[str, Any]) -> str:
-    """The ``figures`` as a text table."""
+    """Return the ``figures`` as a text table."""
     columns = [
         "bodies", "medium", "steps", "ms_per_beat", "error_mm", "gflops", "fraction_of_peak", "times_faster_than_scipy",
         "times_faster_than_engine", "beats_to_periodic", "beats_to_periodic_plain",
@@ -295,7 +317,7 @@ def table(figures: dict[str, Any]) -> str:
 
 
 def main() -> None:
-    """Command line."""
+    """Parse the command line, measure, and print the figures."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.simulator", description=__doc__)
     parser.add_argument("--json", action="store_true", help="print only the JSON object")
     parser.add_argument("--quick", action="store_true", help="under two minutes: no other engine, no search")

@@ -1,7 +1,7 @@
 """A complete calibration over HTTP: ``python -m examples.demo`` (or ``make demo``).
 
 Starts a server on a free port with a temporary data folder, uploads the example campaign and calibrates the 11-body
-wing. Only then it reads the true genome and prints the error of the calibration.
+wing. Only after that it reads the true genome, and prints the error of the calibration.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ INTERRUPTED = 130
 
 
 def main(words: list[str] | None = None) -> int:
-    """Run the demo; 0 on success."""
+    """Run the demo with the options ``words``, by default those of the process; return the exit code, 0 on success."""
     parser = argparse.ArgumentParser(prog="python -m examples.demo", description=__doc__)
     parser.add_argument("--keep", action="store_true", help="keep the server running until Ctrl-C")
     options = parser.parse_args(words)
@@ -64,7 +64,7 @@ def main(words: list[str] | None = None) -> int:
 
 @contextmanager
 def server(data: Path) -> Iterator[str]:
-    """Run a server as a child process; yields its URL when it is ready, and stops it in any case."""
+    """Context manager: run a server with the folder ``data``, give its URL when it is ready, and stop it at the end."""
     url, port = _free_address()
     log = data / "server.log"
     chosen = {"WINGFIT_DATA": str(data / "data"), "WINGFIT_PORT": str(port), "WINGFIT_EVALUATOR": "ray"}
@@ -87,7 +87,7 @@ def server(data: Path) -> Iterator[str]:
 
 
 def calibrate(client: Client) -> None:
-    """Upload, calibrate, report."""
+    """Upload the example, calibrate it, and print the estimated genes and the misfits."""
     started = time.monotonic()
     dataset = client.upload_dataset(EXAMPLE)
     held_out = sum(recording["held_out"] for recording in dataset["recordings"])
@@ -115,14 +115,17 @@ def keep(url: str) -> NoReturn:
 
 
 def true_values(path: Path) -> dict[str, float]:
-    """The true genome of the recordings; as in the results, the genes that are shares of one quantity sum to 1."""
+    """Return the true genes of the recordings, by name, from the file at ``path``.
+
+    As in the results, genes that are shares of one quantity are normalised to sum to 1.
+    """
     from wingfit.sim.virtual_rigs.campaign import read_truth  # imported late, because it compiles kernels
 
     return read_truth(path).normalised()
 
 
 def _print_genes(genes: list[a.GeneInfo]) -> None:
-    """Print nominal, estimated and true value of each gene."""
+    """Print a table of nominal, estimated and true value of each gene."""
     truth = true_values(EXAMPLE.with_suffix(".truth.json"))
     off = {gene["name"]: 100 * (gene["best"] / truth[gene["name"]] - 1) for gene in genes}
     rows = [
@@ -184,7 +187,7 @@ def _await_start(url: str, child: subprocess.Popen[bytes], log: Path) -> None:
 
 
 def _stop(child: subprocess.Popen[bytes]) -> None:
-    """Stop the server; processes of its group that are left are killed."""
+    """Stop the server, and kill the processes of its group that still run."""
     # A second Ctrl-C must not interrupt this; it takes a limited time.
     previous = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:

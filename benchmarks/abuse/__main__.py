@@ -1,7 +1,7 @@
 """``python -m benchmarks.abuse --json``: sends malformed and hostile requests to a server, then runs a fuzzer on it.
 
-A request that must be refused is answered with 4xx and a problem document; no request is answered with 5xx. In between,
-the server answers valid requests, and its memory stays bounded.
+A request that must be refused must be answered with a 4xx status and a problem document (RFC 9457), and no request with
+5xx. In between, the server must answer valid requests, and its memory must stay below ENOUGH_MB.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ from benchmarks.common.progress import show
 from benchmarks.common.server_process import Server
 
 Json = dict[str, Any]
-ENOUGH_MB = 1024.0
+ENOUGH_MB = 1024.0  # largest acceptable peak memory of the server
 RAW_SECONDS = 0.5
 WORKING = {"WINGFIT_MAX_ACTIVE": "100000", "WINGFIT_MAX_RUNS": "1"}
 
 
 def main() -> None:
-    """Send everything, and print one JSON object as the last line."""
+    """Parse the command line, send all requests, and print one JSON object as the last line."""
     options = _options()
     st = None if options.no_fuzz else fuzz.program()
     if st is None and not options.no_fuzz:
@@ -78,9 +78,9 @@ def _measured(server: Server, st: str | None, options: argparse.Namespace, scrat
 
 
 def abused(http: httpx.Client, port: int, names: dict[str, str], cases: list[Case]) -> Json:
-    """Send ``cases`` to the server at ``port``; returns the number of answers by status, and the list of failures.
+    """Send ``cases`` to the server at ``port``; return the number of answers by status, and a list of failures.
 
-    ``names``: ids of existing objects that are put into the paths.
+    ``names``: ids of existing objects by placeholder, such as "{run}", which they replace in paths and bodies.
     """
     statuses, failures = Counter[int](), list[str]()
     for number, case in enumerate(cases):
@@ -97,7 +97,10 @@ def abused(http: httpx.Client, port: int, names: dict[str, str], cases: list[Cas
 
 
 def _sent(http: httpx.Client, port: int, case: Case, names: Json) -> tuple[int, str]:
-    """Send one case; returns the status of the answer (0 if a bare socket got none), and what is wrong, or ""."""
+    """Send one case; return the status of the answer, and what is wrong with the answer, or "" if nothing is.
+
+    ``names``: as in :func:`abused`. The status is 0 without an answer, and if the HTTP client cannot send the request.
+    """
     if case.raw:
         return _raw(port, case.raw), ""
     path, more = case.path, dict(case.more)

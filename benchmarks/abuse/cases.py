@@ -1,4 +1,4 @@
-"""Description of one malformed or hostile request to the server."""
+"""Describes one malformed or hostile request to the server."""
 
 from __future__ import annotations
 
@@ -12,12 +12,14 @@ class Case:
     """A request that must be refused, or must do no harm.
 
     Attributes:
-        name: what is wrong with it.
-        method: of HTTP.
-        path: URL path with its query; ``{dataset}``, ``{run}`` and ``{recording}`` are replaced by existing ids.
+        name: description of what is wrong with the request.
+        method: HTTP method.
+        path: URL path with its query; placeholders such as ``{dataset}``, ``{run}`` and ``{recording}`` are replaced by
+            existing ids.
         more: further keyword arguments of the HTTP client.
-        raw: bytes to send on a bare socket instead.
-        answer: "refused" if it must be refused, "any" if it may be, "accepted" if it must not be.
+        raw: bytes to send on a bare socket instead of the other attributes; empty for none.
+        answer: "refused" if the server must refuse the request, "accepted" if it must accept it, "any" if it may do
+            either.
     """
 
     name: str
@@ -29,5 +31,8 @@ class Case:
 
 
 def upload(name: str, data: bytes, filename: str = "hostile.zip", **more: Any) -> Case:
-    """A case that uploads ``data`` as a dataset file called ``filename``; ``more``: other attributes of the case."""
+    """Return a case, described by ``name``, that uploads ``data`` as a dataset file called ``filename``.
+
+    ``more``: other attributes of the case.
+    """
     return Case(f"upload: {name}", more={"files": {"file": (filename, data)}}, **more)

@@ -1,11 +1,11 @@
-"""Runs schemathesis on the server's OpenAPI description: every phase, and thousands of cases.
+"""Runs the fuzzer schemathesis on the server's OpenAPI description, with thousands of generated requests.
 
 The check ``positive_data_acceptance`` is excluded: it reports a request of valid form that is answered with 422, which
 is right if, for example, its dataset does not exist.
 
 Requests that are meant to be valid get valid values (:mod:`benchmarks.abuse.valid_values`), since most generated ones
-would be refused because of their first id. Events of an unfinished job are read for ``STREAM_SECONDS`` only. Submitted
-jobs are cancelled while they wait; a job that fails by an error of the server counts as a failure too.
+would be refused because of their first id. The event stream of a job is read for at most ``STREAM_SECONDS``. Submitted
+jobs are cancelled while they wait for a worker; a job that fails by an error of the server counts as a failure too.
 """
 
 from __future__ import annotations
@@ -45,17 +45,16 @@ request-timeout = {STREAM_SECONDS}
 
 
 def program() -> str | None:
-    """Path of the schemathesis program: beside this Python, or on PATH; None if it is not installed."""
+    """Return the path of the program schemathesis: beside this Python, or on PATH; None if it is not installed."""
     beside = Path(sys.executable).with_name("st")
     return str(beside) if beside.is_file() else shutil.which("st")
 
 
 def fuzzed(st: str, http: httpx.Client, named: dict[str, str], cases: int, seed: int, scratch: Path) -> Json:
-    """Fuzz the server with at least ``cases`` requests; returns the number of requests and the failures.
+    """Fuzz the server with at least ``cases`` requests; return the number of requests and the failures.
 
-    ``st``: path of schemathesis; ``named``: ids of existing objects; ``scratch``: folder for its files.
-
-    The same ``seed`` gives the same cases, apart from ids.
+    ``st``: path of schemathesis; ``named``: ids of existing objects, of :func:`valid_inputs.names`; ``scratch``: folder
+    for temporary files. The same ``seed`` gives the same requests, apart from ids.
     """
     folder = _given(valid_inputs.values(http, named), seed, scratch / "fuzz")
     sent, failures = 0, list[str]()
@@ -71,12 +70,15 @@ def fuzzed(st: str, http: httpx.Client, named: dict[str, str], cases: int, seed:
 
 
 def counted(report: Json) -> int:
-    """Number of requests in the ``report`` of one run of schemathesis."""
+    """Return the number of requests in the JSON ``report`` of one run of schemathesis."""
     return int(report["test_cases"]["generated"])
 
 
 def judged(report: Json) -> list[str]:
-    """Failures in the report of one run of schemathesis; that it ended early or omitted an operation counts too."""
+    """Return the failures in the JSON ``report`` of one run of schemathesis, one text each.
+
+    A run that ended early, or did not test every operation of the API, counts as a failure too.
+    """
     found = [(one, f" in {', '.join(one['operations'])}") for one in report["failures"]]
     found += [(one, "") for one in report["errors"]]
     failures = [f"fuzz: {one['title']}, {one['count']} times{where}" for one, where in found]
@@ -89,7 +91,10 @@ def judged(report: Json) -> list[str]:
 
 
 def _given(values: Json, seed: int, folder: Path) -> Path:
-    """Write the valid ``values`` for the hooks, and schemathesis' configuration, to ``folder``, which is returned."""
+    """Create ``folder`` with the files that schemathesis and its hooks read, and return it.
+
+    They are the valid ``values`` with the ``seed``, two valid archives to upload, and schemathesis' configuration.
+    """
     folder.mkdir()
     (folder / "good.json").write_text(json.dumps({"good": values, "seed": seed}), encoding="utf-8")
     (folder / "tracks.zip").write_bytes(uploads.small_archive())
@@ -99,10 +104,7 @@ def _given(values: Json, seed: int, folder: Path) -> Path:
 
 
 def _rounds(st: str, http: httpx.Client, cases: int, seed: int, folder: Path) -> Iterator[Json]:
-    """Run schemathesis repeatedly until it has sent ``cases`` requests, and yield each report.
-
-    Only the first run has the deterministic phases.
-    """
+    """Run schemathesis until it has sent ``cases`` requests, and yield each report; the first run has more phases."""
     url = str(http.base_url.join(SPECIFICATION))
     calls = sum(len(methods) for methods in http.get(SPECIFICATION).json()["paths"].values())
     missing = cases
@@ -147,7 +149,7 @@ def _round(st: str, url: str, phases: str, examples: int, seed: int, folder: Pat
 
 @contextmanager
 def _relieved(url: str) -> Iterator[None]:
-    """Context manager: waiting jobs of the server at ``url`` are cancelled repeatedly during the block."""
+    """Context manager: during its block, cancel the queued jobs of the server at ``url`` every RELIEF_SECONDS."""
     done = threading.Event()
 
     def relieve() -> None:
@@ -166,7 +168,7 @@ def _relieved(url: str) -> Iterator[None]:
 
 
 def _mistakes(http: httpx.Client) -> list[str]:
-    """Descriptions of the jobs that failed by an error of the server."""
+    """Return a description of each job that failed by an error of the server."""
     failed = [one for kind in ("runs", "diagnoses") for one in _all(http, f"/v1/{kind}?state=FAILED&limit=200")]
     return [f"fuzz: {one['id']}: {one['error']}" for one in failed if MISTAKE in (one["error"] or "")]
 

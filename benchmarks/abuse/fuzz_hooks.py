@@ -1,4 +1,4 @@
-"""Hooks that schemathesis loads (``SCHEMATHESIS_HOOKS``).
+"""Hooks of the fuzzer schemathesis, which loads this module (environment variable ``SCHEMATHESIS_HOOKS``).
 
 They put valid values into those parts of a generated request that are meant to be valid.
 """
@@ -30,7 +30,11 @@ VALUES = _valid_values()
 
 
 def before_call(context: Any, case: Any, kwargs: dict[str, Any]) -> None:  # noqa: ARG001  as they call it
-    """Put valid values into the request ``case``; parts that schemathesis made invalid on purpose stay as they are."""
+    """Called before ``case`` is sent: put valid values into the parts that are meant to be valid.
+
+    Parts that schemathesis made invalid on purpose are not changed, except that ids in a deletion may be made invalid.
+    ``kwargs``: arguments of the HTTP client, changed for uploads.
+    """
     dice = VALUES.dice(case.method, case.path, case.path_parameters, case.query, str(case.body))
     kind = VALUES.kind(case.path, dice)
     valid = _valid(case)
@@ -49,7 +53,7 @@ def before_call(context: Any, case: Any, kwargs: dict[str, Any]) -> None:  # noq
 
 
 def _valid(case: Any) -> set[str]:
-    """Names of the parts of the request ``case`` (path, query, headers, body) that are meant to be valid."""
+    """Return the names of those parts of ``case`` (path, query, header, body) that are meant to be valid."""
     made = case.meta.components.items() if case.meta else ()
     return {where.value for where, part in made if part.mode is GenerationMode.POSITIVE}
 

@@ -1,4 +1,4 @@
-"""NetCDF files with a changed byte, and files that are crafted to take much memory or time."""
+"""Uploads NetCDF files (HDF5) with a changed byte, and files that are crafted to take much memory or time to read."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ Json = dict[str, Any]
 Make = Callable[[h5py.File], None]
 
 MUTATED = 3000
-AT_ONCE = 2
-HEAP = b"GCOL"
-HEAP_BYTES = 512
+AT_ONCE = 2  # number of simultaneous uploads
+HEAP = b"GCOL"  # signature of an HDF5 global heap
+HEAP_BYTES = 512  # length of a heap's part that is changed
 MIB = 2**20
 ANSWER_SECONDS = 120.0  # time limit of an upload
 SLOWEST_SECONDS, PEAK_MB = 20.0, 1024.0
@@ -39,9 +39,10 @@ UPLOAD_EVERY = 25
 
 
 def abused(http: httpx.Client, server: Server, names: dict[str, str], seed: int, mutated: int = MUTATED) -> Json:
-    """Upload ``mutated`` changed files and all crafted ones.
+    """Upload ``mutated`` randomly changed files and all crafted ones, two at once, while other clients use the server.
 
-    Returns the time of the slowest upload, the server's peak memory, and the delays that other clients observed.
+    ``names``: ids of existing objects. Returns the figures for the report: time of the slowest upload, peak memory of
+    the server, longest times that the other clients waited, and a list of failures.
     """
     files = [*crafted(), *_mutated(seed, mutated)]
     answers = _Answers(len(files))
@@ -70,7 +71,10 @@ def abused(http: httpx.Client, server: Server, names: dict[str, str], seed: int,
 
 
 def _mutated(seed: int, count: int) -> Iterator[tuple[str, bytes]]:
-    """Yield ``count`` (name, bytes) of valid files with one changed byte: half anywhere, half in the text heaps."""
+    """Yield ``count`` files as (name, bytes): a valid file with one byte changed at random.
+
+    Half of the changes are anywhere, half in the heaps in which HDF5 stores texts.
+    """
     rng, good = np.random.default_rng([seed, 5]), uploads.netcdf_example()
     heaps = [at for at in range(len(good)) if good.startswith(HEAP, at)]
     for number in range(count):
@@ -85,7 +89,7 @@ def _mutated(seed: int, count: int) -> Iterator[tuple[str, bytes]]:
 
 
 def crafted() -> Iterator[tuple[str, bytes]]:
-    """Yield (name, bytes) of valid HDF5 files with hostile contents."""
+    """Yield, as (name, bytes), files with hostile contents, most of them valid HDF5."""
     for name, make in CRAFTED.items():
         yield f"crafted NetCDF, {name}", _changed(make)
     good = uploads.netcdf_example()
@@ -110,7 +114,10 @@ def _group(file: h5py.File) -> Any:
 
 
 def _with(name: str, **options: Any) -> Make:
-    """Function that stores the variable ``name`` of a file again, same shape, with other storage ``options``."""
+    """Return a function that replaces the variable ``name`` of a file by one of the same shape, without data.
+
+    ``options``: type and storage of the new variable, as for h5py's ``create_dataset``.
+    """
 
     def make(file: h5py.File) -> None:
         group = _group(file)
@@ -129,7 +136,10 @@ def _huge_attribute(file: h5py.File) -> None:
 
 
 def _bomb(times: int) -> Make:
-    """Function that writes a chunk of data, compressed ``times`` times, that unpacks to 500 MB or more."""
+    """Return a function that replaces the positions in a file by data that unpack to 500 MiB.
+
+    ``times``: how often the data are compressed.
+    """
 
     def make(file: h5py.File) -> None:
         group = _group(file)
@@ -155,7 +165,7 @@ def _zeros(mib: int) -> bytes:
 
 
 def _large(instants: int, **options: Any) -> Make:
-    """Function that declares variables of ``instants`` samples without storing them, so that the file stays small."""
+    """Return a function that declares times and positions of ``instants`` samples without storing their values."""
 
     def make(file: h5py.File) -> None:
         group = _group(file)
@@ -250,7 +260,10 @@ CRAFTED: dict[str, Make] = {
 
 @dataclass
 class _Answers:
-    """Collects the answers to the uploads: statuses, slowest time, failures."""
+    """Collects the answers to the uploads; safe for several threads.
+
+    ``total``: number of uploads; ``slowest``: longest time (s) of an upload, and ``slowest_name`` its name.
+    """
 
     total: int
     done: int = 0
@@ -261,7 +274,7 @@ class _Answers:
     lock: threading.Lock = field(default_factory=threading.Lock)
 
     def add(self, name: str, status: int, seconds: float, text: str) -> None:
-        """Record the answer to the upload ``name``: status, duration, and text; other than 201 or 422 is a failure."""
+        """Record the answer to the upload ``name``; any HTTP status other than 201 or 422 is a failure."""
         with self.lock:
             self.done += 1
             self.accepted += status == 201
@@ -287,14 +300,14 @@ def _upload(url: str, name: str, data: bytes, answers: _Answers) -> None:
 
 
 class _Thread:
-    """Thread that repeats :meth:`look` during a ``with`` block."""
+    """Thread that calls :meth:`look` every ``seconds`` during a ``with`` block."""
 
     def __init__(self, seconds: float) -> None:
         self._seconds, self._over = seconds, threading.Event()
         self._thread = threading.Thread(target=self._go, daemon=True)
 
     def look(self) -> None:
-        """Perform the action once."""
+        """Perform the action of the thread once."""
         raise NotImplementedError
 
     def _go(self) -> None:
@@ -311,14 +324,14 @@ class _Thread:
 
 
 class _Memory(_Thread):
-    """Records the peak memory of the server and its descendants together."""
+    """Records the peak resident memory (MiB) of the server and its descendants together, during a ``with`` block."""
 
     def __init__(self, server: Server) -> None:
         super().__init__(LOOK_SECONDS)
         self._server, self.peak_mb = server, 0.0
 
     def look(self) -> None:
-        """Measure the present memory of the processes."""
+        """Measure the present memory of the processes, and raise the peak if it is larger."""
         held = sum(_resident_mb(pid) for pid in (self._server.pid, *descendants(self._server.pid)))
         self.peak_mb = max(self.peak_mb, held)
 
@@ -331,7 +344,10 @@ def _resident_mb(pid: int) -> float:
 
 
 class _Others(_Thread):
-    """Other clients of the server during the uploads; records how long they wait for answers."""
+    """Other clients of the server during the uploads: they send valid requests and record how long they wait.
+
+    ``names``: ids of existing objects.
+    """
 
     def __init__(self, url: str, names: dict[str, str]) -> None:
         super().__init__(OTHERS_SECONDS)
@@ -341,7 +357,7 @@ class _Others(_Thread):
         self.failures: list[str] = []
 
     def look(self) -> None:
-        """Send one request to each path that is read, and sometimes upload a valid dataset."""
+        """Request each of a few paths, and at every UPLOAD_EVERY-th call upload a valid dataset."""
         with httpx.Client(base_url=self._url, timeout=ANSWER_SECONDS) as http:
             for path in self._paths:
                 seconds = self._timed(path, lambda path=path: http.get(path), 200, READ_SECONDS)  # type: ignore[misc]

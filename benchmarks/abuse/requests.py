@@ -228,7 +228,7 @@ RAW = (
 
 
 def cases() -> Iterator[Case]:
-    """Yield all hostile requests of this module."""
+    """Yield all hostile requests of this module, as cases."""
     for path, good in BODIES.items():
         yield from _bodies(path, good)
     for path in GETS:

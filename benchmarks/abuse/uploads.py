@@ -1,4 +1,4 @@
-"""Hostile archives, and damaged copies of valid ones."""
+"""Hostile archives, and damaged copies of valid ones, for upload as a dataset."""
 
 from __future__ import annotations
 
@@ -71,17 +71,17 @@ def cases(seed: int) -> Iterator[Case]:
 
 
 def small_archive() -> bytes:
-    """A valid dataset with one recording, as a zip archive."""
+    """Return a valid dataset with one recording, as the bytes of a zip archive."""
     return zipped(example_files())
 
 
 def netcdf_example() -> bytes:
-    """The dataset of :func:`small_archive` as a NetCDF file."""
+    """Return the dataset of :func:`small_archive` as the bytes of a NetCDF file."""
     return _netcdf(example_files())
 
 
 def example_files() -> dict[str, bytes]:
-    """Contents, by file name, of the example dataset with its first recording only."""
+    """Return the files of the example dataset, by name in the archive, with its first recording only."""
     import yaml
 
     description = yaml.safe_load((EXAMPLE / YAML).read_text(encoding="utf-8"))

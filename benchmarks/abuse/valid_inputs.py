@@ -1,4 +1,4 @@
-"""Creates valid objects on the server for the fuzzer: datasets of both kinds, finished runs, a diagnosis, a key."""
+"""Creates valid objects on the server for the fuzzer: datasets of tracks and forces, runs, a diagnosis, a key."""
 
 from __future__ import annotations
 
@@ -18,7 +18,11 @@ DIAGNOSIS = {"without": ["clap_and_peel"], "suspects": ["clap_and_peel"], "refit
 
 
 def names(http: httpx.Client) -> dict[str, str]:
-    """Upload a dataset of each kind ("tracks", "forces"), calibrate each, and return the ids by name."""
+    """Upload a dataset of each kind, marker tracks and forces, calibrate each, and return the ids.
+
+    They are returned by placeholder in the paths of cases: "{dataset}" (of tracks), "{forces}" (dataset),
+    "{recording}", "{run}" and "{run of forces}".
+    """
     dataset = http.post("/v1/datasets", files={"file": ("valid.zip", uploads.small_archive())}).json()
     forces = http.post("/v1/datasets", files={"file": ("valid.zip", archive("delfly"))}).json()
     return {
@@ -31,7 +35,10 @@ def names(http: httpx.Client) -> dict[str, str]:
 
 
 def values(http: httpx.Client, named: dict[str, str]) -> Json:
-    """Valid values of request fields for :mod:`benchmarks.abuse.valid_values`, by kind of dataset."""
+    """Return valid values of request fields for :mod:`benchmarks.abuse.valid_values`.
+
+    ``named``: ids of :func:`names`. The values that depend on the kind of dataset are under "tracks" and "forces".
+    """
     key = http.post("/v1/keys", json={"name": "fuzzed", "scopes": ["admin"]}).json()
     diagnosis = succeeded(http, "diagnoses", {"dataset_id": named["{forces}"]} | DIAGNOSIS)
     kinds = {"tracks": ("{dataset}", "{run}"), "forces": ("{forces}", "{run of forces}")}
@@ -60,7 +67,7 @@ def _of(http: httpx.Client, dataset_id: str, run_id: str) -> Json:
 
 
 def cancel_queued(http: httpx.Client) -> None:
-    """Cancel accepted jobs, which need not be computed."""
+    """Cancel the jobs that wait for a worker, because they need not be computed."""
     for kind in ("runs", "diagnoses"):
         _cancel(http, (one["id"] for one in http.get(f"/v1/{kind}?state=QUEUED&limit=200").json()["items"]), kind)
 

@@ -1,1 +1,1 @@
-"""Shared by several benchmarks: machine, files, jobs, progress, servers and Ray nodes as processes, figures."""
+"""Code shared by the benchmarks: figures, processes of servers and Ray nodes, progress, machine, example data."""

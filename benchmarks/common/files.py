@@ -1,4 +1,4 @@
-"""The repository and its example datasets."""
+"""Paths of the repository and of its example datasets, and example datasets packed as archives."""
 
 from __future__ import annotations
 
@@ -11,7 +11,10 @@ EXAMPLES = REPOSITORY / "examples"
 
 
 def archive(example: str) -> bytes:
-    """The folder of an example dataset as a zip archive, the same bytes every time."""
+    """Pack the example dataset in the folder ``examples/<example>`` into a zip archive, and return its bytes.
+
+    The bytes are the same at every call.
+    """
     packed, folder = io.BytesIO(), EXAMPLES / example
     files = [folder / "dataset.yaml", *(folder / "recordings").iterdir()]
     with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as zipped:

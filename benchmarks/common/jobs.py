@@ -1,4 +1,4 @@
-"""Jobs that a benchmark submits to a server and waits for."""
+"""Submits a job (a calibration or a diagnosis) to a server over HTTP and waits until it has succeeded."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ POLL_SECONDS = 0.05
 
 
 def succeeded(http: httpx.Client, kind: str, body: dict[str, Any]) -> str:
-    """Submit a job (``kind`` is "runs" or "diagnoses"), wait for it, and return its id.
+    """Submit a job to the server of ``http``, wait until it has ended, and return its id.
 
-    RuntimeError if it does not succeed.
+    ``kind``: "runs" or "diagnoses"; ``body``: JSON of the request. RuntimeError if the job does not succeed.
     """
     job = str(http.post(f"/v1/{kind}", json=body).json()["id"])
     while (now := http.get(f"/v1/{kind}/{job}").json())["state"] not in FINAL:

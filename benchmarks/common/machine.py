@@ -1,4 +1,4 @@
-"""Processor and commit with which a figure was measured, for reports."""
+"""Names the processor and the commit with which a benchmark was measured, for its report."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 
 
 def cpu() -> str:
-    """Name of the processor, and number of cores available to this process."""
+    """Return the processor's name and the number of cores available to this process, as "NAME, N cores"."""
     name = platform.processor() or platform.machine()
     info = Path("/proc/cpuinfo")
     if info.exists():
@@ -22,7 +22,7 @@ def cpu() -> str:
 
 
 def commit() -> str:
-    """Commit of the working tree, with ``+`` if it has changes; empty outside a repository."""
+    """Return the short hash of the checked-out commit, with ``+`` if tracked files are changed; empty without git."""
     here = Path(__file__).parent
     try:
         head = subprocess.run(

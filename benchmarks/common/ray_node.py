@@ -1,6 +1,7 @@
-"""Ray nodes as processes on this machine.
+"""Starts and kills Ray nodes as processes on this machine.
 
-A unique text in the environment of a node's processes, its mark, identifies them all, so that they can be killed.
+The processes of a node share a unique text in their environment, the node's mark, by which all of them can be found and
+killed.
 """
 
 from __future__ import annotations
@@ -30,7 +31,11 @@ IMPATIENT = {
 
 
 def environment(token: Path, **more: str) -> dict[str, str]:
-    """Environment variables as in a container of the deployment, without those of another Ray on this machine."""
+    """Return the environment variables of this process, those of a container of the deployment, and ``more``.
+
+    Variables of this process that begin with RAY_ are omitted. ``token``: file with the access token of the Ray
+    cluster.
+    """
     clean = {name: value for name, value in os.environ.items() if not name.startswith("RAY_")}
     return clean | {
         "RAY_AUTH_MODE": "token",
@@ -42,7 +47,10 @@ def environment(token: Path, **more: str) -> dict[str, str]:
 
 
 class Process(NamedTuple):
-    """A process of this machine as described in /proc: name, state letter, parent's id, environment variables."""
+    """A process of this machine as described in /proc: name of its program, state letter (Z: ended), parent's id.
+
+    ``environment``: its variables as NAME=value; empty if it has ended.
+    """
 
     name: str
     state: str
@@ -51,6 +59,7 @@ class Process(NamedTuple):
 
 
 def _processes() -> dict[int, Process]:
+    """Return all processes of this machine, by process id."""
     found = {}
     for folder in Path("/proc").glob("[0-9]*"):
         with suppress(OSError):
@@ -69,9 +78,10 @@ def free_port() -> int:
 
 
 def marked(mark: str) -> dict[int, str]:
-    """Names by id of the living processes with ``mark`` in their environment, and of their descendants.
+    """Return the names, by process id, of the living processes marked with ``mark``, and of their descendants.
 
-    The mark alone would miss the processes that Ray renames, because renaming overwrites their environment.
+    A marked process has the variable WINGFIT_TEST_NODE=``mark`` in its environment. Some processes would be missed
+    without the descendants: Ray renames them, which overwrites their environment.
     """
     wanted = f"{MARK}={mark}".encode()
     everyone = _processes()
@@ -82,7 +92,11 @@ def marked(mark: str) -> dict[int, str]:
 
 
 class Node:
-    """One Ray node: ``ray start`` and everything that it spawns."""
+    """One Ray node: the process ``ray start`` and all processes that it starts.
+
+    ``token``: file with the cluster's access token; ``log``: file for the output; ``options``: more options of ``ray
+    start``.
+    """
 
     def __init__(self, token: Path, log: Path, *options: str) -> None:
         self.mark = uuid.uuid4().hex
@@ -101,19 +115,19 @@ class Node:
 
     @property
     def running(self) -> bool:
-        """Whether ``ray start`` is alive."""
+        """Whether the process ``ray start`` is alive."""
         return self._process.poll() is None
 
     def pids(self) -> dict[int, str]:
-        """Names of the living processes of this node, by process id."""
+        """Return the names of the living processes of this node, by process id."""
         return marked(self.mark)
 
     def raylet(self) -> int | None:
-        """Process id of the node's scheduler (raylet); None if there is none."""
+        """Return the process id of the node's scheduler (raylet); None if it is not running."""
         return next((pid for pid, name in self.pids().items() if name == "raylet"), None)
 
     def kill(self) -> None:
-        """SIGKILL to every process of the node, until none is left."""
+        """Send SIGKILL to every process of the node until none lives; RuntimeError if some still live after 10 s."""
         victims = self.pids()
         deadline = time.monotonic() + 10.0
         while victims and time.monotonic() < deadline:
@@ -128,6 +142,6 @@ class Node:
             raise RuntimeError(f"these processes of a Ray node survive SIGKILL: {victims}")
 
     def remove(self) -> None:
-        """Kill the node and remove its files."""
+        """Kill the node and delete its temporary folder."""
         self.kill()
         self.folder.cleanup()

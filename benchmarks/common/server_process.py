@@ -1,4 +1,4 @@
-"""The server as a separate process with a data folder, for benchmarks that restart and kill it."""
+"""Runs the server as a separate process with a data folder, for benchmarks that restart and kill it."""
 
 from __future__ import annotations
 
@@ -22,7 +22,12 @@ WORKERS = 2
 
 
 class Server:
-    """A server with a data folder, on the same port after every restart."""
+    """A server process that can be started, stopped and killed repeatedly, always on the same port and data folder.
+
+    The data are in ``folder``/data, the output is in ``folder``/server.log. ``evaluator``: kind of the evaluator, which
+    simulates individuals ("in_process", "processes" or "ray"); ``token``, ``ray_address``: access token file and
+    address of the Ray cluster; ``settings``: further environment variables.
+    """
 
     def __init__(
         self,
@@ -49,7 +54,8 @@ class Server:
     def start(self, fail_point: str = "") -> None:
         """Start the server and wait until it answers.
 
-        ``fail_point``: name of a place in the server's code at which it kills itself, possibly before it answers.
+        ``fail_point``: point in the server's code at which the server kills itself, as "NAME:COUNT" (at the COUNT-th
+        pass); this may happen before the server answers, in which case the function returns as well.
         """
         self.fail_point = fail_point
         with (self.folder / "server.log").open("ab") as log:
@@ -72,22 +78,22 @@ class Server:
             time.sleep(0.02)
 
     def answers(self) -> bool:
-        """Whether the server answers now."""
+        """Return whether the server answers a health check now."""
         with suppress(httpx.TransportError):
             return httpx.get(f"http://127.0.0.1:{self.port}/v1/health", timeout=5.0).status_code == 200
         return False
 
     def peak_mb(self) -> float:
-        """Peak memory of the server itself, MB."""
+        """Return the server's peak resident memory in MiB, without its workers."""
         lines = (Path("/proc") / str(self.pid) / "status").read_text().splitlines()
         return float(next(line.split()[1] for line in lines if line.startswith("VmHWM:"))) / 1024
 
     def tail(self) -> str:
-        """The end of the server's log."""
+        """Return the last 2,000 characters of the server's log."""
         return (self.folder / "server.log").read_text(errors="replace")[-2000:]
 
     def died(self, seconds: float) -> bool:
-        """Wait at most ``seconds``; returns whether the server ended by itself."""
+        """Wait at most ``seconds`` for the server to end; return whether it ended."""
         assert self._process is not None  # noqa: S101  # started
         with suppress(subprocess.TimeoutExpired):
             self._process.wait(seconds)
@@ -95,14 +101,14 @@ class Server:
         return False
 
     def kill(self) -> None:
-        """SIGKILL to the server only."""
+        """Send SIGKILL to the server process only, not to its workers, and wait until it has ended."""
         assert self._process is not None  # noqa: S101  # started
         with suppress(ProcessLookupError):
             os.kill(self._process.pid, signal.SIGKILL)
         self._process.wait(DIE_SECONDS)
 
     def kill_all(self) -> None:
-        """SIGKILL to the server and all its descendants."""
+        """Send SIGKILL to the server and all its descendants, and wait until the server has ended."""
         victims = [self.pid, *descendants(self.pid)]
         for pid in victims:
             with suppress(ProcessLookupError):
@@ -117,7 +123,7 @@ class Server:
         return self._process.pid
 
     def workers(self) -> list[int]:
-        """Process ids of the workers."""
+        """Return the process ids of the server's workers, which simulate individuals."""
         return [pid for pid, command in _commands(descendants(self.pid)) if _evaluates(command)]
 
     def stop(self) -> None:
@@ -131,7 +137,7 @@ class Server:
 
 
 def descendants(pid: int) -> list[int]:
-    """Living descendants of the process ``pid``."""
+    """Return the process ids of the living children of the process ``pid``, of their children, and so on."""
     children: dict[int, list[int]] = {}
     for folder in Path("/proc").glob("[0-9]*"):
         with suppress(OSError, ValueError):
@@ -146,10 +152,12 @@ def descendants(pid: int) -> list[int]:
 
 
 def _commands(pids: list[int]) -> Iterator[tuple[int, str]]:
+    """Yield (process id, command line) of those of the processes ``pids`` that exist."""
     for pid in pids:
         with suppress(OSError):
             yield pid, (Path("/proc") / str(pid) / "cmdline").read_bytes().replace(b"\0", b" ").decode(errors="replace")
 
 
 def _evaluates(command: str) -> bool:
+    """Return whether ``command`` is the command line of a worker: a Python multiprocessing child or a Ray actor."""
     return "spawn_main" in command or command.startswith("ray::")

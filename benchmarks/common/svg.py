@@ -1,4 +1,4 @@
-"""Panels of curves as SVG: black on white, round numbers on the axes, a legend below each panel."""
+"""Draws panels of curves as SVG: black on white, round numbers on the axes, a legend below each panel."""
 
 from __future__ import annotations
 
@@ -19,7 +19,10 @@ LETTER = 5.5  # approximate width of a letter
 
 @dataclass(frozen=True)
 class Line:
-    """A curve [n] with its name in the legend; ``crosses``: drawn as crosses only, ``dots``: with its points marked."""
+    """One curve with coordinates ``x`` [n] and ``y`` [n]; ``name``: its text in the legend.
+
+    ``crosses``: draw a cross at each point instead of a curve; ``dots``: also mark the points of the curve with dots.
+    """
 
     name: str
     x: Array
@@ -30,7 +33,11 @@ class Line:
 
 @dataclass(frozen=True)
 class Panel:
-    """One pair of axes with its curves; ``shaded``: interval of x; ``holds``: values that the y axis must include."""
+    """One pair of axes with at most three curves; ``x`` and ``y``: labels of the axes.
+
+    ``shaded``: interval of x that is shaded; ``logarithmic``: whether the y axis is; ``holds``: values that the range
+    of the y axis must include (their log10 on a logarithmic axis).
+    """
 
     title: str
     x: str
@@ -42,7 +49,7 @@ class Panel:
 
 
 def svg(panels: Sequence[Panel], *, columns: int = 0) -> str:
-    """SVG text of the panels in rows of ``columns`` panels; all in one row by default."""
+    """Return ``panels`` as SVG text, in rows of ``columns`` panels; 0 puts all panels into one row."""
     across = columns or len(panels)
     width, height = WIDTH * across, HEIGHT * -(-len(panels) // across)
     parts = [
@@ -105,7 +112,7 @@ def _scaled(y: Array, panel: Panel) -> Array:
 
 
 def _ticks(low: float, high: float) -> Array:
-    """Round numbers that enclose [low, high]; the first and the last are the ends of the axis."""
+    """Return about six equally spaced round numbers that enclose [low, high]; the outer two are the axis limits."""
     raw = (high - low) / 5
     size = 10.0 ** np.floor(np.log10(raw))
     step = next(m * size for m in (1, 2, 2.5, 5, 10) if m * size >= raw)
@@ -113,6 +120,7 @@ def _ticks(low: float, high: float) -> Array:
 
 
 def _along(value: Array | float, ticks: Array, start: float, end: float) -> Array:
+    """Map ``value`` on an axis with the given ``ticks`` to a position in the panel, from ``start`` to ``end``."""
     return np.asarray(start + (np.asarray(value) - ticks[0]) / (ticks[-1] - ticks[0]) * (end - start))
 
 

@@ -1,8 +1,8 @@
-"""``python -m benchmarks.durability --json``: kills the server, workers, nodes, or all of them, again and again.
+"""``python -m benchmarks.durability --json``: kills the server, workers, Ray nodes, or all of them, again and again.
 
-Workers are also stopped (SIGSTOP), as by a swapping machine or a debugger; each must be replaced. Meanwhile clients
-upload, submit, watch, pause, resume and cancel, and record every answer. At the end everything that was acknowledged
-must be stored, every run must have the result of an undisturbed run, and the database must be intact.
+Workers are also stopped (SIGSTOP), as by a swapping machine or a debugger; the server must replace each. Meanwhile
+clients upload, submit, watch, pause, resume and cancel, and record every answer. At the end everything that the server
+acknowledged must be stored, every run must have the result of an undisturbed run, and the database must be intact.
 """
 
 from __future__ import annotations
@@ -37,12 +37,12 @@ from wingfit.service.storage.database import FILE_NAME
 Json = dict[str, Any]
 KILLS = {"server": 300, "workers": 60, "hung": 20, "nodes": 20, "stack": 20}
 CLIENTS = 2
-LONGEST_LIFE = 2.5  # s
-# A diagnosis starts again whenever the server restarts: it must not block the runs.
-# Kills from outside must not count as failures of the job.
+LONGEST_LIFE = 2.5  # s, scale of the random times between kills
+# Several runs at once, so that a diagnosis, which starts again after every restart, does not block the others; many
+# starts per job, so that the kills do not count as failures of the job.
 ROOMY = {"WINGFIT_MAX_RUNS": "4", "WINGFIT_MAX_STARTS": "1000"}
 OF_DIAGNOSES = "diagnosis"
-PLACES = ("commit", "committed", "answer")
+PLACES = ("commit", "committed", "answer")  # fail points of the server
 QUIET_SECONDS = 600.0
 # Longer than any unit of these workloads may take before its worker counts as hung.
 REPLACED_SECONDS = 300.0
@@ -50,7 +50,7 @@ EVALUATORS = {"server": "in_process", "workers": "processes", "hung": "processes
 
 
 def main() -> None:
-    """Kill in all ways, and print one JSON object as the last line."""
+    """Parse the command line, kill in the requested ways, and print one JSON object as the last line."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.durability", description=__doc__)
     parser.add_argument("--json", action="store_true", help="one JSON object as the last line (always printed)")
     parser.add_argument(
@@ -90,7 +90,10 @@ def main() -> None:
 
 
 def undisturbed(folder: Path) -> dict[str, Json]:
-    """Result of every workload, by name, on a server that is not disturbed; the reference for :func:`season`."""
+    """Compute every workload on a server that is not disturbed; return the results by name of the workload.
+
+    :func:`season` compares with them. ``folder``: new folder for the server's data.
+    """
     folder.mkdir()
     server, ends = Server(folder, "in_process"), {}
     server.start()
@@ -111,7 +114,8 @@ def undisturbed(folder: Path) -> dict[str, Json]:
 def season(kind: str, kills: int, seed: int, folder: Path, expected: dict[str, Json]) -> Json:
     """Kill ``kills`` times in one way while clients use the server, wait until all jobs have ended, then check.
 
-    ``expected``: results of undisturbed runs. Returns counts of jobs, equal and different results, and losses.
+    ``kind``: what is killed, a key of KILLS; ``folder``: new folder for the server's data; ``expected``: results of
+    :func:`undisturbed`. Returns, for the report, counts of jobs and of equal results, different results, and losses.
     """
     folder.mkdir()
     cluster = Cluster(folder) if EVALUATORS[kind] == "ray" else None
@@ -158,7 +162,7 @@ def season(kind: str, kills: int, seed: int, folder: Path, expected: dict[str, J
 
 
 def _of_server(server: Server, _: Cluster | None, rng: np.random.Generator) -> None:
-    """Kill the server, at a random time or at a fail point chosen at its start, and restart it."""
+    """Kill the server, at a random time or at the fail point set at its last start, and restart it."""
     server.died(4 * LONGEST_LIFE if server.fail_point else rng.uniform(0.0, LONGEST_LIFE))
     server.kill()
     armed = f"{PLACES[rng.integers(len(PLACES))]}:{rng.integers(1, 60)}"
@@ -166,13 +170,13 @@ def _of_server(server: Server, _: Cluster | None, rng: np.random.Generator) -> N
 
 
 def _of_worker(server: Server, _: Cluster | None, rng: np.random.Generator) -> None:
-    """Kill a worker while the server lives."""
+    """Kill a random worker of the server, after a random time."""
     with suppress(ProcessLookupError):
         os.kill(_some_worker(server, rng), signal.SIGKILL)
 
 
 def _stop_of_worker(server: Server, _: Cluster | None, rng: np.random.Generator) -> bool:
-    """Stop a worker (SIGSTOP); returns whether the server replaces it."""
+    """Stop a random worker (SIGSTOP); return whether the server replaces it within REPLACED_SECONDS."""
     worker = _some_worker(server, rng)
     try:
         os.kill(worker, signal.SIGSTOP)
@@ -197,7 +201,7 @@ def _some_worker(server: Server, rng: np.random.Generator) -> int:
 
 
 def _of_node(_: Server, cluster: Cluster | None, rng: np.random.Generator) -> None:
-    """Kill the only node that computes, and start another."""
+    """Kill the only Ray node that computes, after a random time, and start another."""
     assert cluster is not None  # noqa: S101  # of this kind
     time.sleep(rng.uniform(1.0, 2 * LONGEST_LIFE))
     cluster.kill_node()
@@ -205,7 +209,7 @@ def _of_node(_: Server, cluster: Cluster | None, rng: np.random.Generator) -> No
 
 
 def _of_all(server: Server, cluster: Cluster | None, rng: np.random.Generator) -> None:
-    """Kill server, head and node together."""
+    """Kill the server and both Ray nodes together, after a random time, and start them again."""
     assert cluster is not None  # noqa: S101  # of this kind
     time.sleep(rng.uniform(1.0, 4 * LONGEST_LIFE))
     server.kill_all()
@@ -227,7 +231,10 @@ DEATHS: dict[str, Callable[[Server, Cluster | None, np.random.Generator], bool |
 
 
 def _quiet(server: Server, ledger: Ledger, expected: dict[str, Json]) -> int:
-    """Let all jobs end undisturbed and check their results; returns the number of jobs that do not end."""
+    """Wait until all jobs have ended, without kills, and check their results; paused runs are resumed.
+
+    Returns the number of jobs that do not end within QUIET_SECONDS.
+    """
     with httpx.Client(base_url=f"http://127.0.0.1:{server.port}", timeout=60.0) as http:
 
         def fetch(path: str) -> Json | None:
@@ -257,7 +264,11 @@ def _quiet(server: Server, ledger: Ledger, expected: dict[str, Json]) -> int:
 
 
 def _diagnoses(ledger: Ledger, fetch: Callable[[str], Json | None], expected: Json, deadline: float) -> int:
-    """Wait until ``deadline`` for the diagnoses and check their findings; returns the number that do not end."""
+    """Wait until all diagnoses have ended and check their findings; return the number of those that do not end.
+
+    ``fetch``: returns the JSON at a path of the API, or None; ``deadline``: latest end of the wait, by
+    ``time.monotonic``.
+    """
     left = [diagnosis for diagnosis, state in ledger.diagnoses.items() if state is None]
     while left and time.monotonic() < deadline:
         for diagnosis in list(left):

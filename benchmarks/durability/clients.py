@@ -1,4 +1,4 @@
-"""Clients of a server that is killed: they repeat a request until it is answered, and record what was acknowledged."""
+"""Clients of a server that is killed: they repeat requests until there is an answer, and record every answer."""
 
 from __future__ import annotations
 
@@ -25,13 +25,14 @@ ANSWERED = frozenset(range(200, 500))
 
 
 class OverError(Exception):
-    """Raised in a client's thread once :meth:`Client.leave` was called, to abandon a request."""
+    """Raised in a client's thread to abandon a request, once :meth:`Client.leave` was called."""
 
 
 class Client(threading.Thread):
     """Thread that acts as one user at random: uploads, submits, watches, pauses, cancels, and records all answers.
 
-    Each client acts only on runs that it submitted, so that the order of the requests for a run is known.
+    Each client acts only on runs that it submitted, so that the order of the requests for a run is known. ``number``:
+    of the client, from 0; ``port``: of the server; ``expected``: results of undisturbed runs by name of the workload.
     """
 
     def __init__(self, number: int, seed: int, port: int, ledger: Ledger, expected: Mapping[str, Json]) -> None:
@@ -43,11 +44,11 @@ class Client(threading.Thread):
         self.error: BaseException | None = None
 
     def leave(self) -> None:
-        """Ask the client to stop."""
+        """Make the client stop soon; a request in progress is abandoned."""
         self._over.set()
 
     def run(self) -> None:
-        """Act until asked to stop."""
+        """Act at random until :meth:`leave` is called; an unexpected exception is stored in ``error``."""
         try:
             with httpx.Client(base_url=self._base, timeout=30.0) as self._http:
                 while not self._over.is_set():
@@ -176,7 +177,11 @@ class Client(threading.Thread):
 def settle(
     ledger: Ledger, run: str, now: Json, fetch: Callable[[str], Json | None], expected: Mapping[str, Json]
 ) -> None:
-    """Check a finished run (its state is ``now``): allowed final state, and result equal to the undisturbed one."""
+    """Check a finished run, record its loss if its final state is not allowed, and compare its result.
+
+    ``now``: the run as the server describes it; ``fetch``: returns the JSON at a path of the API, or None;
+    ``expected``: results of undisturbed runs by name of the workload.
+    """
     known = ledger.runs[run]
     if now["state"] not in known.endings:
         ledger.lose(f"run {run} is {now['state']}, must be {' or '.join(known.endings)}: {now['error']}")
@@ -188,7 +193,10 @@ def settle(
 def settle_diagnosis(
     ledger: Ledger, diagnosis: str, now: Json, fetch: Callable[[str], Json | None], expected: Json
 ) -> None:
-    """Check a finished diagnosis (its state is ``now``): it succeeded, with the finding of the undisturbed one."""
+    """Check a finished diagnosis: it must have succeeded, with the finding ``expected`` of an undisturbed one.
+
+    ``now``: the diagnosis as the server describes it; ``fetch``: as for :func:`settle`.
+    """
     if now["state"] != "SUCCEEDED":
         ledger.lose(f"diagnosis {diagnosis} is {now['state']}: {now['error']}")
     else:
@@ -197,14 +205,17 @@ def settle_diagnosis(
 
 
 def finding(diagnosis: str, fetch: Callable[[str], Json | None]) -> Json:
-    """The finding of a diagnosis without its duration."""
+    """Return the finding of a diagnosis without its duration; ``fetch`` returns the JSON at a path, or None."""
     return {
         key: value for key, value in (fetch(f"/v1/diagnoses/{diagnosis}/finding") or {}).items() if key != "seconds"
     }
 
 
 def outcome(run: str, fetch: Callable[[str], Json | None]) -> Json:
-    """Result of a successful run without times; ``fetch`` returns the JSON of a path of the API."""
+    """Return the history, genome and result of a successful run, without fields that contain times.
+
+    ``fetch`` returns the JSON at a path of the API, or None.
+    """
     history = fetch(f"/v1/runs/{run}/history?limit=10000") or {"items": []}
     return {
         "history": [without_times(item) for item in history["items"]],

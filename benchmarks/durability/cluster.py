@@ -1,4 +1,4 @@
-"""A Ray cluster as in the Compose deployment, and ways to kill its nodes."""
+"""A Ray cluster as in the deployment with Docker Compose, and ways to kill its nodes."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ START_SECONDS = 120.0
 
 
 class Cluster:
-    """A Ray head, and one more node that computes."""
+    """A Ray cluster of two nodes: a head and one that computes; ``folder``: for the access token and logs."""
 
     def __init__(self, folder: Path) -> None:
         self.folder, self.token, self._lives = folder, folder / "token", 0
@@ -24,11 +24,11 @@ class Cluster:
 
     @property
     def address(self) -> str:
-        """Address of the head."""
+        """Address of the head, as HOST:PORT."""
         return f"127.0.0.1:{self.port}"
 
     def start(self) -> None:
-        """Start both nodes."""
+        """Start the head and the node that computes, and wait until both run."""
         self._lives += 1
         log = self.folder / f"head-{self._lives}.log"
         self.head = Node(
@@ -38,7 +38,7 @@ class Cluster:
         self.start_node()
 
     def start_node(self) -> None:
-        """Start the node that computes."""
+        """Start the node that computes, and wait until it runs."""
         self._lives += 1
         log = self.folder / f"node-{self._lives}.log"
         self.node = Node(self.token, log, f"--address={self.address}")

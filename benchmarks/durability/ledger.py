@@ -1,4 +1,4 @@
-"""Record of what the server acknowledged, and of what was lost."""
+"""Record of what the server acknowledged, and of what it lost."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ class KnownRun:
     Attributes:
         work: name of its workload.
         generations: entries of its history, by sequence number, as first seen.
-        endings: allowed final states: SUCCEEDED; also CANCELLED once that was requested, only CANCELLED once
-            acknowledged.
-        final: its final state, once seen.
+        endings: allowed final states: at first SUCCEEDED; also CANCELLED once a cancellation was requested; only
+            CANCELLED once the cancellation was acknowledged.
+        final: its final state; None until a client has seen it.
     """
 
     work: str
@@ -30,12 +30,21 @@ class KnownRun:
 
 @dataclass
 class Ledger:
-    """Record of everything that the server acknowledged, and of losses; shared by all clients, thread-safe."""
+    """Record of everything that the server acknowledged, and of losses; shared by all clients, thread-safe.
+
+    Attributes:
+        datasets: SHA-256 of each uploaded archive, by id of the dataset.
+        runs: submitted runs, by id.
+        diagnoses: final state of each diagnosis by id; None until a client has seen it.
+        lost: descriptions of losses.
+        acknowledged: number of acknowledged requests and stored generations.
+        results: number of results compared with undisturbed ones, of which ``identical`` were equal.
+        different: ids of jobs with other results.
+    """
 
     datasets: dict[str, str] = field(default_factory=dict)
     runs: dict[str, KnownRun] = field(default_factory=dict)
     diagnoses: dict[str, str | None] = field(default_factory=dict)
-    """Final state of each, once seen."""
     lost: list[str] = field(default_factory=list)
     acknowledged: int = 0
     results: int = 0
@@ -44,7 +53,7 @@ class Ledger:
     lock: threading.RLock = field(default_factory=threading.RLock)
 
     def lose(self, what: str) -> None:
-        """Record that something acknowledged was lost or changed."""
+        """Record the loss or change of something acknowledged; ``what``: its description."""
         with self.lock:
             self.lost.append(what)
 
@@ -54,7 +63,10 @@ class Ledger:
             self.acknowledged += 1
 
     def history(self, run: str, items: list[Json]) -> None:
-        """Compare the history ``items`` of a run with the entries seen before, record changes as losses, store it."""
+        """Compare the history ``items`` of a run with the entries seen before; changed or missing entries are losses.
+
+        New entries are stored.
+        """
         with self.lock:
             seen = self.runs[run].generations
             now = {item["sequence"]: without_times(item) for item in items}
@@ -65,7 +77,7 @@ class Ledger:
             seen.update(now)
 
     def result(self, run: str, found: Json, expected: Json) -> None:
-        """Compare the result ``found`` of a run or diagnosis with the undisturbed one, ``expected``, and count it."""
+        """Compare the result ``found`` of the run or diagnosis ``run`` (id) with the undisturbed one; count it."""
         with self.lock:
             self.results += 1
             self.identical += found == expected
@@ -74,5 +86,5 @@ class Ledger:
 
 
 def without_times(item: Json) -> Json:
-    """Copy of a JSON object without fields that contain times, which differ between equal runs."""
+    """Return a copy of a JSON object without the fields of times, which differ between equal runs."""
     return {key: value for key, value in item.items() if key not in TIMES}

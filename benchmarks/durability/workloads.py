@@ -1,4 +1,4 @@
-"""Workloads: small calibrations of both kinds and a diagnosis. Undisturbed, each always has the same result."""
+"""The jobs to submit: small calibrations with tracks or forces, and a diagnosis, which all give repeatable results."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ Json = dict[str, Any]
 
 @dataclass(frozen=True)
 class Work:
-    """A run to submit: name, example dataset to upload, and body of the request without the dataset's id."""
+    """A calibration to submit: its name, the example dataset to upload, and the request without the dataset's id."""
 
     name: str
     example: str
@@ -35,5 +35,5 @@ WORKS = (
 
 
 DIAGNOSIS: Json = {"axes": ["x", "z"], "seed": 1}
-"""Of balance recordings. It starts again after every kill of the server, and ends in the quiet phase."""
+"""Diagnosis of balance recordings. It starts again after every kill of the server, and ends once the kills stop."""
 DIAGNOSED = "delfly"

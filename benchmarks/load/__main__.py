@@ -1,7 +1,7 @@
-"""``python -m benchmarks.load --json``: reads, event streams and pages beside a calibration that uses all processors.
+"""``python -m benchmarks.load --json``: tests the server under load, while a calibration uses all processors.
 
-Over a database of 10,000 runs and 1,000,000 generations. The load generator runs on the same machine; its processor
-time is reported apart from the server's (docs/load.md).
+Measures reads, event streams and pages over a database of 10,000 runs and 1,000,000 generations. The load generator
+runs on the same machine; its processor time is reported apart from the server's (docs/load.md).
 """
 
 from __future__ import annotations
@@ -42,7 +42,12 @@ ANSWERED = 0.99  # required fraction of the requested reads per second
 
 @dataclass(frozen=True)
 class Size:
-    """Sizes of the load test: database, requests and calibration."""
+    """Size of the load test.
+
+    ``runs``: stored runs, each with ``generations`` generations, one with ``longest``; ``rate``: reads per second;
+    ``watchers``: number of event streams; ``rounds``: repetitions of each load; ``work``: request of the timed
+    calibration.
+    """
 
     runs: int
     generations: int
@@ -54,7 +59,8 @@ class Size:
 
     @property
     def loads(self) -> Sequence[Load]:
-        """The loads to apply during a calibration; the first is only one event stream, which notices the run's end."""
+        """The loads to apply: the reference, all event streams, and all event streams with reads."""
+        # The reference has one event stream, by which the end of the run is noticed.
         return (Load(NONE, 0.0, 1), Load(WATCHED, 0.0, self.watchers), Load(READ, self.rate, self.watchers))
 
 
@@ -63,7 +69,7 @@ QUICK = Size(200, 20, 3000, 50.0, 20, 1, SHORT)
 
 
 def main() -> None:
-    """Measure everything, and print one JSON object on the last line."""
+    """Parse the command line, measure everything, and print one JSON object on the last line."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.load", description=__doc__)
     parser.add_argument("--json", action="store_true", help="print one JSON object on the last line (always done)")
     parser.add_argument("--quick", action="store_true", help="a short run of everything, whose figures mean nothing")
@@ -89,7 +95,10 @@ def main() -> None:
 
 
 def served(scratch: Path, size: Size, rounds: int) -> Json:
-    """Start a server with a filled database and measure it: response times of pages, then the effect of each load."""
+    """Start a server with a filled database and measure it: response times of pages, then the effect of each load.
+
+    ``rounds``: repetitions of each load. Returns the figures for the report, by name.
+    """
     server = Server(scratch, "processes")
     try:
         filled, dataset = _filled(server, size)
@@ -127,7 +136,7 @@ def served(scratch: Path, size: Size, rounds: int) -> Json:
 
 
 def missed(report: Json) -> list[str]:
-    """One line for each figure of ``report`` that is beyond its limit, and for reads and streams that failed."""
+    """Return one line for each figure of ``report`` beyond its limit, and for each kind of failed reads or streams."""
     read = report["beside"][READ]
     faults = [
         f"{name} is {report[name]}, must be at most {limit:g}"
@@ -146,7 +155,7 @@ def missed(report: Json) -> list[str]:
 def _filled(server: Server, size: Size) -> tuple[Filled, str]:
     """Let the server compute a run, copy it many times in the database, and restart the server.
 
-    Returns a description of the copies, and the id of the dataset.
+    Returns a description of the filled database, and the id of the uploaded dataset.
     """
     server.start()
     with Client(f"http://127.0.0.1:{server.port}") as client:
@@ -159,6 +168,7 @@ def _filled(server: Server, size: Size) -> tuple[Filled, str]:
 
 
 def _worst(times: Json, *prefixes: str) -> float:
+    """Return the largest 99th percentile (ms) of the kinds of pages whose names begin with one of ``prefixes``."""
     return max(float(found["p99_ms"]) for name, found in times.items() if name.startswith(prefixes))
 
 

@@ -1,7 +1,8 @@
 """Runs the same calibration with and without each load, to measure how much each slows the other.
 
 The same seed gives the same computation, bit for bit, so the times of two runs differ only by the load and by other
-work on the machine. Therefore the loads alternate, in reversed order every second round.
+work on the machine. To average over slow changes of that work the loads alternate, in reversed order every second
+round.
 """
 
 from __future__ import annotations
@@ -24,13 +25,13 @@ from benchmarks.load.mix import KINDS, Stored, reads
 from wingfit.client.client import Client
 
 Json = dict[str, Any]
-READS = 20_000  # number drawn; then they are repeated
+READS = 20_000  # different reads of a trial; after the last, they are repeated from the first
 TICKS = os.sysconf("SC_CLK_TCK")
 
 
 @dataclass(frozen=True)
 class Load:
-    """A load to apply during a calibration: name, reads per second, number of event streams of the run."""
+    """A load to apply during a calibration; ``rate``: reads per second; ``watchers``: event streams of the run."""
 
     name: str
     rate: float
@@ -45,7 +46,7 @@ class Trial:
         seconds: from the first generation to the last.
         evaluations: number of simulated individuals in that time.
         processor_seconds: processor time of the server without its workers, from before the run to after it.
-        kinds: kind of each read, by the index of its path in the load generator's list.
+        kinds: kind of each read ("run", "list" or "history"), by the index of its path in the load generator's list.
         observed: response times and losses, as measured by the load generator.
     """
 
@@ -57,9 +58,10 @@ class Trial:
 
 
 def beside(server: Server, client: Client, body: Json, stored: Stored, loads: Sequence[Load], rounds: int) -> Json:
-    """Run the calibration ``body`` under each of ``loads``, ``rounds`` times; returns the figures by name of the load.
+    """Run the same calibration under each of ``loads``, ``rounds`` times, and return the figures by name of the load.
 
-    The first load is the reference, without reads.
+    ``body``: request of the calibration; ``stored``: stored runs that are read. The first load, without reads, is the
+    reference for slowdowns.
     """
     trials: dict[str, list[Trial]] = {load.name: [] for load in loads}
     with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
@@ -86,6 +88,7 @@ def _trial(
     seed: int,
     run_traffic: Callable[[Traffic], Observed],
 ) -> Trial:
+    """Submit the calibration ``body``, apply ``load`` until it ends, and measure both; ``seed``: of the drawn reads."""
     before = processor_seconds(server.pid)
     run = client.submit_run(**body)["id"]
     requests = reads(stored, run, READS, seed) if load.rate else []
@@ -95,7 +98,10 @@ def _trial(
 
 
 def _figures(load: Load, trials: Sequence[Trial], alone: Sequence[Trial]) -> Json:
-    """Figures of one load over its trials, compared with the undisturbed trials of the same rounds (``alone``)."""
+    """Return the figures of the report for one load.
+
+    ``trials``: those with this load; ``alone``: those of the reference load in the same rounds.
+    """
     observed = [trial.observed for trial in trials]
     latencies = [seconds for one in observed for _, seconds in one.latencies]
     slowdowns = [100 * (trial.seconds / other.seconds - 1) for trial, other in zip(trials, alone, strict=True)]
@@ -125,10 +131,9 @@ def _figures(load: Load, trials: Sequence[Trial], alone: Sequence[Trial]) -> Jso
 
 
 def per_read_us(loaded: Json, watched: Json) -> float | None:
-    """Processor time of the server per read, us.
+    """Return the processor time of the server per read, in microseconds; None if there were no reads.
 
-    Difference of the figures of a load with reads (``loaded``) and one with event streams only (``watched``), divided
-    by the number of reads; None if there were no reads.
+    ``loaded``: figures of the load with event streams and reads; ``watched``: of the load with event streams only.
     """
     number = loaded["reads"]["of"]
     more = loaded["server_processor_seconds"] - watched["server_processor_seconds"]
@@ -136,12 +141,13 @@ def per_read_us(loaded: Json, watched: Json) -> float | None:
 
 
 def processor_seconds(pid: int) -> float:
-    """Processor time of a process with its threads, without the processes that it started."""
+    """Return the processor time (s) so far of the process ``pid``, without the processes that it started."""
     fields = (Path("/proc") / str(pid) / "stat").read_text().rsplit(")", 1)[1].split()
     return (int(fields[11]) + int(fields[12])) / TICKS
 
 
 def _of_kind(trials: Sequence[Trial], kind: str) -> list[float]:
+    """Return the response times (s) of the reads of one ``kind`` in all ``trials``."""
     return [seconds for trial in trials for number, seconds in trial.observed.latencies if trial.kinds[number] == kind]
 
 

@@ -1,4 +1,4 @@
-"""The calibrations of the benchmark: the example wing, with a fixed number of generations."""
+"""The calibrations of the load test: the example wing, with a fixed number of generations."""
 
 from __future__ import annotations
 
@@ -12,7 +12,10 @@ ROBIRD = EXAMPLES / "robird"
 
 
 def search(division: str, population: int, generations: int, **more: Any) -> Json:
-    """Request body of a genetic search that always computes all its ``generations``."""
+    """Return the request body of a genetic search that always computes all its ``generations``.
+
+    ``division``: discretisation of the wing, such as "11" bodies; ``population``: individuals per generation.
+    """
     size = {"division": division, "population": population, "max_generations": generations, "stall": generations}
     return size | {"mode": "joint", "tolerance": 0.0, "seed": 1} | more
 
@@ -23,7 +26,10 @@ SHORT = search("4", 8, 12, recordings=["vac-0010mbar-lag0-2.0hz"])
 
 
 def computed(client: Client, run_id: str) -> tuple[float, int]:
-    """Wait for a run to end; returns the seconds, and the evaluations, from its first generation to its last."""
+    """Wait for a calibration to end; return the seconds and the simulated individuals from first to last generation.
+
+    RuntimeError if it does not succeed.
+    """
     ended = client.wait(run_id)
     if ended["state"] != "SUCCEEDED":
         raise RuntimeError(f"the calibration {ended['state']}: {ended['error']}")

@@ -1,4 +1,4 @@
-"""Fills a database as years of use would, with copies of a run that a server computed and stored."""
+"""Fills a server's database as years of use would, with copies of a run that the server computed and stored."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ INTERVAL = timedelta(minutes=50)
 
 @dataclass(frozen=True)
 class Filled:
-    """What the filled database holds.
+    """Content of the filled database.
 
     Attributes:
         runs: number of runs.
@@ -41,9 +41,9 @@ class Filled:
 
 
 def fill(folder: Path, runs: int, generations: int, longest: int) -> Filled:
-    """Copy the run in the database of a stopped server in ``folder`` until there are ``runs``.
+    """Copy the successful run in the database of a stopped server in ``folder`` until there are ``runs``.
 
-    Every copy has ``generations`` generations, those of the original repeated; the newest copy has ``longest``.
+    Every copy has ``generations`` generations, which repeat those of the original; the newest copy has ``longest``.
     """
     database = Database(folder)
     try:
@@ -67,7 +67,7 @@ def fill(folder: Path, runs: int, generations: int, longest: int) -> Filled:
 
 
 def _datasets(session: Session, dataset_id: str) -> list[str]:
-    """Store copies of a dataset; returns the ids of the dataset and its copies."""
+    """Store DATASETS - 1 copies of a dataset; return the ids of the dataset and its copies."""
     row, body = store.one(session, DatasetRow, dataset_id), store.archive(session, dataset_id)
     copies = [_unnumbered(row) | {"id": store.new_id("ds"), "name": f"{row.name} {n}"} for n in range(2, DATASETS + 1)]
     session.execute(insert(DatasetRow), copies)
@@ -76,9 +76,9 @@ def _datasets(session: Session, dataset_id: str) -> list[str]:
 
 
 def _copies(original: Values, datasets: list[str], number: int) -> list[Values]:
-    """``number`` database rows of runs like ``original``, one every 50 minutes until now, each with its own seed.
+    """Return ``number`` database rows of runs like ``original``, each with its own seed.
 
-    They are distributed over ``datasets``.
+    They ended one every 50 minutes until now, and use the ``datasets`` (ids) in turn.
     """
     until, copies = datetime.now(UTC), []
     for place in range(number):
@@ -99,6 +99,7 @@ def _copies(original: Values, datasets: list[str], number: int) -> list[Values]:
 
 
 def _ending(place: int) -> Values:
+    """Return the columns of the copy number ``place`` that differ from those of a success: none for 8 of 10 copies."""
     if place % 10 < SUCCEEDED:
         return {}
     if place % 2:
@@ -107,11 +108,12 @@ def _ending(place: int) -> Values:
 
 
 def _unnumbered(row: DatasetRow) -> Values:
+    """Return the columns of a database row without its automatic number."""
     return {name: value for name, value in columns(row).items() if name != "number"}
 
 
 def _generations(past: list[Values], run: Values) -> list[Values]:
-    """Database rows of the generations of ``run``: those of another run (``past``), repeated to its length."""
+    """Return database rows of the generations of ``run``: the generations ``past`` of another run, repeated in turn."""
     return [
         past[(sequence - 1) % len(past)]
         | {
@@ -128,9 +130,9 @@ def _generations(past: list[Values], run: Values) -> list[Values]:
 
 
 def _length(past: list[Values], generations: int) -> Values:
-    """Counters of a run after ``generations`` generations, at the pace of another run (``past``).
+    """Return counters of a run after ``generations`` generations, at the pace of another run.
 
-    The fields are generations, evaluations and seconds.
+    ``past``: generations of that run. The counters are generations, evaluations (individuals) and elapsed seconds.
     """
     part = generations / len(past)
     return {
@@ -141,7 +143,7 @@ def _length(past: list[Values], generations: int) -> Values:
 
 
 def _copy_generations(session: Session, model: str, have: list[str]) -> None:
-    """Copy the generations of the run ``model`` to all runs not in ``have``, in one SQL statement for speed."""
+    """Copy the generations of the run ``model`` (id) to all runs not in ``have``, in one SQL statement for speed."""
     names = [column.key for column in GenerationRow.__table__.columns]
     theirs = [RunRow.id if name == "run_id" else getattr(GenerationRow, name) for name in names]
     rows = select(*theirs).join(RunRow, literal(True)).where(GenerationRow.job_id == model, RunRow.id.not_in(have))

@@ -1,7 +1,7 @@
-"""The load generator: sends reads and follows event streams while a run is computed, in one process of small cost.
+"""The load generator: one process that sends reads and follows event streams while a run is computed.
 
 Reads are due at even intervals whether the server keeps up or not (an open loop), and each is timed from when it was
-due. So a late answer also counts for the reads that waited behind it, as it would for users.
+due. So a late answer also lengthens the times of the reads that waited behind it, as it would for users.
 """
 
 from __future__ import annotations
@@ -22,21 +22,21 @@ CONNECTIONS = 64
 EVENT = re.compile(rb"id: \d+\nevent: (\w+)\ndata: (\{.*\})\n\n")
 FINAL = frozenset({"SUCCEEDED", "FAILED", "CANCELLED"})
 LONGEST_SECONDS = 900.0
-LAST_SECONDS = 5.0  # in which the last answers may come
+LAST_SECONDS = 5.0  # longest wait for the last answers after the end of the run
 HEAD_END = b"\r\n\r\n"
 LENGTH = re.compile(rb"\r\ncontent-length: *(\d+)\r", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
 class Traffic:
-    """Requests to a server until a run ends.
+    """The requests to send to a server until a run ends.
 
     Attributes:
         port: port of the server.
         run: id of the run whose events are streamed.
-        watchers: number of its event streams.
+        watchers: number of event streams of that run.
         rate: reads per second; 0 for none.
-        paths: paths to read, one after the other, repeated.
+        paths: URL paths to read, one after the other, repeated.
     """
 
     port: int
@@ -51,14 +51,14 @@ class Observed:
     """Measurements of the load generator during one run.
 
     Attributes:
-        seconds: duration of the run.
+        seconds: duration of the load.
         reading_seconds: time during which reads became due.
         latencies: (index of the path, time in s from when the read was due to its answer) of each answer.
-        refused: number of answers that were not 200.
+        refused: number of answers whose status was not 200.
         unanswered: number of reads that were due and got no answer.
         late: longest delay of this process in noticing that a read was due, s.
-        lags: delay of each generation at each event stream, s.
-        cut: number of event streams that ended before their run.
+        lags: delay (s) of each generation at each event stream, from its computation to its arrival.
+        cut: number of event streams that ended before the run did.
         processor_seconds: processor time of this process.
     """
 
@@ -74,7 +74,7 @@ class Observed:
 
 
 def generate(traffic: Traffic) -> Observed:
-    """Send the reads and follow the event streams of ``traffic`` until its run ends; returns the measurements."""
+    """Send the reads and follow the event streams of ``traffic`` until its run ends; return the measurements."""
     start, took = time.monotonic(), time.process_time()
     observed = uvloop.run(asyncio.wait_for(_generate(traffic), LONGEST_SECONDS))
     observed.seconds, observed.processor_seconds = time.monotonic() - start, time.process_time() - took
@@ -98,7 +98,10 @@ async def _generate(traffic: Traffic) -> Observed:
 
 
 class Reads:
-    """Sends the reads in an open loop: each becomes due at its time, independently of earlier answers."""
+    """Sends the reads in an open loop: each becomes due at its time, independently of earlier answers.
+
+    ``observed``: where the measurements are stored.
+    """
 
     def __init__(self, traffic: Traffic, observed: Observed) -> None:
         self._traffic, self._observed = traffic, observed
@@ -130,16 +133,16 @@ class Reads:
             self._waiting.append((self._number, due))
             self._number += 1
         self._send()
-        # The event loop rounds delays to whole milliseconds, down to zero.
+        # The event loop rounds delays to whole milliseconds; a delay of zero would keep the processor busy.
         self._next = self._loop.call_later(max(due - now, 0.001), self._tick)
 
     def free(self, reader: _Reader) -> None:
-        """Called when ``reader`` is ready for a request: sends the oldest read that waits, if any."""
+        """Called when the connection ``reader`` can send a request: send the read that has waited longest, if any."""
         self._idle.append(reader)
         self._send()
 
     def lost(self, reader: _Reader, request: tuple[int, float] | None) -> None:
-        """Called when the server closed the idle connection ``reader``; a read just sent on it is sent again."""
+        """Called when the server closed ``reader``; ``request`` (number, due time), if any, is sent again."""
         self._open -= 1
         if request:
             self._waiting.appendleft(request)
@@ -148,11 +151,12 @@ class Reads:
             self._idle.remove(reader)
 
     def answered(self, number: int, status: int, seconds: float) -> None:
-        """Record an answer to path ``number`` that came ``seconds`` after the read was due."""
+        """Record that read ``number`` was answered with the HTTP ``status``, ``seconds`` after it was due."""
         self._observed.latencies.append((number % len(self._requests), seconds))
         self._observed.refused += status != 200
 
     def _send(self) -> None:
+        """Send waiting reads on idle connections; if reads still wait, open one more connection, up to CONNECTIONS."""
         while self._waiting and self._idle:
             number, due = self._waiting.popleft()
             self._idle.pop().send(self._requests[number % len(self._requests)], number, due)
@@ -173,12 +177,12 @@ class _Reader(asyncio.Protocol):
         self._data = b""
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Report that the connection is ready."""
+        """Report that the connection can send a request."""
         self._transport = cast(asyncio.Transport, transport)
         self._reads.free(self)
 
     def send(self, request: bytes, number: int, due: float) -> None:
-        """Send the bytes ``request`` for path ``number``, which was due at the time ``due``."""
+        """Send ``request``, the bytes of read ``number``, which was due at the time ``due`` (``time.monotonic``)."""
         self._pending, self._data = (number, due), b""
         self._transport.write(request)
 
@@ -202,7 +206,7 @@ class _Reader(asyncio.Protocol):
 
 
 def answered(data: bytes) -> int:
-    """HTTP status of the answer in the received bytes ``data``; 0 while it is incomplete."""
+    """Return the HTTP status of the answer in the received bytes ``data``; 0 while the answer is incomplete."""
     end = data.find(HEAD_END)
     length = LENGTH.search(data, 0, end + 2) if end > 0 else None
     return int(data[9:12]) if length and len(data) - end - len(HEAD_END) >= int(length[1]) else 0
@@ -218,8 +222,9 @@ def _request(port: int, path: str) -> bytes:
 class Watcher(asyncio.Protocol):
     """Connection to one event stream of a run.
 
-    It times each generation from the end of its computation (``started_at`` of the run plus ``elapsed_seconds`` of the
-    generation, by the server's clock) through its durable storage to its arrival here.
+    For each generation it measures the delay from the end of its computation (the run's ``started_at`` plus the
+    generation's ``elapsed_seconds``, by the server's clock), over its storage on disk, to its arrival here. ``over`` is
+    set when the stream ends.
     """
 
     def __init__(self, port: int, run: str, over: asyncio.Event) -> None:
@@ -245,7 +250,7 @@ class Watcher(asyncio.Protocol):
         self._transport.write(_request(self._port, f"/v1/runs/{self._run}/events"))
 
     def data_received(self, data: bytes) -> None:
-        """Record when each event arrived."""
+        """Store each generation with its time of arrival; close the stream once the run has ended."""
         now = time.time()
         self._data += data
         end = 0
@@ -260,13 +265,13 @@ class Watcher(asyncio.Protocol):
             self._transport.close()
 
     def connection_lost(self, exc: Exception | None) -> None:  # noqa: ARG002  as asyncio calls it
-        """Record that the stream has ended."""
+        """Signal that the stream has ended."""
         self._over.set()
         if not self.ended.done():
             self.ended.set_result(None)
 
     def lags(self) -> list[float]:
-        """Delay of each generation, from its computation to its arrival, s."""
+        """Return the delay (s) of each generation, from its computation to its arrival here."""
         started = self._state.get("started_at")
         if not isinstance(started, str):
             return []

@@ -1,8 +1,9 @@
-"""The mix of read requests in the load test: a few users follow the present run, others look at old ones.
+"""The mix of read requests in the load test: as if a few users followed the present run, and others looked at old ones.
 
-Of ten reads six are of a run, two of a page of 50 runs, and two of a page of 50 generations. Half of the runs and
-histories are those of the present run; nine tenths of the run lists are the first page. The others are drawn at random
-from everything that is stored, so that a cache in the server does not improve the figures.
+Of ten reads six are of a run, two of a page of the run list (50 runs), and two of a page of a run's history (50
+generations). Half of the runs and histories are those of the present run; nine tenths of the run lists are the first
+page. The others are drawn at random from everything that is stored, so that a cache in the server does not improve the
+figures.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ PAGE = 50
 
 @dataclass(frozen=True)
 class Stored:
-    """The stored runs: ids, newest first; cursors of the list pages; number of generations of each run."""
+    """The stored runs: ids, newest first; cursors of the list's pages; number of generations of each run."""
 
     ids: Sequence[str]
     cursors: Sequence[str]
@@ -29,7 +30,7 @@ class Stored:
 
 
 def walk(http: httpx.Client) -> Stored:
-    """Read all pages of the server's run list, and return what is stored."""
+    """Read all pages of the server's run list, and return the stored runs."""
     ids, cursors, generations, cursor = list[str](), list[str](), list[int](), None
     while True:
         page = http.get("/v1/runs", params={"limit": PAGE} | ({"cursor": cursor} if cursor else {})).json()
@@ -42,7 +43,7 @@ def walk(http: httpx.Client) -> Stored:
 
 
 def reads(stored: Stored, present: str, number: int, seed: int) -> list[tuple[str, str]]:
-    """``number`` random reads, each as (kind, URL path); ``present``: id of the present run."""
+    """Draw ``number`` random reads, each as (kind, URL path); ``present``: id of the run that is being computed."""
     rng = np.random.default_rng(seed)
     return [_read(KINDS[kind], stored, present, rng) for kind in rng.choice(len(KINDS), number, p=SHARES)]
 

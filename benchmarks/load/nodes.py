@@ -18,9 +18,11 @@ SETTLE_SECONDS = 120.0
 
 
 def scaling(folder: Path, work: Json, short: Json, rounds: int) -> Json:
-    """Evaluations per second of the calibration ``work`` with one and with two nodes, alternately in ``rounds`` rounds.
+    """Measure the pace (evaluations per second) of a calibration with one and with two Ray nodes.
 
-    The efficiency is the pace with two nodes divided by twice that with one. ``short``: calibration for warming up.
+    ``work``: request of the calibration, which is run with each number of nodes in each of ``rounds`` rounds;
+    ``short``: request of a calibration for warming up. The returned efficiency is the pace with two nodes divided by
+    twice the pace with one.
     """
     folder.mkdir()
     cluster = Cluster(folder)
@@ -49,7 +51,7 @@ def scaling(folder: Path, work: Json, short: Json, rounds: int) -> Json:
 
 
 def _set_nodes(cluster: Cluster, nodes: int, now: int) -> int:
-    """Start or kill a node if the number of nodes ``now`` differs from ``nodes``; returns ``nodes``."""
+    """Start or kill a node if their number is ``now`` and should be ``nodes``; return ``nodes``."""
     if nodes < now:
         cluster.kill_node()
     elif nodes > now:
@@ -58,7 +60,10 @@ def _set_nodes(cluster: Cluster, nodes: int, now: int) -> int:
 
 
 def _settle(client: Client, short: Json, nodes: int) -> None:
-    """Compute short runs until the server uses all ``nodes`` and their code is compiled."""
+    """Compute short runs until the server has one worker on each of ``nodes`` nodes and their code is compiled.
+
+    RuntimeError after SETTLE_SECONDS.
+    """
     deadline = time.monotonic() + SETTLE_SECONDS
     while True:
         computed(client, client.submit_run(**short)["id"])

@@ -22,7 +22,10 @@ PAGES, LARGEST_PAGES = 100, 20
 
 
 def pages(port: int, stored: Stored, filled: Filled, dataset_id: str) -> Json:
-    """Response times (ms) and largest size of each kind of page, by its name."""
+    """Measure pages of the run list and of a history: response times (ms) and largest size (kB), by kind of page.
+
+    ``port``: of the server; ``filled``: the long history to read; ``dataset_id``: dataset by which lists are filtered.
+    """
     rng = np.random.default_rng(1)
     cursors = rng.permutation(stored.cursors)
     last = max(0, filled.longest_generations - HISTORY_PAGE - PAGES)
@@ -45,7 +48,7 @@ def pages(port: int, stored: Stored, filled: Filled, dataset_id: str) -> Json:
 
 
 def timed(port: int, paths: list[str]) -> Json:
-    """Request ``paths`` one after the other; response times (ms) and size of the largest response.
+    """Request ``paths`` one after the other; return percentiles of the response times (ms), and the largest size (kB).
 
     RuntimeError if a status is not 200.
     """

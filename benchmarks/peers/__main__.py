@@ -1,4 +1,4 @@
-"""Cost of a beat in other engines: ``python -m benchmarks.peers --division 24 --medium vacuum --json``."""
+"""Time of a wing beat in other engines: ``python -m benchmarks.peers --division 24 --medium vacuum --json``."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ for _library in ("OPENBLAS", "OMP", "MKL"):
 
 
 def main() -> None:
-    """Print one line for each requested engine."""
+    """Parse the command line, and print the cost and the error of a beat with each requested engine."""
     from benchmarks.peers import compare
 
     parser = argparse.ArgumentParser(prog="python -m benchmarks.peers", description=__doc__)

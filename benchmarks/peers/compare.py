@@ -19,7 +19,10 @@ CASES = ("scipy", "exudyn", "exudyn_same_law")
 
 
 def nominal(division: str, medium: Medium) -> PeerWing:
-    """The Robird's wing with nominal genes at 3 Hz in the chamber at 10 mbar or in the tunnel at 6 m/s."""
+    """Return the Robird's wing with nominal genes at 3 Hz, in the chamber at 10 mbar or in the tunnel at 6 m/s.
+
+    ``division``: discretisation into bodies. ValueError for an unknown ``medium``.
+    """
     if medium not in CONDITIONS:
         raise ValueError(f"medium {medium!r} is unknown; give one of {', '.join(CONDITIONS)}")
     model = FlexibleWing(robird_wing(), division)
@@ -28,26 +31,36 @@ def nominal(division: str, medium: Medium) -> PeerWing:
 
 
 def scipy_case(division: str, medium: Medium, tolerance_mm: float, seconds: float = 600.0) -> dict[str, Any]:
-    """Cost of a beat with scipy: the cheapest of LSODA, BDF and Radau, on compiled equations with a sparse Jacobian."""
+    """Measure a beat with scipy: the cheapest of LSODA, BDF and Radau, on compiled equations, sparse Jacobian.
+
+    Arguments and result as for :func:`case`.
+    """
     return case("scipy", division, medium, tolerance_mm, seconds)
 
 
 def exudyn_case(division: str, medium: Medium, tolerance_mm: float, seconds: float = 600.0) -> dict[str, Any]:
-    """Cost of a beat with Exudyn and its own compiled spring law.
+    """Measure a beat with Exudyn and its own compiled spring law. Arguments and result as for :func:`case`.
 
     In air, the compiled air loads are called from Python. In the vacuum chamber, whose pressure is 1 % of the ambient
-    one, Exudyn neglects the air, which avoids these calls.
+    one, the simulation with Exudyn neglects the air, which avoids these calls.
     """
     return case("exudyn", division, medium, tolerance_mm, seconds)
 
 
 def exudyn_same_law_case(division: str, medium: Medium, tolerance_mm: float, seconds: float = 600.0) -> dict[str, Any]:
-    """Cost of a beat with Exudyn and wingfit's spring law, called from Python: slow, to check that results agree."""
+    """Measure a beat with Exudyn and wingfit's spring law, which is called from Python and therefore slow.
+
+    It serves to check that the results agree. Arguments and result as for :func:`case`.
+    """
     return case("exudyn_same_law", division, medium, tolerance_mm, seconds)
 
 
 def case(engine: str, division: str, medium: Medium, tolerance_mm: float, seconds: float) -> dict[str, Any]:
-    """One row of the comparison: engine, bodies, medium, tolerance, and the fields of Cost."""
+    """Return one row of the comparison: engine, number of bodies, medium, tolerance, and the fields of Cost.
+
+    ``engine``: one of CASES; ``division``: discretisation into bodies; ``tolerance_mm``: largest error of a marker;
+    ``seconds``: time limit.
+    """
     if engine not in CASES:
         raise ValueError(f"engine {engine!r} is unknown; give one of {', '.join(CASES)}")
     if not tolerance_mm > 0:

@@ -2,19 +2,26 @@
 
 They are derived from the springs' energies and the Newton-Euler equations.
 
-State of each body, 13 numbers: centre of mass p (m), unit quaternion q (scalar first, body -> world), velocity v (m/s)
-and angular velocity w (rad/s), all in the **world**; ``sim`` keeps body twists. Scalar code for one individual.
+State of each body, 13 numbers: centre of mass p (m), unit quaternion q (scalar first; it rotates body axes to world
+axes), velocity v (m/s) and angular velocity w (rad/s), all in **world** axes, whereas ``sim`` stores twists (linear and
+angular velocity) in body axes. The code is scalar, for one individual. Equations are those of van der Grinten's thesis.
 
-Springs (thesis Eqs. 5-7; Stramigioli). With both frames' axes a_k, b_k and the gap s between their origins, in the
-world, the energies of ``docs/peers.md`` read V_o = sum_k g_k (1 - a_k . b_k), G_o = tr(K_o)/2 - K_o, and
-V_t = 1/4 s . (K_A + K_B) s with K_A = sum_k k_k a_k a_k^T and K_B alike. Their variations give
+Springs (thesis Eqs. 5-7; Stramigioli). A connector joins a frame on body A, with axes a_k, and one on body B, with axes
+b_k (k = 1..3); s is the vector from A's origin to B's, all in world axes. g_k are co-stiffnesses, k_k the stiffnesses
+of translation, K_o the rotational stiffness matrix, and G_o = tr(K_o)/2 - K_o = diag(g_k). The energies of
+``docs/peers.md`` read V_o = sum_k g_k (1 - a_k . b_k) and V_t = 1/4 s . (K_A + K_B) s with K_A = sum_k k_k a_k a_k^T,
+and K_B in the same way from b_k. Their variations give
 
 - force on B: -(K_A + K_B) s / 2; on A the opposite,
-- moment on B: sum_k g_k b_k x a_k + s x (K_B s) / 2; on A: -sum_k g_k b_k x a_k + s x (K_A s) / 2,
+- moment on B: sum_k g_k b_k x a_k + s x (K_B s) / 2; on A: -sum_k g_k b_k x a_k + s x (K_A s) / 2.
 
-which balance: the two moments and s x force sum to zero. Damper (Eq. 4): opposes B's twist relative to A's frame, at
-B's origin. Air: thesis Eqs. 8-13 with the reading of ``sim/kernels/air.py``; the change of sign in reversed flow is
-the cubic x (3 - x^2) / 2 of x = (chordwise flow) / (flow sin 5 deg), cut at -1 and 1.
+They balance: the two moments and s x (force on B) sum to zero. Dampers (Eq. 4) oppose B's twist relative to A's frame,
+at B's origin. Air: thesis Eqs. 8-13 with the changes listed in ``sim/kernels/air.py``; lift changes sign in reversed
+flow as the cubic x (3 - x^2) / 2 of x = (chordwise flow) / (flow speed times sin 15 deg), limited to -1..1.
+
+In the functions, N bodies are followed by the two driving rods: rotation matrices R [N + 2, 3, 3] (body to world axes),
+positions p, velocities v and angular velocities w [N + 2, 3]. ``load`` [N + 2, 6]: force (N), then moment about the
+centre of mass (N m).
 """
 
 from __future__ import annotations
@@ -33,7 +40,7 @@ V3 = tuple[float, float, float]
 
 SIZE = 13  # numbers per body
 P, Q, V, W = 0, 3, 7, 10  # offsets of position, quaternion, velocity, angular velocity
-_TURN = math.sin(math.radians(15.0))
+_TURN = math.sin(math.radians(15.0))  # lift changes sign within 15 degrees of flow normal to the chord
 _STILL = 1e-9  # m/s, keeps the angle of attack defined without flow
 
 
@@ -44,7 +51,7 @@ def _row(x: Array, i: int) -> V3:
 
 @allocating
 def _axis(R: Array, n: int, k: int) -> V3:
-    """Axis ``k`` of body ``n`` in world axes: column k of R[n]."""
+    """Return axis ``k`` of body ``n`` in world axes: column k of R[n]."""
     return R[n, 0, k], R[n, 1, k], R[n, 2, k]
 
 
@@ -60,13 +67,13 @@ def _dot(x: V3, y: V3) -> float:
 
 @allocating
 def _plus(x: V3, f: float, y: V3) -> V3:
-    """The vector x + f y."""
+    """Return the vector x + f y."""
     return x[0] + f * y[0], x[1] + f * y[1], x[2] + f * y[2]
 
 
 @allocating
 def _turned(R: Array, n: int, x: V3) -> V3:
-    """R[n] x: the vector ``x`` of body ``n`` in world axes."""
+    """Return R[n] x: the vector ``x``, given in axes of body ``n``, in world axes."""
     return (
         R[n, 0, 0] * x[0] + R[n, 0, 1] * x[1] + R[n, 0, 2] * x[2],
         R[n, 1, 0] * x[0] + R[n, 1, 1] * x[1] + R[n, 1, 2] * x[2],
@@ -76,13 +83,13 @@ def _turned(R: Array, n: int, x: V3) -> V3:
 
 @allocating
 def _back(R: Array, n: int, x: V3) -> V3:
-    """R[n]^T x: the world vector ``x`` in axes of body ``n``."""
+    """Return R[n]^T x: the vector ``x``, given in world axes, in axes of body ``n``."""
     return _dot(_axis(R, n, 0), x), _dot(_axis(R, n, 1), x), _dot(_axis(R, n, 2), x)
 
 
 @allocating
 def _act(load: Array, n: int, force: V3, moment: V3) -> None:
-    """Add a force and a moment about the centre (world axes) to row ``n`` of ``load`` [N + 2, 6]."""
+    """Add a force and a moment about the centre of mass, both in world axes, to row ``n`` of ``load`` [N + 2, 6]."""
     for i in range(3):
         load[n, i] += force[i]
         load[n, 3 + i] += moment[i]
@@ -99,7 +106,10 @@ def rotation(w: float, x: float, y: float, z: float, R: Array) -> None:
 
 @allocating
 def put_rods(wing: PeerWing, t: float, R: Array, p: Array, v: Array, w: Array) -> None:
-    """Set rows N and N + 1 of R, p, v and w: the frames of the driving rods, which turn about x at the hinge."""
+    """Set rows N and N + 1 of R, p, v and w to the frames of the driving rods at time ``t`` (s).
+
+    The rods rotate about x at the hinge.
+    """
     n = len(wing.mass)
     for k in range(2):
         angle, rate = rod_motion(wing, t, k)
@@ -112,7 +122,7 @@ def put_rods(wing: PeerWing, t: float, R: Array, p: Array, v: Array, w: Array) -
 
 @allocating
 def spring_loads(wing: PeerWing, R: Array, p: Array, v: Array, w: Array, load: Array) -> None:
-    """Add the loads of springs and dampers on bodies and rods to ``load`` [N + 2, 6]."""
+    """Add the forces and moments of springs and dampers on bodies and rods to ``load`` [N + 2, 6]."""
     for c in range(len(wing.first)):
         i, j = wing.first[c], wing.second[c]
         arm_a, arm_b = _turned(R, i, _row(wing.a, c)), _turned(R, j, _row(wing.b, c))
@@ -143,7 +153,11 @@ def spring_loads(wing: PeerWing, R: Array, p: Array, v: Array, w: Array, load: A
 
 @allocating
 def _lift_and_drag(wing: PeerWing, strip: int, chord: V3, normal: V3, flow: V3) -> tuple[V3, V3]:
-    """Lift and drag (N, world axes) of a strip (thesis Eqs. 8-11); ``flow``: the air's velocity past it, m/s."""
+    """Return lift and drag (N, world axes) of a strip (thesis Eqs. 8-11).
+
+    ``chord``, ``normal``: unit vectors along the chord and normal to the strip; ``flow``: velocity of the air relative
+    to the strip, m/s.
+    """
     along, across = _dot(flow, chord), _dot(flow, normal)
     speed = math.sqrt(along * along + across * across + _STILL * _STILL)
     x = min(max(along / (_TURN * speed), -1.0), 1.0)
@@ -161,7 +175,7 @@ def _lift_and_drag(wing: PeerWing, strip: int, chord: V3, normal: V3, flow: V3) 
 
 @allocating
 def air_loads(wing: PeerWing, R: Array, v: Array, w: Array, load: Array) -> None:
-    """Add the air's force and moment on every body to ``load`` [N + 2, 6]."""
+    """Add the force and the moment of the air on every body to ``load`` [N + 2, 6]."""
     for strip in range(len(wing.area)):
         flow, x, z = _row(wing.wind.reshape(1, 3), 0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
         members = range(wing.strip[strip], wing.strip[strip + 1])
@@ -186,7 +200,10 @@ def air_loads(wing: PeerWing, R: Array, v: Array, w: Array, load: Array) -> None
 
 @allocating
 def _accelerate(wing: PeerWing, n: int, R: Array, w: V3, load: Array, dy: Array) -> None:
-    """Set the accelerations v', w' (world axes) of body ``n`` in ``dy`` by the Newton-Euler equations."""
+    """Set v' and w' (world axes) in ``dy`` [13] to the accelerations of body ``n``, by the Newton-Euler equations.
+
+    ``w``: its angular velocity, rad/s.
+    """
     spin = _back(R, n, w)
     L = _turned(R, n, _times(wing.inertia, n, spin))
     torque = _back(R, n, _plus(_row(load[:, 3:], n), -1.0, _cross(w, L)))
@@ -204,7 +221,7 @@ def _times(A: Array, n: int, x: V3) -> V3:
 
 @allocating
 def _solved(A: Array, n: int, x: V3) -> V3:
-    """Solution y of A[n] y = x for the 3 x 3 matrix A[n], by Cramer's rule."""
+    """Return the solution y of A[n] y = x for the 3 x 3 matrix A[n], by Cramer's rule."""
     r0, r1, r2 = _axis(A, n, 0), _axis(A, n, 1), _axis(A, n, 2)
     c = _cross(r1, r2)
     f = 1.0 / _dot(r0, c)
@@ -239,7 +256,7 @@ def rates(wing: PeerWing, t: float, y: Array, dy: Array) -> None:
 
 @allocating
 def rates_of_rows(wing: PeerWing, t: float, rows: Array) -> Array:
-    """Time derivatives [k, 13 N] of the k states ``rows`` [k, 13 N], for finite differences."""
+    """Return the time derivatives [k, 13 N] of the k states ``rows`` [k, 13 N] at time ``t`` (s)."""
     out = np.empty_like(rows)
     for k in range(len(rows)):
         rates(wing, t, rows[k], out[k])
@@ -247,23 +264,26 @@ def rates_of_rows(wing: PeerWing, t: float, rows: Array) -> Array:
 
 
 def right_hand_side(wing: PeerWing, t: float, y: Array) -> Array:
-    """Time derivative in the form for ``scipy.integrate``: ``y`` [13 N] or, vectorised, [13 N, k]; same shape out."""
+    """Return the time derivative of the state ``y`` at time ``t`` (s), in the form for ``scipy.integrate``.
+
+    ``y`` is one state [13 N] or k states [13 N, k]; the result has the same shape.
+    """
     if y.ndim == 1:
         return np.asarray(rates_of_rows(wing, t, y[None])[0])
     return np.asarray(rates_of_rows(wing, t, np.ascontiguousarray(y.T)).T)
 
 
 def at_rest(wing: PeerWing) -> Array:
-    """State [13 N] of the undeformed wing at rest."""
+    """Return the state [13 N] of the undeformed wing at rest."""
     y = np.zeros((len(wing.mass), SIZE))
     y[:, P:Q], y[:, Q] = wing.rest, 1.0
     return y.ravel()
 
 
 def sparsity(wing: PeerWing) -> csc_matrix:
-    """Sparsity pattern [13 N, 13 N] of the Jacobian.
+    """Return the sparsity pattern [13 N, 13 N] of the Jacobian of :func:`right_hand_side`.
 
-    Joined bodies couple through connectors, the bodies of a strip through the air.
+    Bodies joined by a connector depend on each other, and with air so do all bodies of a strip.
     """
     n = len(wing.mass)
     near = np.eye(n, dtype=bool)
@@ -281,7 +301,7 @@ def sparsity(wing: PeerWing) -> csc_matrix:
 
 
 def marker_tracks(wing: PeerWing, states: Array) -> Array:
-    """World positions [T, M, 3] (m) of the markers for ``states`` [T, 13 N]."""
+    """Return the world positions [T, M, 3] (m) of the M markers for ``states`` [T, 13 N] at T times."""
     x = states.reshape(len(states), -1, SIZE)[:, wing.carrier]
     p, q, u = x[..., P:Q], x[..., Q + 1 : V], x[..., Q : Q + 1]
     length = np.sum(x[..., Q:V] ** 2, axis=-1, keepdims=True)

@@ -2,7 +2,7 @@
 
 The bodies are rigid and have Tait-Bryan angles; each connector is a six-axis spring-damper. The two driving rods are
 bodies too, with their angles constrained to those of the drive. The integrator is the generalised-alpha method with a
-modified Newton iteration and a sparse solver, on one thread. Needs the extra ``peers``.
+modified Newton iteration and a sparse solver, on one thread. Needs the extra ``peers`` (pip install 'wingfit[peers]').
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _ROD_MASS, _ROD_INERTIA = 0.1, 1e-4  # kg, kg m^2: without influence, because th
 
 
 def load_exudyn() -> Any:
-    """Import Exudyn in its fast build without range checks; ImportError names the extra to install."""
+    """Import Exudyn in its fast build without range checks, and return it; ImportError if it is not installed."""
     sys.exudynFast = True  # type: ignore[attr-defined]
     try:
         with contextlib.redirect_stdout(io.StringIO()):  # it prints a greeting
@@ -48,9 +48,9 @@ class Settings:
 
     Attributes:
         steps: integration steps per beat, a multiple of SAMPLES.
-        law: of the springs: "angles" (Exudyn's default, on Tait-Bryan angles), "logarithm" (its intrinsic one, on the
-            logarithm of the relative pose at mid-frame) or "energy" (that of wingfit, in Python).
-        spectral_radius: of the generalised-alpha method at infinity.
+        law: law of the springs: "angles" (Exudyn's default, on Tait-Bryan angles), "logarithm" (Exudyn's intrinsic one,
+            on the logarithm of the relative pose at mid-frame) or "energy" (wingfit's, called from Python).
+        spectral_radius: spectral radius of the generalised-alpha method at infinite frequency.
         newton: relative tolerance of Newton's method.
     """
 
@@ -70,8 +70,8 @@ class ExudynRun:
 
     Attributes:
         times: [T] s.
-        tracks: [T, M, 3] of the markers, m.
-        cpu: [beats] process time of each beat, s.
+        tracks: [T, M, 3] positions of the markers, m.
+        cpu: [beats] processor time of each beat, s.
     """
 
     times: Array
@@ -80,7 +80,10 @@ class ExudynRun:
 
 
 def simulate(wing: PeerWing, settings: Settings, *, beats: int = 2, until: float = np.inf) -> ExudynRun:
-    """Integrate ``beats`` beats from rest; OutOfTimeError once ``time.monotonic()`` passes ``until``."""
+    """Integrate ``beats`` beats from rest with Exudyn.
+
+    OutOfTimeError once ``time.monotonic()`` exceeds ``until``, ArithmeticError if Exudyn fails.
+    """
     exu = load_exudyn()
     items = exu.itemInterface
     period = 2 * np.pi / wing.omega
@@ -131,7 +134,10 @@ def _solver_settings(exu: Any, settings: Settings, beats: int, period: float) ->
 
 
 def _add_bodies(items: Any, system: Any, wing: PeerWing) -> tuple[list[Any], list[Any]]:
-    """Add the N bodies, under gravity, and the two driven rods to ``system``; returns their nodes and objects."""
+    """Add the N bodies, under gravity, and the two driving rods to ``system``.
+
+    Returns the nodes and the objects of bodies and rods. ``items``: Exudyn's item interface.
+    """
     nodes, bodies = [], []
     for mass, inertia, place in zip(wing.mass, wing.inertia, wing.rest, strict=True):
         J = [inertia[0, 0], inertia[1, 1], inertia[2, 2], inertia[1, 2], inertia[0, 2], inertia[0, 1]]
@@ -168,7 +174,10 @@ def _drive(wing: PeerWing, rod: int, derivative: int) -> Callable[[Any, float, i
 
 
 def _add_connectors(items: Any, system: Any, wing: PeerWing, bodies: list[Any], law: Law) -> None:
-    """Add the springs and dampers to ``system``; in Exudyn's matrices translation comes before rotation."""
+    """Add the springs and dampers between ``bodies`` to ``system``.
+
+    In Exudyn's matrices translation comes before rotation, in ``wing`` after it.
+    """
     order = [3, 4, 5, 0, 1, 2]
     for c, (i, j) in enumerate(zip(wing.first, wing.second, strict=True)):
         ends = [
@@ -190,7 +199,7 @@ def _add_connectors(items: Any, system: Any, wing: PeerWing, bodies: list[Any], 
 
 @allocating
 def tait_bryan(a: float, b: float, c: float, R: Array) -> None:
-    """Set ``R`` [3, 3] to R_x(a) R_y(b) R_z(c), a rotation by Tait-Bryan angles (rad)."""
+    """Set ``R`` [3, 3] to the rotation matrix R_x(a) R_y(b) R_z(c) of the Tait-Bryan angles a, b, c (rad)."""
     sa, ca, sb, cb, sc, cc = np.sin(a), np.cos(a), np.sin(b), np.cos(b), np.sin(c), np.cos(c)
     R[0, 0], R[0, 1], R[0, 2] = cb * cc, -cb * sc, sb
     R[1, 0], R[1, 1], R[1, 2] = ca * sc + sa * sb * cc, ca * cc - sa * sb * sc, -sa * cb
@@ -199,11 +208,15 @@ def tait_bryan(a: float, b: float, c: float, R: Array) -> None:
 
 @allocating
 def energy_wrench(K: Array, D: Array, d: Array, angles: Array, v: Array, w: Array) -> Array:
-    """Force and moment [6] on the first body of springs that derive from the energies of ``docs/peers.md``.
+    """Return the force and the moment [6] on the first body of one connector, by the energies of ``docs/peers.md``.
 
-    In the first body's axes: with the gap d and the relative rotation Q, F = (K_t + Q K_t Q^T) d / 2 and, for the
-    second body, moments sum_k g_k (Q e_k) x e_k + d x (Q K_t Q^T d) / 2. Exudyn takes the moment on the first body to
-    be the opposite of that on the second, though the forces are d apart; see ``docs/peers.md``.
+    All in the first body's axes. ``K``, ``D`` [6]: stiffness and damping, rotation before translation; ``d``: vector
+    between the connector's ends (m); ``angles``: Tait-Bryan angles of the relative rotation Q (rad); ``v``, ``w``:
+    relative velocity (m/s) and angular velocity (rad/s).
+
+    With the translational stiffness K_t and co-stiffnesses g_k, the force is (K_t + Q K_t Q^T) d / 2, and the moment on
+    the second body is sum_k g_k (Q e_k) x e_k + d x (Q K_t Q^T d) / 2; dampers are added. Exudyn takes the moment on
+    the first body to be the opposite of that on the second, though the forces act d apart; see ``docs/peers.md``.
     """
     Q, out = np.empty((3, 3)), np.empty(6)
     tait_bryan(angles[0], angles[1], angles[2], Q)
@@ -228,10 +241,11 @@ def _energy_law(K: Array, D: Array) -> Callable[..., Array]:
 
 @allocating
 def air_on_angles(wing: PeerWing, q: Array, q_t: Array) -> Array:
-    """Generalised force [6 N] of the air, for displacements and Tait-Bryan angles ``q`` [6 N] of all bodies.
+    """Return the generalised force [6 N] of the air on the N bodies.
 
-    ``q_t`` [6 N]: time derivative of ``q``. With angles a, b, c and R = R_x R_y R_z the angular velocity is
-    w = e_x a' + (R_x e_y) b' + (R_x R_y e_z) c'; hence the generalised force of a moment M on a is M . e_x, and so on.
+    ``q`` [6 N]: displacement (m) and Tait-Bryan angles (rad) of each body; ``q_t`` [6 N]: their time derivatives. With
+    angles a, b, c and R = R_x R_y R_z the angular velocity is w = e_x a' + (R_x e_y) b' + (R_x R_y e_z) c'; hence the
+    generalised force of a moment M is M . e_x for a, M . (R_x e_y) for b, and M . (R_x R_y e_z) for c.
     """
     n_bodies = len(wing.mass)
     R, axes = np.empty((n_bodies, 3, 3)), np.zeros((n_bodies, 3, 3))
@@ -255,7 +269,7 @@ def air_on_angles(wing: PeerWing, q: Array, q_t: Array) -> Array:
 
 
 def _add_air(exu: Any, system: Any, wing: PeerWing, nodes: list[Any]) -> None:
-    """Add the air's force to ``system`` as one object that acts on all bodies, evaluated at every iteration.
+    """Add the force of the air to ``system`` as one object on all ``nodes``, evaluated at every Newton iteration.
 
     Its Jacobian is omitted: the air is soft compared with the springs, and Newton's method converges without it.
     """
@@ -277,7 +291,10 @@ def _add_air(exu: Any, system: Any, wing: PeerWing, nodes: list[Any]) -> None:
 
 
 def _marker_tracks(wing: PeerWing, q: Array) -> Array:
-    """World positions [T, M, 3] (m) of the markers from displacements and angles ``q`` [N, T, 6] of the bodies."""
+    """Return the world positions [T, M, 3] (m) of the M markers at T times.
+
+    ``q`` [N, T, 6]: displacement (m) and Tait-Bryan angles (rad) of each of N bodies.
+    """
     x = q[wing.carrier]
     R = Rotation.from_euler("XYZ", x[..., 3:].reshape(-1, 3)).as_matrix().reshape(*x.shape[:2], 3, 3)
     there = wing.rest[wing.carrier][:, None] + x[..., :3] + np.einsum("mtij,mj->mti", R, wing.markers)
@@ -294,10 +311,11 @@ def cheapest(
     converged: int = 3840,
     seconds: float = 600.0,
 ) -> Cost:
-    """Cost of the first beat after the start-up ramp, at the longest step that keeps markers within ``tolerance_mm``.
+    """Measure the beat after the start-up ramp with the fewest steps that keep markers within ``tolerance_mm``.
 
-    The error is measured against the converged run with the same spring law; of the ``newtons`` tolerances that
-    suffice, the cheaper one is used.
+    The error is measured against the run with ``converged`` steps a beat and the same spring law. ``steps``: numbers of
+    steps a beat to try in turn; ``newtons``: tolerances of Newton's method, of which the cheapest one that suffices is
+    used; ``seconds``: time limit for everything. Without a result, the returned Cost gives the reason.
     """
     until = time.monotonic() + seconds
     method, note = f"generalised alpha, {law}", f"not found within {seconds:g} s; allow more time"

@@ -29,9 +29,9 @@ class Run:
 
     Attributes:
         times: [T] start of the run, then end of every step, s.
-        states: [T, 13 N] as in :mod:`.equations`.
-        cpu: [beats] process time of each beat, s.
-        between: the integrator's interpolation, if it was kept.
+        states: [T, 13 N] of the N bodies, as in :mod:`.equations`.
+        cpu: [beats] processor time of each beat, s.
+        between: the integrator's interpolation between steps, if it was kept, else None.
     """
 
     times: Array
@@ -51,8 +51,8 @@ def simulate(
 ) -> Run:
     """Integrate ``beats`` beats from rest with scipy's ``method``.
 
-    ``tolerance``: relative; the absolute tolerances are this times typical values. ``clock`` is called after every step
-    and may raise :class:`OutOfTimeError`. ``keep``: whether to keep the interpolation.
+    ``tolerance``: relative tolerance; the absolute ones are ``tolerance`` times typical values of the state. ``clock``
+    is called after every step and may raise :class:`OutOfTimeError`. ``keep``: whether to store the interpolation.
     """
     period = 2 * np.pi / wing.omega
     solver = _solver(wing, method, tolerance, beats * period)
@@ -85,9 +85,10 @@ def _solver(wing: PeerWing, method: str, tolerance: float, end: float) -> OdeSol
 
 @dataclass(frozen=True)
 class Cost:
-    """Cost of one beat at a given error.
+    """Processor time of one beat, and the largest error of a marker (mm).
 
-    If there is no result, ``cpu_ms_per_beat`` is None and ``note`` gives the reason.
+    ``method``, ``settings``: integrator and its tolerances or steps. Without a result, ``cpu_ms_per_beat`` is None and
+    ``note`` gives the reason.
     """
 
     cpu_ms_per_beat: float | None
@@ -98,7 +99,7 @@ class Cost:
 
 
 def deadline(seconds: float) -> Callable[[], None]:
-    """Function that raises :class:`OutOfTimeError` if it is called more than ``seconds`` from now."""
+    """Return a function that raises :class:`OutOfTimeError` if it is called more than ``seconds`` from now."""
     end = time.monotonic() + seconds
 
     def check() -> None:
@@ -109,9 +110,10 @@ def deadline(seconds: float) -> Callable[[], None]:
 
 
 def error_against(wing: PeerWing, run: Run, reference: Run) -> float:
-    """Largest distance (m) of a marker in ``run`` from ``reference`` at the steps of the last beat.
+    """Return the largest distance (m) of a marker in ``run`` from ``reference`` at the steps of the last beat.
 
-    It is evaluated at the steps of ``run``; only the reference is interpolated.
+    The times are those of the steps of ``run``; only the reference is interpolated, and must have been run with
+    keep=True.
     """
     if reference.between is None:
         raise ValueError("the reference was run without its interpolation; simulate it with keep=True")
@@ -129,10 +131,12 @@ def cheapest(
     converged: float = 1e-6,
     seconds: float = 600.0,
 ) -> Cost:
-    """Cost of the cheapest beat after the start-up ramp with markers within ``tolerance_mm`` of a converged Radau run.
+    """Measure the cheapest beat after the start-up ramp with markers within ``tolerance_mm`` of a converged run.
 
-    For each of ``methods`` it takes the loosest of ``tolerances`` that suffices together with the next tighter one, and
-    the cheaper of the two. The errors of BDF and LSODA are erratic: a single tolerance may suffice by chance.
+    The converged run uses Radau with the tolerance ``converged``. For each of ``methods`` the loosest two neighbouring
+    ``tolerances`` that both suffice are measured, because the errors of BDF and LSODA are erratic and a single
+    tolerance may suffice by chance; the cheaper one counts. ``seconds``: time limit for everything. Without a result,
+    the returned Cost gives the reason.
     """
     clock = deadline(seconds)
     try:
@@ -161,7 +165,10 @@ def _sufficient(
     reference: Run,
     clock: Callable[[], None],
 ) -> list[Cost]:
-    """Costs with the two loosest neighbouring tolerances that both suffice; empty if there are none."""
+    """Return the costs with the two loosest neighbouring ``tolerances`` whose errors are at most ``tolerance_mm``.
+
+    ``clock``: as for :func:`simulate`. One cost or none is returned if too few tolerances suffice.
+    """
     found: list[Cost] = []
     for tolerance in tolerances:
         try:

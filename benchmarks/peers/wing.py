@@ -25,25 +25,35 @@ _SAMPLES, _HARMONICS = 512, 40
 
 
 class PeerWing(NamedTuple):
-    """A wing with given genes under one condition, SI units. N bodies; N and N + 1 are the front and the rear rod.
+    """A wing with given genes under one condition, in SI units.
+
+    N bodies are grouped in S strips along the span; N and N + 1 are the front and the rear driving rod. "Thesis" is van
+    der Grinten's.
 
     Attributes:
         mass: [N] kg.
         inertia: [N, 3, 3] kg m^2 about the centre of mass, body axes.
         rest: [N, 3] centres of mass at rest, m; all bodies are aligned with the world there.
-        first, second: [C] bodies that a connector connects.
-        a, b: [C, 3] the connector's position on each, from the body's centre (for a rod: from the hinge), m.
-        stiffness, damping: [C, 6] about x, y, z (N m/rad), then along x, y, z (N/m), of the first body's axes.
-        strip: [S + 1] first body of each strip.
-        weight: [N] share of the strip's area; ``centroid`` [N, 2] of the planform, from the body's centre, m.
-        area: [S] m^2.
+        first, second: [C] the two bodies that each of C connectors joins.
+        a, b: [C, 3] position of the connector on the first and second body, from its centre of mass (rod: the hinge),
+            m.
+        stiffness, damping: [C, 6] about x, y, z (N m/rad), then along x, y, z (N/m), of the first body's axes; damping:
+            these units times s.
+        strip: [S + 1] first body of each strip, then N.
+        weight: [N] share of the body in its strip's area.
+        centroid: [N, 2] x and y of the body's planform centroid, from its centre of mass, m.
+        area: [S] area of each strip, m^2.
         coefficients: [4] L_a, L_b, ID_a, ID_b (thesis Eqs. 10-11).
-        lift, drag: [N, 2] share of the strip's force (thesis Eqs. 12-13), and x where it acts, from the centre, m.
-        air: density, kg/m^3; ``wind`` [3] m/s; ``gravity`` m/s^2.
-        hinge: [3] m, on the rods' axis along x.
-        harmonics: [H, 2] cosine and sine amplitude of the flap angle about ``mean``, rad.
-        omega: angular rate of the drive, rad/s; ``lag`` [2] of both rods, rad; ``ramp`` duration of the start, s.
-        markers: [M, 3] in the frame of body ``carrier`` [M], m.
+        lift, drag: [N, 2] share of the strip's force (thesis Eqs. 12-13), and x where it acts, from the centre of mass,
+            m.
+        air: density, kg/m^3; ``wind`` [3]: velocity, m/s; ``gravity``: m/s^2.
+        hinge: [3] a point on the axis about which the rods rotate, which is parallel to x, m.
+        mean: mean flap angle, rad.
+        harmonics: [H, 2] cosine and sine amplitudes of the flap angle about the mean, rad.
+        omega: angular frequency of flapping, rad/s.
+        lag: [2] phase lag of the front and the rear rod, rad.
+        ramp: duration of the start, in which the amplitude grows from zero, s.
+        markers: [M, 3] position of each marker, in the frame of the body ``carrier`` [M], m.
     """
 
     mass: Array
@@ -78,7 +88,10 @@ class PeerWing(NamedTuple):
 def peer_wing(
     structure: Structure, genes: tuple[Gene, ...], genome: Array, condition: Condition, ramp_beats: int = 1
 ) -> PeerWing:
-    """The arrays of the wing with gene values ``genome`` [G] under ``condition``."""
+    """Return the arrays of the wing with the gene values ``genome`` [G] under ``condition``.
+
+    ``ramp_beats``: duration of the start-up ramp, beats.
+    """
     group, w = lanes(structure, genes, genome[None]), structure.wiring
     incidence, hinge = condition.angle_of_attack, structure.wing.hinge
     mean, harmonics = _drive_series(structure)
@@ -114,7 +127,7 @@ def peer_wing(
 
 
 def _drive_series(structure: Structure) -> tuple[float, Array]:
-    """Mean (rad) and cosine and sine harmonics [H, 2] (rad) of the driving rods' flap angle."""
+    """Return the mean (rad) and the cosine and sine amplitudes [H, 2] (rad) of the driving rods' flap angle."""
     psi = 2 * np.pi * np.arange(_SAMPLES) / _SAMPLES
     spectrum = np.fft.rfft(flap_angle(structure.wing.drive, psi)[:, 0]) / _SAMPLES
     head = 2 * spectrum[1 : _HARMONICS + 1]
@@ -123,7 +136,10 @@ def _drive_series(structure: Structure) -> tuple[float, Array]:
 
 @allocating
 def rod_motion(wing: PeerWing, t: float, rod: int) -> tuple[float, float]:
-    """Angle (rad) and rate (rad/s) of a rod at time ``t`` (s): the periodic drive times a quintic ramp."""
+    """Return the angle (rad) and its rate (rad/s) of a rod at time ``t`` (s).
+
+    ``rod``: 0 is the front, 1 the rear rod. The periodic drive is multiplied by a quintic ramp from 0 to 1.
+    """
     psi = wing.omega * t - wing.lag[rod]
     angle, slope = wing.mean, 0.0
     c1, s1 = np.cos(psi), np.sin(psi)

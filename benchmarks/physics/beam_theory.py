@@ -1,8 +1,9 @@
-"""Reference solutions of cantilevered beams: frequencies by Ritz's method, and the elastica.
+"""Reference solutions of cantilevered beams: natural frequencies by Ritz's method, and large static deflection.
 
 Ritz's method with polynomials that satisfy the clamped end converges exponentially for sections that vary smoothly; on
-uniform beams it gives the closed forms to ten digits (tests/sim/wing/test_beams.py). Rectangular sections, chord and
-thickness linear along the span.
+uniform beams it gives the closed forms to ten digits (tests/sim/wing/test_beams.py). Sections are rectangular, with
+chord and thickness linear along the span. E is Young's modulus, G the shear modulus, I the second moment of area, A the
+area, rho the density, J the torsion constant, I_p the polar second moment of area, omega the angular frequency.
 """
 
 from __future__ import annotations
@@ -23,11 +24,14 @@ Family = Literal["flapwise", "in-plane", "torsion"]
 
 # Dimensionless frequencies of the uniform clamped-free beam: roots of cos x cosh x = -1 (Blevins 1979, table 8-1).
 CANTILEVER_ROOTS = (1.8751040687119611, 4.6940911329741746, 7.8547574382376126)
-_TERMS, _POINTS = 20, 64
+_TERMS, _POINTS = 20, 64  # number of basis functions, and of points of integration
 
 
 def torsion_constant(width: Array | float, thickness: Array | float) -> Array:
-    """Saint-Venant's torsion constant of a rectangle, m^4, by its series (Timoshenko and Goodier, section 109)."""
+    """Return Saint-Venant's torsion constant (m^4) of rectangles ``width`` by ``thickness`` (m), by its series.
+
+    Timoshenko and Goodier, Theory of Elasticity, section 109.
+    """
     n = np.arange(1, 200, 2)
     long, short = np.maximum(width, thickness), np.minimum(width, thickness)
     ratio = np.asarray(long / short)
@@ -37,10 +41,10 @@ def torsion_constant(width: Array | float, thickness: Array | float) -> Array:
 
 @dataclass(frozen=True)
 class Beam:
-    """Rectangular beam of foam, clamped at the root; chord and thickness (m) at root and tip, linear between.
+    """Rectangular beam of foam, clamped at the root, with a ``length`` in m.
 
-    ``young``, ``shear`` in Pa, ``density`` in kg/m^3. The whole area carries shear (coefficient 1), as in the thesis's
-    K_t (Eq. 16).
+    ``chord`` and ``thickness`` (m): at root and tip, linear between; ``young``, ``shear``: moduli, Pa; ``density``:
+    kg/m^3. The whole area carries shear (shear coefficient 1), as in K_t of van der Grinten's thesis (Eq. 16).
     """
 
     length: float
@@ -51,7 +55,7 @@ class Beam:
     shear: float = 2.6e6
 
     def at(self, y: Array) -> tuple[Array, Array]:
-        """Chord and thickness (m) at span positions ``y`` (m)."""
+        """Return chord and thickness (m) at the distances ``y`` (m) from the root."""
         t = y / self.length
         return (
             self.chord[0] + t * (self.chord[1] - self.chord[0]),
@@ -59,13 +63,20 @@ class Beam:
         )
 
     def second_moment(self, family: Family, y: Array) -> Array:
-        """Second moment of area (m^4) for bending out of or in the plane of the chord."""
+        """Return the second moments of area (m^4) at the distances ``y`` (m) from the root.
+
+        ``family``: "flapwise" for bending across the chord's plane, otherwise for bending within it.
+        """
         c, h = self.at(y)
         return c * h**3 / 12 if family == "flapwise" else h * c**3 / 12
 
 
 def _basis(s: Array, power: int) -> tuple[Array, Array, Array]:
-    """Ritz basis on [0, 1]: Legendre polynomials times s^power; values and two derivatives, [terms, points] each."""
+    """Return the Ritz basis at ``s`` [points] in [0, 1]: s^power times Legendre polynomials.
+
+    The result is the values, first and second derivatives, [terms, points] each. With ``power`` 1 the values vanish at
+    s = 0, with 2 also the first derivatives.
+    """
     rows: tuple[list[Array], list[Array], list[Array]] = ([], [], [])
     f, df, ddf = s**power, power * s ** (power - 1), power * (power - 1) * s ** max(power - 2, 0)
     for k in range(_TERMS):
@@ -77,9 +88,9 @@ def _basis(s: Array, power: int) -> tuple[Array, Array, Array]:
 
 
 def _grid(beam: Beam, root: float) -> tuple[Array, Array, Array, float]:
-    """Gauss points as fractions of the free length and as y (m), their weights (m), and the free length (m).
+    """Return the Gauss points of integration over the free part of ``beam``, which begins at y = ``root`` (m).
 
-    ``root``: y of the clamped end, m.
+    They are given as fractions of the free length and as y (m), with their weights (m); last comes the free length (m).
     """
     x, w = np.polynomial.legendre.leggauss(_POINTS)
     free = beam.length - root
@@ -88,7 +99,7 @@ def _grid(beam: Beam, root: float) -> tuple[Array, Array, Array, float]:
 
 
 def _lowest(K: Array, M: Array, count: int) -> Array:
-    """Lowest ``count`` frequencies (Hz) of stiffness ``K`` and mass ``M`` [terms, terms].
+    """Return the lowest ``count`` natural frequencies (Hz) of stiffness ``K`` and mass ``M`` [terms, terms].
 
     They are computed as the largest eigenvalues of (M, K), because small eigenvalues of (K, M) lose digits.
     """
@@ -97,7 +108,11 @@ def _lowest(K: Array, M: Array, count: int) -> Array:
 
 
 def euler_bernoulli(beam: Beam, family: Family, root: float = 0.0, count: int = 3) -> Array:
-    """First ``count`` frequencies (Hz) of (EI w'')'' = rho A omega^2 w, clamped at = ``root`` (m), free at the tip."""
+    """Return the first ``count`` natural frequencies (Hz) of bending, (EI w'')'' = rho A omega^2 w.
+
+    ``family``: direction of bending, as in Beam.second_moment. The beam is clamped at y = ``root`` (m) and free at the
+    tip; w is its deflection.
+    """
     s, y, weight, free = _grid(beam, root)
     c, h = beam.at(y)
     value, _, second = _basis(s, 2)
@@ -107,7 +122,7 @@ def euler_bernoulli(beam: Beam, family: Family, root: float = 0.0, count: int = 
 
 
 def timoshenko(beam: Beam, family: Family, root: float = 0.0, count: int = 3) -> Array:
-    """Frequencies as :func:`euler_bernoulli`, but with shear and rotary inertia (Timoshenko 1921)."""
+    """Return frequencies as :func:`euler_bernoulli`, but with shear and rotary inertia (Timoshenko 1921)."""
     s, y, weight, free = _grid(beam, root)
     c, h = beam.at(y)
     value, slope, _ = _basis(s, 1)
@@ -122,11 +137,11 @@ def timoshenko(beam: Beam, family: Family, root: float = 0.0, count: int = 3) ->
 
 
 def torsional(beam: Beam, root: float = 0.0, count: int = 3, *, warping: float = 0.0) -> Array:
-    """First torsional frequencies (Hz) of (G J theta')' = -rho I_p omega^2 theta (Saint-Venant).
+    """Return the first ``count`` torsional frequencies (Hz) of (G J theta')' = -rho I_p omega^2 theta (Saint-Venant).
 
-    With ``warping`` the clamped end also stays flat, as that of a plate: the term (E Gamma theta'')'' is added, where
-    Gamma is ``warping`` times the c^3 h^3 / 144 of a thin strip of chord c and thickness h (Reissner and Stein, NACA TN
-    2369, 1951).
+    theta is the twist; the beam is clamped at y = ``root`` (m). With ``warping`` the clamped end also stays flat, as
+    that of a plate: the term (E Gamma theta'')'' is subtracted on the left, where Gamma is ``warping`` times the c^3
+    h^3 / 144 of a thin strip of chord c and thickness h (Reissner and Stein, NACA TN 2369, 1951).
     """
     s, y, weight, free = _grid(beam, root)
     c, h = beam.at(y)
@@ -140,11 +155,11 @@ def torsional(beam: Beam, root: float = 0.0, count: int = 3, *, warping: float =
 
 
 def reference(beam: Beam, family: Family, root: float = 0.0, *, slender: bool = True, chordwise: int = 1) -> Array:
-    """First three frequencies (Hz) of a family of modes, clamped at y = ``root``.
+    """Return the first three frequencies (Hz) of a family of modes of ``beam``, clamped at y = ``root`` (m).
 
-    ``slender`` omits shear and rotary inertia. ``chordwise``: number of bodies that divide the chord in the model to be
-    compared. They have 1 - 1 / chordwise^2 of the plate's resistance to warping: with width w and position x of a body
-    on the chord c, the sum of w x^2 over the bodies instead of c^3 / 12.
+    ``slender``: whether to omit shear and rotary inertia; ``chordwise``: number of bodies that divide the chord in the
+    model to be compared. Such bodies have 1 - 1 / chordwise^2 of a plate's resistance to warping: with width w and
+    position x of a body on the chord c, the sum of w x^2 over the bodies instead of c^3 / 12.
     """
     if family == "torsion":
         return torsional(beam, root, warping=1 - 1 / chordwise**2)
@@ -153,12 +168,11 @@ def reference(beam: Beam, family: Family, root: float = 0.0, *, slender: bool = 
 
 
 def elastica(load: float) -> tuple[float, float, float]:
-    """Large deflection of a cantilever under a constant tip load across its rest axis.
+    """Compute the large deflection of a cantilever (an elastica) under a constant tip load across its rest axis.
 
-    Returns deflection / L, shortening / L and tip rotation (rad), L the length.
-
-    ``load`` is P L^2 / E I. Solves theta'' = -load cos theta, theta(0) = 0, theta'(1) = 0 by shooting (Bisshopp and
-    Drucker, Q. Appl. Math. 3, 1945, solve it by elliptic integrals).
+    ``load`` is P L^2 / (E I), with force P and length L. Returns deflection / L, shortening / L (along the rest axis)
+    and tip rotation (rad). With the slope theta, solves theta'' = -load cos theta, theta(0) = 0, theta'(1) = 0 by
+    shooting (Bisshopp and Drucker, Q. Appl. Math. 3, 1945, solve it by elliptic integrals).
     """
 
     def shoot(curvature: float) -> Array:

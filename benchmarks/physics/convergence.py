@@ -1,4 +1,4 @@
-"""Convergence of the simulation of one nominal wing.
+"""Measures the convergence of the simulation of one nominal wing.
 
 Computes its converged periodic motion, the integration steps that a beat needs, and the beats until it is periodic.
 """
@@ -33,17 +33,17 @@ from wingfit.sim.wing.structure import Structure
 Array = npt.NDArray[np.float64]
 
 CONVERGED = 1024  # steps of the reference, which is compared with half as many
-SETTLED = 1e-7  # m from the periodic motion: negligible compared with 0.1 mm
+SETTLED = 1e-7  # m from the periodic motion at which a beat counts as periodic: negligible compared with 0.1 mm
 MOST_BEATS = 400
 _AGREEMENT = 0.02  # largest change from half as many steps to the reference, relative to the tolerance
 
 
 @dataclass(frozen=True)
 class Subject:
-    """The Robird's wing with nominal genes, a discretisation (``division``) and a condition.
+    """The Robird's wing with nominal genes, in one discretisation under one condition.
 
-    The simulator computes LANES individuals at once, in "lanes"; here all are equal. ``damping`` multiplies the nominal
-    damping genes.
+    ``division``: discretisation, such as "6x4" (6 strips of 4 bodies); ``damping``: factor of the nominal damping
+    genes. The simulator computes LANES individuals at once, in "lanes"; here all of them are equal.
     """
 
     division: str
@@ -52,12 +52,12 @@ class Subject:
 
     @cached_property
     def model(self) -> FlexibleWing:
-        """The wing's model with default settings."""
+        """The model of the wing with default settings."""
         return FlexibleWing(robird_wing(), self.division)
 
     @property
     def structure(self) -> Structure:
-        """Rigid bodies and connectors of the model."""
+        """The rigid bodies and connectors of the model."""
         return self.model.structure
 
     @cached_property
@@ -68,17 +68,23 @@ class Subject:
 
     @cached_property
     def scene(self) -> WingScene:
-        """The simulator's input for a full group of lanes, all with the same genome."""
+        """Input of the simulator for LANES individuals, all with the same genome."""
         return WingScene.of(self.structure, self.condition, lanes(self.structure, self.model.genes, self.genome))
 
     def drive(self, numerics: Numerics, steps: int, beat: int) -> Array:
-        """Angles and rates of the driving rods over a beat, see :func:`wingfit.sim.solver.scene.drive_table`."""
+        """Return angles and rates of the driving rods over beat number ``beat``, in ``steps`` steps.
+
+        See :func:`wingfit.sim.solver.scene.drive_table`.
+        """
         return drive_table(self.scene.rods, self.condition.flap_frequency, numerics, steps, beat)
 
 
 @dataclass(frozen=True)
 class Passed:
-    """One integrated beat of the first lane: its trace, its start state, and its distance (m) from periodicity."""
+    """One integrated beat of the first lane: ``trace``, its motion and energy; ``start``, the state at its start.
+
+    ``distance``: estimated distance (m) of that state from the periodic motion; infinite if it is not known.
+    """
 
     trace: Trace
     start: State
@@ -86,10 +92,10 @@ class Passed:
 
 
 def beats(subject: Subject, steps: int, *, window: int, start: State | None = None) -> Iterator[Passed]:
-    """Yield one integrated beat of ``steps`` steps after another, from rest or from ``start``, endlessly.
+    """Integrate from rest, or from the state ``start``, and yield one beat of ``steps`` steps after another, endlessly.
 
     The search for a periodic motion is that of :func:`wingfit.sim.solver.settle.settle`, which returns only the last
-    beat. ``window`` as in Numerics. ArithmeticError if a lane diverges.
+    beat. ``window``: past beats that Anderson acceleration uses, 0 for none. ArithmeticError if a lane diverges.
     """
     structure, numerics = subject.structure, Numerics(steps=steps, window=window)
     group, here = subject.scene.frozen(), subject.scene.setting(steps)
@@ -124,7 +130,10 @@ def _put(into: State, state: State) -> None:
 
 
 def periodic(subject: Subject, steps: int, start: State | None = None) -> Passed:
-    """The first beat of ``steps`` steps that is periodic to within SETTLED m; ArithmeticError after MOST_BEATS."""
+    """Return the first beat of ``steps`` steps that is periodic to within SETTLED m; ArithmeticError after MOST_BEATS.
+
+    ``start``: initial state; at rest if None.
+    """
     window = Numerics().window
     for passed in islice(beats(subject, steps, window=window, start=start), MOST_BEATS):
         if passed.distance <= SETTLED:
@@ -136,8 +145,8 @@ def periodic(subject: Subject, steps: int, start: State | None = None) -> Passed
 class Reference:
     """The converged periodic motion, with CONVERGED steps a beat.
 
-    ``tracks`` [CONVERGED, M, 3] of the markers, m; ``change``: largest distance (m) from the tracks with half as many
-    steps; ``start``: state at the start of the beat.
+    ``tracks`` [CONVERGED, M, 3]: positions of the M markers, m; ``change``: their largest distance (m) from those with
+    half as many steps; ``start``: state at the start of the beat.
     """
 
     tracks: Array
@@ -146,9 +155,9 @@ class Reference:
 
 
 def reference(subject: Subject, tolerance: float) -> Reference:
-    """The converged motion of ``subject``.
+    """Compute the converged periodic motion of ``subject``.
 
-    ArithmeticError if the motion with half as many steps differs by more than a fraction of ``tolerance`` (m).
+    ArithmeticError if the motion with half as many steps differs by more than ``tolerance`` (m) times _AGREEMENT.
     """
     half = periodic(subject, CONVERGED // 2)
     whole = periodic(subject, CONVERGED, half.start)
@@ -162,12 +171,15 @@ def reference(subject: Subject, tolerance: float) -> Reference:
 
 
 def largest_distance(tracks: Array, converged: Array) -> float:
-    """Largest distance (m) of a marker of ``tracks`` [n, M, 3] from the periodic ``converged`` [m, M, 3]."""
+    """Return the largest distance (m) of a marker between two periodic motions, over the beat.
+
+    It is taken at the n instants of ``tracks`` [n, M, 3], to which ``converged`` [m, M, 3] is interpolated.
+    """
     return float(np.sqrt(((tracks - at_steps(converged, len(tracks))) ** 2).sum(axis=-1)).max())
 
 
 def at_steps(tracks: Array, count: int) -> Array:
-    """Periodic ``tracks`` [m, M, 3] resampled at ``count`` equal steps of the beat, by their full Fourier series."""
+    """Resample the periodic ``tracks`` [m, M, 3] at ``count`` equal steps of the beat, by their full Fourier series."""
     if len(tracks) % count == 0:
         return tracks[:: len(tracks) // count]
     series = np.fft.rfft(tracks, axis=0) / len(tracks)
@@ -177,9 +189,10 @@ def at_steps(tracks: Array, count: int) -> Array:
 
 
 def fewest_steps(subject: Subject, converged: Reference, tolerance: float, least: int = 16) -> tuple[int, float]:
-    """Smallest even number of steps a beat that keeps markers within ``tolerance`` (m), and the error (m) with them.
+    """Return the smallest even number of steps a beat that keeps markers within ``tolerance`` (m), and its error (m).
 
-    The next larger number must suffice too, so that a zero crossing of the error does not count.
+    The next even number must suffice too, so that an error that is small by chance does not count. ``least``: first
+    number tried.
     """
     found: tuple[int, float] | None = None
     for steps in range(least, CONVERGED // 2, 2):
@@ -194,7 +207,7 @@ def fewest_steps(subject: Subject, converged: Reference, tolerance: float, least
 
 
 def _error(subject: Subject, converged: Reference, steps: int) -> float:
-    """Largest error (m) of the periodic tracks with ``steps`` steps a beat; infinite if no periodic motion is found."""
+    """Return the largest error (m) of a marker with ``steps`` steps a beat; infinite without a periodic motion."""
     try:
         return largest_distance(periodic(subject, steps, converged.start).trace.tracks, converged.tracks)
     except ArithmeticError:
@@ -202,10 +215,10 @@ def _error(subject: Subject, converged: Reference, steps: int) -> float:
 
 
 def beats_to_periodic(subject: Subject, steps: int, window: int, tolerance: float) -> int | None:
-    """Number of beats from rest until all tracks stay within ``tolerance`` (m) of the periodic ones.
+    """Return the number of beats from rest until all markers stay within ``tolerance`` (m) of the periodic motion.
 
-    The count includes the beats of the start-up ramp; the periodic tracks have as many steps a beat. None if it takes
-    more than MOST_BEATS.
+    The count includes the beats of the start-up ramp; the periodic motion is computed with as many ``steps`` a beat.
+    ``window``: past beats that Anderson acceleration uses. None if it takes more than MOST_BEATS.
     """
     final = periodic(subject, steps).trace.tracks
     errors = []
@@ -217,7 +230,11 @@ def beats_to_periodic(subject: Subject, steps: int, window: int, tolerance: floa
 
 
 def ms_per_beat(subject: Subject, steps: int, start: State, seconds: float = 0.6) -> float:
-    """Processor time (ms) of one beat, per individual of a full group of lanes, without compilation; a median."""
+    """Return the median processor time (ms) of a beat of ``steps`` steps from the state ``start``, without compilation.
+
+    The time is for one individual: that of all lanes divided by LANES. ``seconds``: least total duration of the
+    measurement.
+    """
     structure, numerics = subject.structure, Numerics(steps=steps)
     group, here = subject.scene.frozen(), subject.scene.setting(steps)
     work = new_work(structure.wiring, here, group)
@@ -238,8 +255,8 @@ def ms_per_beat(subject: Subject, steps: int, start: State, seconds: float = 0.6
 class ByDefault:
     """Result of a simulation with default settings.
 
-    ``beat``: of the first individual; ``ms``: processor time for one individual of a full group until its motion is
-    periodic.
+    ``beat``: periodic beat of the first individual; ``ms``: processor time (ms) until the motion is periodic, for one
+    individual: that of all lanes divided by LANES.
     """
 
     beat: Beat
@@ -247,7 +264,7 @@ class ByDefault:
 
 
 def by_default(subject: Subject) -> ByDefault:
-    """Time a full group of lanes in :func:`wingfit.sim.solver.simulate.periodic_beats`; minimum of three runs."""
+    """Simulate LANES individuals by default settings until they are periodic; the time is the least of three runs."""
     genomes = np.repeat(subject.genome, LANES, axis=0)
     arguments = (subject.model.subject((), subject.condition), genomes, subject.model.numerics)
     times, found = [], periodic_beats(*arguments)
@@ -261,10 +278,10 @@ def by_default(subject: Subject) -> ByDefault:
 
 
 def energy_error(subject: Subject, steps: int, count: int = 20) -> float:
-    """Energy error over ``count`` beats from rest, relative to the largest of four works.
+    """Return the largest energy error over ``count`` beats from rest, as a fraction.
 
-    The error is the change of stored energy (kinetic, elastic, gravitational) minus the work of dampers, two motors and
-    air.
+    The error is the change of stored energy (kinetic, elastic, gravitational) minus the works of dampers, first motor,
+    second motor and air since the start; it is divided by the largest of these four works.
     """
     passed = [one.trace for one in islice(beats(subject, steps, window=0), count)]
     stored = np.concatenate([trace.energy for trace in passed]).sum(axis=1)

@@ -1,4 +1,4 @@
-"""Results that follow from the printed Tables 3-5 and 8 of Armanini et al. (2016) alone; Eq. 23 is theirs."""
+"""Results that follow from the printed Tables 3-5 and 8 and Eq. 23 of Armanini et al. (2016) alone."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from wingfit.sim.virtual_rigs.balance import TRIALS, delfly, true_beat
 
 
 def tables_law() -> GlobalModel:
-    """Global model of Eq. 23 (coefficients affine in frequency and pitch) from unweighted least squares on Table 8."""
+    """Fit Eq. 23, coefficients affine in flap frequency and body pitch, to Table 8 by unweighted least squares."""
     local = [
         LocalEstimate(t.name, (t.name,), t.coefficients, dict.fromkeys(t.coefficients, 0.0), (), (), 0.0, True, ())
         for t in TRIALS
@@ -25,9 +25,9 @@ def tables_law() -> GlobalModel:
 
 
 def closest_law_percent(name: str) -> float:
-    """Smallest maximum relative error (per cent) that an affine law can have for coefficient ``name`` of Table 8.
+    """Return the smallest maximum relative error (per cent) of an affine law for one coefficient of Table 8.
 
-    The law is affine in flap frequency and body pitch (minimax fit).
+    ``name``: of the coefficient. The law is affine in flap frequency and body pitch (minimax fit).
     """
     values = np.array([trial.coefficients[name] for trial in TRIALS])
     design = (
@@ -44,9 +44,9 @@ def closest_law_percent(name: str) -> float:
 
 
 def lift_by_root_pitch() -> dict[str, list[float]]:
-    """Mean lift (N) under each condition with the coefficients of Table 8, for root pitch angles "0" and "90_deg".
+    """Return the mean lift (N) in each test of Table 8 with its coefficients, for two root pitch angles.
 
-    The paper can be read either way.
+    The keys "0" and "90_deg" are the two root pitch angles: the paper can be read either way.
     """
     found = {}
     for name, root in (("0", 0.0), ("90_deg", np.pi / 2)):
@@ -58,7 +58,7 @@ def lift_by_root_pitch() -> dict[str, list[float]]:
 
 
 def fling_ends(model: BladeElementWing) -> list[float]:
-    """Earliest and latest time in the beat (fraction t*) at which fling circulation ends, over all conditions."""
+    """Return the earliest and latest time, as fractions of the beat, at which fling circulation ends in a test."""
     motion, n = model.vehicle.motion, 4000
     flap, rates = flap_series(motion.flap, {}, 1, n), [trial.condition.flap_frequency for trial in TRIALS]
     peels = [angles_of(flap, motion, {}, rate, n, claps=True, peel_width=0.0).peel[0] for rate in rates]

@@ -27,17 +27,17 @@ DIVISION = "11"
 STEPS = Numerics(
     steps=144, periodic=4e-6, max_beats=40
 )  # fixed steps, so that differences of motions are smooth in the genes
-QUICK = (1, 5, 7)  # indices of conditions
+QUICK = (1, 5, 7)  # indices of the three conditions of a quick rig
 FRAMES = 2 * (FRAMES_PER_BEAT + 1)
 FORCE_BEATS, PER_BEAT = 3, 64
 
 
 @dataclass(frozen=True, eq=False)
 class Rig:
-    """A rig with its conditions.
+    """A simulated rig (the Robird's wing or the DelFly) with the conditions under which it is recorded.
 
-    ``kind``: "wing" or "vehicle"; ``description``: the rig's data; ``unit``: factor from m or N to the table's mm or
-    mN; ``axes``: recorded force axes, none for a wing; ``quick``: whether to use only three conditions.
+    ``kind``: "wing" or "vehicle"; ``description``: the rig's data; ``unit``: factor from m or N to the mm or mN of the
+    report; ``axes``: recorded force axes, none for a wing; ``quick``: whether to use only three conditions.
     """
 
     kind: Kind
@@ -47,15 +47,15 @@ class Rig:
     quick: bool
 
     def stands_for(self, effect: Effect) -> str:
-        """Name of the term of the vehicle's nominal model that is the same physics as ``effect``; "" if there is none.
+        """Return the name of the term of the vehicle's nominal model that is the same physics as ``effect``, or "".
 
-        The model without the effect omits this term.
+        A model with that effect, and the one that it is compared with, omit this term.
         """
         known = self.kind == "vehicle" and effect.name in BladeElementWing(delfly()).terms
         return effect.name if known else ""
 
     def model(self, effect: Effect | None, *, without: str = "") -> AnyModel:
-        """The rig's model with ``effect``, or without any.
+        """Return the rig's model with ``effect``, or without any effect.
 
         A vehicle's model omits the term ``without``, and the term that is the same physics as the effect.
         """
@@ -67,41 +67,50 @@ class Rig:
         return replace(bare, terms=tuple(term for term in bare.terms if term not in left_out), effects=names)
 
     def by_default(self, effect: Effect | None, without: str) -> AnyModel:
-        """As :meth:`model`, but with the simulator's default number of steps and accuracy."""
+        """Return the model as :meth:`model`, but with the simulator's default number of steps and accuracy."""
         model = self.model(effect, without=without)
         return replace(model, numerics=Numerics()) if isinstance(model, FlexibleWing) else model
 
     def recordings(self, without: str = "") -> tuple[Recording, ...]:
-        """Recordings of the nominal rig under every condition."""
+        """Return noise-free recordings of the nominal rig under every condition.
+
+        ``without``: term that a vehicle's model omits, or "".
+        """
         return _recorded(self, without)
 
     def timed(self) -> tuple[Recording, ...]:
-        """Every fourth (wing) or third (vehicle) recording, for measuring processor time."""
+        """Return every fourth (wing) or third (vehicle) recording, for measuring processor time."""
         return _recorded(self, "")[:: 4 if self.kind == "wing" else 3]
 
     def rms(self, difference: Array) -> float:
-        """RMS displacement of a marker (m), or RMS force along an axis (N), of the values ``difference`` [D]."""
+        """Return the RMS displacement of a marker (m), or RMS force along an axis (N).
+
+        ``difference`` [D]: differences of all recorded values, one recording after the other.
+        """
         per = difference.reshape(-1, 3 if self.kind == "wing" else 1)
         return float(np.sqrt((per**2).sum(axis=1).mean()))
 
     def changed(self, recordings: tuple[Recording, ...], difference: Array) -> tuple[Recording, ...]:
-        """Copies of the recordings with ``difference`` [D], of all their values in turn, added."""
+        """Return copies of the recordings to which ``difference`` is added.
+
+        ``difference`` [D]: differences of all recorded values, one recording after the other.
+        """
         ends = np.cumsum([recording.values.size for recording in recordings])
         parts = np.split(difference, ends[:-1])
         pairs = zip(recordings, parts, strict=True)
         return tuple(replace(one, values=one.values + part.reshape(one.values.shape)) for one, part in pairs)
 
     def parts(self, recordings: tuple[Recording, ...]) -> list[tuple[Recording, ...]]:
-        """Groups of recordings that are fitted with the same gene values.
+        """Return the groups of recordings that are fitted with the same gene values.
 
-        All of a wing; for a vehicle each one alone, as in Armanini et al. (2016).
+        All recordings of a wing form one group; for a vehicle each one is alone, as in Armanini et al. (2016).
         """
         return [recordings] if self.kind == "wing" else [(recording,) for recording in recordings]
 
 
 @cache
 def rig_of(kind: str, quick: bool) -> Rig:
-    """The rig of this kind ("wing" or "vehicle"); ``quick``: with only three conditions."""
+    """Return the rig of this ``kind`` ("wing" or "vehicle"); ``quick``: with only three conditions."""
     if kind == "wing":
         return Rig("wing", robird_wing(), 1e3, (), quick)
     return Rig("vehicle", delfly(), 1e3, ("x", "z"), quick)
@@ -120,7 +129,7 @@ def _recorded(rig: Rig, without: str) -> tuple[Recording, ...]:
 
 @cache
 def recorded(rig: Rig, condition: Condition) -> Recording:
-    """Simulated recording of the nominal wing under ``condition``."""
+    """Return a simulated, noise-free recording of the nominal wing under ``condition``."""
     model = rig.model(None)
     return _filled(model, np.array([[gene.nominal for gene in model.genes]]), _strobed(rig, condition))
 
@@ -140,9 +149,10 @@ def _forces(number: int) -> Recording:
 
 
 def _filled(model: AnyModel, nominal: Array, blank: Recording) -> Recording:
-    """``blank`` with the values that ``model`` simulates for the gene values ``nominal`` [1, G].
+    """Return the recording ``blank`` with the values that ``model`` simulates for the gene values ``nominal`` [1, G].
 
-    The start of the beat is estimated from the tracks, as for a real recording; hence the two steps for a wing.
+    For a wing the values are simulated twice: the start of the beat is estimated from the tracks, as for a real
+    recording, so the second simulation uses the tracks of the first.
     """
     if isinstance(model, BladeElementWing):
         return replace(blank, values=model.observe(nominal, blank).channels[0])

@@ -1,4 +1,4 @@
-"""Counts the floating-point operations of one integrator step, and measures the peak performance of this core.
+"""Counts the floating-point operations of one integrator step, and measures the peak performance of one core.
 
 The simulator's kernels compute LANES individuals at once, in "lanes".
 """
@@ -34,14 +34,14 @@ SUMS = (6, 12)  # accumulators that fill the registers of a core with AVX2 and o
 
 
 class Counter:
-    """Number of floating-point operations so far, over all lanes."""
+    """Number of floating-point operations so far, summed over all lanes."""
 
     def __init__(self) -> None:
         self.operations = 0
 
 
 class Counted:
-    """An array with one value per lane [LANES] that counts the arithmetic operations on it."""
+    """Array [LANES] with one value per lane; arithmetic operations on it are counted in ``counter``."""
 
     __array_ufunc__ = None  # numpy scalars use the arithmetic of this class
 
@@ -89,12 +89,18 @@ def _is_one(x: Counted | float) -> bool:
 
 
 def counting(function: Callable[..., Any], counter: Counter) -> Callable[..., Any]:
-    """The compiled ``function``, and all that it calls, as plain Python that counts its operations in ``counter``."""
+    """Return the compiled ``function`` as plain Python that counts its floating-point operations in ``counter``.
+
+    All compiled functions that it calls are replaced in the same way.
+    """
     return _Interpreter(counter).plain(function)
 
 
 class _Interpreter:
-    """Replaces compiled functions by their Python source, and array reads and writes by those of :class:`Counted`."""
+    """Replaces compiled functions by their Python source.
+
+    In these functions array elements are read as :class:`Counted`, so that the operations on them are counted.
+    """
 
     def __init__(self, counter: Counter) -> None:
         self.counter = counter
@@ -150,14 +156,21 @@ def _refused(*_: Any) -> None:
 
 
 class StepCount(NamedTuple):
-    """Operations of one step of a group of lanes; relative difference of its state from that of the compiled step."""
+    """Result of counting one step.
+
+    ``operations``: floating-point operations of all lanes; ``difference``: relative difference of the state after the
+    counted step from the state after the compiled step.
+    """
 
     operations: int
     difference: float
 
 
 def count_step(division: str) -> StepCount:
-    """Count one step of :func:`wingfit.sim.kernels.integrate.advance` on the Robird's wing, moving in air."""
+    """Count the operations of one integration step of the Robird's wing, moving in air.
+
+    The step is that of :func:`wingfit.sim.kernels.integrate.advance`. ``division``: discretisation into bodies.
+    """
     model, condition = FlexibleWing(robird_wing(), division), tunnel(0.05, 3.0, 6.0)
     structure, numerics, steps = model.structure, Numerics(), 96
     nominal = np.array([[gene.nominal for gene in model.genes]])
@@ -173,9 +186,10 @@ def count_step(division: str) -> StepCount:
 
 
 def run(integrate: Callable[..., Any], model: tuple[Any, ...], table: Array, state: State, trace: Trace) -> None:
-    """Integrate with the kernel ``integrate`` over the rows (steps) of the drive ``table``, which changes ``state``.
+    """Integrate from ``state``, which is changed, over the rows (steps) of the drive ``table``.
 
-    RuntimeError if a lane diverges.
+    ``integrate``: the kernel; ``model``: its first arguments, wiring, setting and group; ``trace``: where the motion is
+    stored. RuntimeError if a lane diverges.
     """
     alive = np.ones(LANES, bool)
     integrate(*model, table, new_work(*model), state, trace, alive)
@@ -184,7 +198,10 @@ def run(integrate: Callable[..., Any], model: tuple[Any, ...], table: Array, sta
 
 
 def peak_gflops(repeats: int = 7, rounds: int = 2_000_000) -> float:
-    """Peak rate of one core in 1e9 operations a second; a fused multiply-add counts as two operations."""
+    """Measure the peak rate of one core in 1e9 operations a second; a fused multiply-add counts as two operations.
+
+    Best of ``repeats`` repetitions of a loop of ``rounds`` rounds.
+    """
     best = 0.0
     for sums, function in zip(SUMS, (_few, _many), strict=True):
         data = np.zeros((sums + 2, LANES))
@@ -199,7 +216,7 @@ def peak_gflops(repeats: int = 7, rounds: int = 2_000_000) -> float:
 
 @kernel
 def _few(data: Array, rounds: int) -> None:
-    """Repeat a = a x + y ``rounds`` times for six independent rows a of ``data`` [8, W]; x, y are its last rows."""
+    """Repeat a = a x + y ``rounds`` times for six independent rows a of ``data`` [8, LANES]; x, y are its last rows."""
     x, y = load1(data, 6), load1(data, 7)
     a, b, c, d, e, f = load1(data, 0), load1(data, 1), load1(data, 2), load1(data, 3), load1(data, 4), load1(data, 5)
     for _ in range(rounds):
@@ -214,7 +231,7 @@ def _few(data: Array, rounds: int) -> None:
 
 @kernel
 def _many(data: Array, rounds: int) -> None:
-    """Repeat a = a x + y ``rounds`` times for twelve independent rows a of ``data`` [14, W]; x, y are its last rows."""
+    """Repeat a = a x + y ``rounds`` times for twelve rows a of ``data`` [14, LANES]; x, y are its last two rows."""
     x, y = load1(data, 12), load1(data, 13)
     a, b, c, d, e, f = load1(data, 0), load1(data, 1), load1(data, 2), load1(data, 3), load1(data, 4), load1(data, 5)
     g, h, i, j, k, m = load1(data, 6), load1(data, 7), load1(data, 8), load1(data, 9), load1(data, 10), load1(data, 11)
@@ -236,7 +253,7 @@ def _many(data: Array, rounds: int) -> None:
 
 
 def main() -> None:
-    """Command line."""
+    """Parse the command line, and print the operations of a step and the peak rate."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.physics.flops", description=__doc__)
     parser.add_argument("--division", default="24", help="discretisation: a preset such as 24, or 6x4, or 3,3,3,2")
     division = parser.parse_args().division

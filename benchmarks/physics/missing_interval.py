@@ -1,4 +1,4 @@
-"""Locates the interval of the wing beat in which a fitted model of forces misses physics."""
+"""Locates the interval of the wing beat in which physics is missing from a fitted model of forces."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from wingfit.records.array_types import Array
 from wingfit.records.blas_threads import one_blas_thread
 
 SHARE = 0.9
-"""Share of the excess squared misfit that the interval of :func:`located` must explain.
+"""Fraction of the excess squared misfit that the interval of :func:`located` must explain.
 
-With a larger share the interval would also include the ringing of the low-pass filter around an event; with a smaller
-one it would shrink to the core of the event.
+With a larger fraction the interval would also include the ringing of the low-pass filter around an event; with a
+smaller one it would shrink to the core of the event.
 """
 SIGNIFICANCE = 0.01
-FEWEST_BEATS = 5  # for the scatter between beats to say what noise explains
+FEWEST_BEATS = 5  # needed to estimate the noise from the scatter between beats
 FLIPS = 999
 
 
@@ -28,20 +28,21 @@ FLIPS = 999
 def located(
     recording: Recording, residual: Array, sensitivities: Array | None = None, quantity: Quantity = "x"
 ) -> tuple[float, float] | None:
-    """Find where in the beat a model misses physics: start and end of the interval, as fractions t* of the beat.
+    """Find where in the beat a model misses physics: start and end of the interval, as fractions of the beat.
 
-    ``residual`` [n] is the modelled minus the recorded mean beat, N, at n equal steps of the beat; ``sensitivities``
-    [n, F] are its derivatives by the coefficients that were fitted; ``quantity`` is the recorded force axis.
+    ``residual`` [n]: modelled minus recorded mean beat (N) at n equal steps of the beat; ``sensitivities`` [n, F]: its
+    derivatives by the F coefficients that were fitted; ``quantity``: the recorded force axis.
 
     The excess is the squared misfit minus the part that random variation between beats explains. The result is the
-    shortest interval such that the model, fitted again to the rest of the beat only, keeps at most 1 - SHARE of the
+    shortest interval such that the model, fitted again to the rest of the beat only, has at most 1 - SHARE of the
     excess there. This second fit is needed because a fit to the whole beat adapts the coefficients to the missing
     physics, which creates misfit in parts of the beat where the model is right. Without ``sensitivities`` the result is
     the shortest interval that contains SHARE of the excess.
 
     An interval that continues over the end of the beat has an end above 1. None if the misfit is not significant by a
-    wild bootstrap (Wu 1986): in more than SIGNIFICANCE of FLIPS means of the beats' deviations with random signs, the
-    mean square reaches that of the residual. Also None with fewer than FEWEST_BEATS beats.
+    wild bootstrap (Wu 1986): each of FLIPS samples averages the beats' deviations from their mean with random signs,
+    and the mean square reaches that of the residual in more than SIGNIFICANCE of them. Also None with fewer than
+    FEWEST_BEATS beats.
     """
     samples = whole_beats(recording, points=len(residual)).samples[quantity]
     if len(samples) < FEWEST_BEATS or not _significant(samples, residual):
@@ -53,9 +54,10 @@ def located(
 
 @one_blas_thread
 def missing_interval(problem: Problem, evaluator: Evaluator, recording: int = 0) -> tuple[float, float] | None:
-    """Interval of the beat (start and end, t*) in which the model of ``problem`` misses physics, as :func:`located`.
+    """Find the interval of the beat in which the model of ``problem`` misses physics, as :func:`located` does.
 
-    At the gene values ``problem.base``, for the first fitted force axis of recording number ``recording``.
+    Returns start and end as fractions of the beat, or None. The gene values are ``problem.base``; ``recording``: number
+    of the recording, whose first fitted force axis is used.
     """
     genes, record = free_genes(problem), problem.recordings[recording]
     unit = unit_at(genes, np.array([problem.base[gene.name] for gene in genes]))
@@ -82,10 +84,10 @@ def _significant(samples: Array, residual: Array) -> bool:
 
 
 def _shortest(residual: Array, slopes: Array, noise: Array) -> tuple[float, float] | None:
-    """Shortest cyclic interval (start, end; t*) outside of which a new fit keeps at most 1 - SHARE of the excess.
+    """Return the shortest cyclic interval outside of which a new fit has at most 1 - SHARE of the excess.
 
-    ``residual`` [n] and its variance ``noise`` [n]; ``slopes`` [n, F]: derivatives by the fitted coefficients. None if
-    the squared residual does not exceed the noise.
+    ``residual`` [n] and its variance ``noise`` [n]; ``slopes`` [n, F]: derivatives by the fitted coefficients. The
+    interval is (start, end) as fractions of the beat; None if the squared residual does not exceed the noise.
     """
     n, basis = len(residual), np.linalg.qr(slopes)[0]
     terms = np.concatenate([basis, residual[:, None]], axis=1)
@@ -106,7 +108,7 @@ def _shortest(residual: Array, slopes: Array, noise: Array) -> tuple[float, floa
 
 
 def _left(products: Array) -> Array:
-    """Residual sums of squares [K] after K least-squares fits, from their normal equations.
+    """Return the residual sums of squares [K] after K least-squares fits, from their normal equations.
 
     ``products`` [K, F + 1, F + 1]: sums of products of the F basis functions and, last, the residual.
     """

@@ -19,9 +19,9 @@ Array = npt.NDArray[np.float64]
 
 
 def plate(chord: float, span: float, thickness: float, rods: tuple[Rod, Rod], markers: tuple[Marker, ...] = ()) -> Wing:
-    """A rectangular wing with a corner at the origin (lengths in m), of foam with 20 kg/m^3 and without skin.
+    """Return a rectangular wing (lengths in m) with a corner at the origin, of foam with 20 kg/m^3 and without skin.
 
-    Both rods are driven, by a drive at rest.
+    Both ``rods`` are driving rods, and the drive is at rest. ``markers``: tracked points besides one at the tip.
     """
     stations = tuple(Station(y, 0.0, chord, thickness) for y in (0.0, span))
     tip = Marker("tip", (chord / 2, span - 1e-9, 0.0), 0.0)
@@ -33,15 +33,19 @@ def plate(chord: float, span: float, thickness: float, rods: tuple[Rod, Rod], ma
 
 
 def loaded(structure: Structure, genome: Mapping[str, float]) -> Lanes:
-    """The simulator's parameter arrays for individuals with equal gene values, nominal if not in ``genome``."""
+    """Return the simulator's parameter arrays for individuals with equal gene values.
+
+    ``genome``: gene values by name; others are nominal.
+    """
     genes = wing_genes({})
     return lanes(structure, genes, np.array([[genome.get(g.name, g.nominal) for g in genes]]))
 
 
 def stiffness_matrix(structure: Structure, genome: Mapping[str, float]) -> Array:
-    """Stiffness matrix [6 n, 6 n] of n bodies at rest, with fixed driving rods.
+    """Return the stiffness matrix [6 n, 6 n] of n bodies at rest, with fixed driving rods.
 
-    Each body has three rotations, then three displacements.
+    The coordinates of each body are three rotations (rad), then three displacements (m). ``genome``: as in
+    :func:`loaded`.
     """
     w, n = structure.wiring, len(structure.bodies)
     group, state = loaded(structure, genome), at_rest(structure)
@@ -57,9 +61,10 @@ def stiffness_matrix(structure: Structure, genome: Mapping[str, float]) -> Array
 
 
 def spring_wrenches(structure: Structure, springs: Array, R: Array, p: Array) -> Array:
-    """Static spring loads [n + 2, 6, W] (moment, force) on n bodies and 2 rods, for W poses.
+    """Return the static spring loads [n + 2, 6, W] (moment, then force) on n bodies and 2 rods, for W poses.
 
-    Rotations ``R`` [n + 2, 9, W] and positions ``p`` [n + 2, 3, W].
+    ``springs`` [C, 6, W]: stiffness of C connectors; ``R`` [n + 2, 9, W]: rotation matrices, row by row; ``p`` [n + 2,
+    3, W]: positions, m. W is LANES.
     """
     w = structure.wiring
     Q, d = np.zeros((len(w.first), 9, LANES)), np.zeros((len(w.first), 3, LANES))
@@ -72,9 +77,10 @@ def spring_wrenches(structure: Structure, springs: Array, R: Array, p: Array) ->
 
 
 def displacement(K: Array, load: Array, held: tuple[int, ...] = ()) -> Array:
-    """Small rotations and displacements [n, 6] under the moments and forces ``load`` [n, 6].
+    """Return the small rotations (rad) and displacements (m) [n, 6] of n bodies under a load.
 
-    ``K``: of :func:`stiffness_matrix`; the bodies in ``held`` are clamped.
+    ``K``: stiffness matrix of :func:`stiffness_matrix`; ``load`` [n, 6]: moments (N m) and forces (N); ``held``:
+    indices of clamped bodies.
     """
     free = np.array([k for k in range(len(K)) if k // 6 not in held])
     u = np.zeros(len(K))

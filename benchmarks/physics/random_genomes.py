@@ -30,7 +30,7 @@ REFERENCE = Numerics(steps=1024, periodic=1e-6, max_beats=120)
 
 
 class Task(NamedTuple):
-    """Genomes [B, G] (sets of gene values) to simulate with one discretisation (``division``) under one condition.
+    """Genomes [B, G] (B sets of G gene values) to simulate in one discretisation (``division``) under one condition.
 
     ``checked``: whether the motions are also compared with converged ones.
     """
@@ -45,8 +45,8 @@ class Ended(NamedTuple):
     """Results of a task.
 
     ``reasons``: of failure of each genome, None if it succeeded; ``beats``: simulated beats of each; ``seconds``:
-    processor time of all; ``errors``: largest error (m) of each, NaN if it was not checked or if either simulation
-    failed.
+    processor time of all; ``errors``: largest error (m) of a marker for each, NaN if it was not checked or if either
+    simulation failed.
     """
 
     task: Task
@@ -57,7 +57,10 @@ class Ended(NamedTuple):
 
 
 def draw(genes: tuple[Gene, ...], count: int, seed: int) -> Array:
-    """``count`` random genomes [count, G], log-uniform over the search ranges of all ``genes``."""
+    """Draw ``count`` random genomes [count, G] over the search ranges of the G ``genes``.
+
+    Values are uniform on the gene's scale, which is linear or logarithmic.
+    """
     units = np.random.default_rng(seed).uniform(size=(count, len(genes)))
     return np.stack([gene.from_unit(units[:, k]) for k, gene in enumerate(genes)], axis=1)
 
@@ -73,7 +76,7 @@ def tasks(genomes: Array, campaign: tuple[Condition, ...] = CAMPAIGN) -> list[Ta
 
 
 def simulate(task: Task) -> Ended:
-    """Simulate the genomes of ``task`` at the default accuracy."""
+    """Simulate the genomes of ``task`` at the default accuracy, and if it is checked also at that of REFERENCE."""
     model = FlexibleWing(robird_wing(), task.division)
     blank = blank_recording(model.wing, task.condition)
     start = time.thread_time()
@@ -94,10 +97,10 @@ def run(
     limit: float = LIMIT,
     work: Callable[[Task], Ended] = simulate,
 ) -> list[Ended]:
-    """Run the tasks ``todo`` in ``workers`` processes; returns the results of those that finished, in any order.
+    """Run the tasks ``todo`` in ``workers`` processes; return the results of those that finished, in any order.
 
-    If there is no result for ``limit`` seconds, the processes are killed. ``progress`` gets the numbers done and in
-    all.
+    If no task finishes for ``limit`` seconds, the processes are killed. ``progress`` is called with the numbers of
+    finished and of all tasks; ``work``: function that simulates one task.
     """
     done: list[Ended] = []
     with multiprocessing.get_context("spawn").Pool(workers) as pool:
@@ -112,7 +115,10 @@ def run(
 
 
 def summary(todo: list[Task], done: list[Ended]) -> dict[str, Any]:
-    """Percentage of genomes that finished, reasons of the others, and accuracy of the checked ones."""
+    """Return the figures for the report: percentage of genomes that succeeded, reasons of failures, accuracy, cost.
+
+    ``todo``: all tasks; ``done``: results of those that finished.
+    """
     total, ended = sum(len(task.genomes) for task in todo), sum(len(one.reasons) for one in done)
     if total == 0:
         raise ValueError("the number of genomes is 0; give at least 1")
@@ -140,7 +146,7 @@ def summary(todo: list[Task], done: list[Ended]) -> dict[str, Any]:
 
 
 def _case(one: Ended, k: int) -> dict[str, Any]:
-    """Description of the k-th genome of a task for the report, sufficient to simulate it again."""
+    """Describe genome number ``k`` of a task for the report, sufficiently to simulate it again."""
     nominal = np.array([gene.nominal for gene in FlexibleWing(robird_wing()).genes])
     return {
         "division": one.task.division,
@@ -152,7 +158,7 @@ def _case(one: Ended, k: int) -> dict[str, Any]:
 
 
 def _shares(done: list[Ended]) -> dict[str, float]:
-    """Percentage of genomes that succeeded, by discretisation, medium, and airspeed or pressure."""
+    """Return the percentage of genomes that succeeded, by discretisation, medium, and airspeed or pressure."""
     finished: Counter[str] = Counter()
     ended: Counter[str] = Counter()
     for one in done:
@@ -163,7 +169,7 @@ def _shares(done: list[Ended]) -> dict[str, float]:
 
 
 def kind(reason: str) -> str:
-    """Category of a failure ``reason``: one of KINDS, or its first words."""
+    """Return the category of a failure ``reason``: the one of KINDS that it begins with, or its text up to : or ;."""
     return next((known for known in KINDS if reason.startswith(known)), re.split(r"[:;]", reason)[0])
 
 

@@ -21,7 +21,10 @@ Array = npt.NDArray[np.float64]
 
 
 def cut_beam(beam: Beam, division: str) -> Structure:
-    """The beam as rigid bodies: a foam wing with a straight centre line, and rods without stiffness or mass."""
+    """Divide the beam into rigid bodies: a foam wing with a straight centre line, and rods without stiffness or mass.
+
+    ``division``: discretisation, such as "8x2": 8 strips along the span, 2 bodies along the chord.
+    """
     middle, (c0, c1), (h0, h1) = beam.chord[0] / 2, beam.chord, beam.thickness
     rods = tuple(Rod(n, middle, 0.0, middle, beam.length, 0.0, 0.0, 0.0) for n in ("front", "rear"))
     stations = tuple(Station(y, middle - c / 2, c, h) for y, c, h in ((0.0, c0, h0), (beam.length, c1, h1)))
@@ -31,16 +34,16 @@ def cut_beam(beam: Beam, division: str) -> Structure:
 
 
 def genome(beam: Beam) -> dict[str, float]:
-    """Gene values of a wing with the moduli of the beam and no damping."""
+    """Return gene values of a wing, by name: the moduli of the beam, and no damping."""
     return {"E_f": beam.young, "G_f": beam.shear, "D_E": 0.0, "D_G": 0.0}
 
 
 class _Chain:
-    """Chain of rigid bodies on their springs under a constant force at the tip, in joint coordinates.
+    """Chain of n rigid bodies on their springs under a constant force at the tip, in joint coordinates.
 
-    The joint coordinates u [n, 6] are the rotation vector (rad) of each joint and its displacement (m) in the inner
-    body's axes. (In the bodies' own coordinates every rotation stretches the stiff chain, and Newton's method converges
-    slowly.)
+    The joint coordinates u [n, 6] are the rotation vector (rad) of each joint, and its displacement (m) in axes of the
+    body on the side of the root. (In coordinates of the bodies themselves every rotation stretches the stiff chain, and
+    Newton's method converges slowly.)
     """
 
     def __init__(self, beam: Beam, strips: int) -> None:
@@ -49,12 +52,15 @@ class _Chain:
         self.n, self.state = strips, at_rest(self.structure)
         self.tip = np.array([0.0, beam.length - self.state.p[strips - 1, 1, 0], 0.0])
         w = self.structure.wiring
-        # arms of the joint at the inner side of each body; at the root that of the first rod (the second coincides)
+        # arms of the joint on the root side of each body; the first joint is on the first rod (the second coincides)
         inner = np.array([np.flatnonzero(w.second == k)[0] for k in range(strips)])
         self.a, self.b = w.a[inner], w.b[inner]
 
     def poses(self, u: Array) -> tuple[Array, Array]:
-        """Rotations [W, n + 2, 3, 3] and positions [W, n + 2, 3] m of bodies and rods; ``u`` [W, 6 n]."""
+        """Return rotation matrices [W, n + 2, 3, 3] and positions [W, n + 2, 3] (m) of bodies and rods.
+
+        ``u`` [W, 6 n]: W sets of joint coordinates.
+        """
         joint = u.reshape(len(u), self.n, 6)
         R = np.tile(self.state.R[..., 0].reshape(-1, 3, 3), (len(u), 1, 1, 1))
         p = np.tile(self.state.p[..., 0], (len(u), 1, 1))
@@ -66,9 +72,9 @@ class _Chain:
         return R, p
 
     def unbalanced(self, u: Array, load: float) -> Array:
-        """Sums of moments and forces [W, 6 n] on the bodies (body axes) at joint coordinates ``u`` [W, 6 n].
+        """Return the sums of moments (N m) and forces (N) [W, 6 n] on the bodies, in body axes.
 
-        They vanish in equilibrium under the tip force ``load``.
+        ``u`` [W, 6 n]: W sets of joint coordinates; ``load``: tip force, N. The sums vanish in equilibrium.
         """
         found = []
         R_all, p_all = self.poses(u[np.arange(-(-len(u) // LANES) * LANES) % len(u)])
@@ -83,7 +89,10 @@ class _Chain:
         return rest
 
     def settle(self, load: float) -> tuple[Array, Array]:
-        """Rotations and positions in equilibrium under the tip force ``load`` (N), by Newton's method."""
+        """Compute the equilibrium under the tip force ``load`` (N) by Newton's method.
+
+        Returns rotation matrices [n + 2, 3, 3] and positions [n + 2, 3] (m) of bodies and rods.
+        """
         size, h, u = 6 * self.n, 1e-5, np.zeros(6 * self.n)
         for _ in range(40):
             sides = self.unbalanced(u + h * np.concatenate([np.eye(size), -np.eye(size)]), load)
@@ -97,9 +106,9 @@ class _Chain:
 
 
 def spring_chain(beam: Beam, strips: int, load: float) -> tuple[float, float, float]:
-    """Deflection / L, shortening / L and tip rotation (rad) of the chain, as `beam_theory.elastica` for the beam.
+    """Return deflection / L, shortening / L and tip rotation (rad) of a uniform beam's chain of ``strips`` bodies.
 
-    ``load`` is P L^2 / E I of the uniform beam.
+    ``load`` is P L^2 / (E I), with tip force P and length L, as in :func:`beam_theory.elastica`, the exact solution.
     """
     chain = _Chain(beam, strips)
     inertia = beam.chord[0] * beam.thickness[0] ** 3 / 12

@@ -23,7 +23,10 @@ FOLDER = Path(__file__).parents[2] / "docs" / "figures"
 
 
 def lift_panels(seed: int = 1) -> list[Panel]:
-    """Lift of the source's test 4 over the beat at both cutoffs, and its spectrum: recorded, with and without fling."""
+    """Return panels of lift in test 4 of Armanini et al. (2016): over the beat at both cutoffs, and its spectrum.
+
+    Curves: recorded on the simulated balance, modelled with clap-and-peel, and without. ``seed``: of the noise.
+    """
     evaluator, trial, vehicle = make_evaluator("in_process"), TRIALS[FINER_TRIAL], delfly()
     raw = record(true_beat(vehicle, trial), trial, Balance(), np.random.default_rng([seed, 3, FINER_TRIAL]))
     panels, lines = [], tuple[Line, ...]()
@@ -55,7 +58,10 @@ def _compared(one: Fitted) -> ForceComparison:
 
 
 def coefficient_panels(seed: int = 1) -> list[Panel]:
-    """Local estimates and the global model over body pitch (the source's Fig. 14)."""
+    """Return a panel per coefficient over body pitch: true values, local estimates and the global model.
+
+    As Fig. 14 of Armanini et al. (2016). ``seed``: of the noise.
+    """
     evaluator, vehicle = make_evaluator("in_process"), delfly()
     fitted = [
         fit(
@@ -88,7 +94,7 @@ def coefficient_panels(seed: int = 1) -> list[Panel]:
 
 
 def main() -> None:
-    """Command line."""
+    """Parse the command line, and write the figures."""
     parser = argparse.ArgumentParser(prog="python -m docs.generate.delfly_figures", description=__doc__)
     parser.add_argument("folder", type=Path, nargs="?", default=FOLDER)
     folder = parser.parse_args().folder

@@ -1,7 +1,8 @@
 """Draw the figures of effects: ``python -m docs.generate.effect_figures [NAME ...]``, all of them without names.
 
-Each effect at its typical size on the nominal rig, without noise, solved with fixed steps: its change of the markers of
-the Robird's wing over the beat and over conditions, aligned as a recording is, and of the forces of the DelFly.
+Each effect has its typical size on the nominal rig, without noise, solved with fixed steps. The figures show how it
+changes the positions of the markers of the Robird's wing, over the beat and over conditions, and the forces of the
+DelFly. The start of the beat is estimated from the simulated tracks, as for a recording.
 """
 
 from __future__ import annotations
@@ -39,14 +40,18 @@ LEAST = 0.01  # mm or mN: smallest range of an axis to either side
 
 
 def panels(effect: Effect) -> list[Panel]:
-    """Panels of an effect: three in a row for the wing and two for the vehicle, where it applies."""
+    """Return the panels of an effect: three in a row for the wing and two for the vehicle, where it applies."""
     made = {"wing": wing_panels, "vehicle": vehicle_panels}
     rigs = [rig_of(kind, quick=False) for kind in made]
     return [panel for rig in rigs if effect.applies_to(rig.description) for panel in made[rig.kind](rig, effect)]
 
 
 def wing_panels(rig: Rig, effect: Effect) -> list[Panel]:
-    """Displacement of two markers over the beat; of all, against flap frequency and against airspeed or pressure."""
+    """Return three panels of the change that an effect makes to marker positions (mm).
+
+    They show two markers over the beat, the RMS change of all markers against flap frequency, and against airspeed or
+    pressure.
+    """
     there = vacuum(EMPTY, LAG, FREQUENCY) if effect.name in IN_VACUUM else tunnel(LAG, FREQUENCY, AIRSPEED)
     empty, air = [vacuum(EMPTY, LAG, f) for f in FREQUENCIES], [tunnel(LAG, f, AIRSPEED) for f in FREQUENCIES]
     pressing = effect.name in OF_PRESSURE
@@ -75,7 +80,10 @@ def wing_panels(rig: Rig, effect: Effect) -> list[Panel]:
 
 
 def over_the_beat(rig: Rig, effect: Effect, recording: Recording, change: Array) -> Panel:
-    """Displacement of two markers over the beat, along the axis of largest displacement."""
+    """Return a panel of the displacement (mm) of two markers over the beat, along the axis where it is largest.
+
+    ``change`` [T, C]: displacement of all markers (m) at T samples; C = 3 M columns, x, y, z of each of M markers.
+    """
     wing = _wing_of(rig)
     shown = shown_markers(wing, effect)
     tracks = rig.unit * change.reshape(len(change), -1, 3)[:, list(shown.values())]
@@ -86,7 +94,7 @@ def over_the_beat(rig: Rig, effect: Effect, recording: Recording, change: Array)
     else:
         turns = recording.condition.flap_frequency * recording.times - recorded_crossing(wing, recording) / (2 * np.pi)
         x, label = turns % 1.0, "part of the beat since the upstroke crossing"
-        order = np.argsort(x[: FRAMES // 2])  # then come the same phases again
+        order = np.argsort(x[: FRAMES // 2])  # the second half has the same phases again
     lines = tuple(Line(name, x[order], tracks[order, k, axis]) for k, name in enumerate(shown))
     where = recording.condition
     medium = f"air at {where.airspeed:g} m/s" if where.airspeed else f"vacuum, {EMPTY:g} mbar"
@@ -95,7 +103,10 @@ def over_the_beat(rig: Rig, effect: Effect, recording: Recording, change: Array)
 
 
 def shown_markers(wing: Wing, effect: Effect) -> dict[str, int]:
-    """Indices of two markers by name: tip and mid-span, or the marker of a single-marker fault and its neighbour."""
+    """Return the indices of two markers by name: the tip and one at mid-span.
+
+    For a fault of a single marker they are that marker and its neighbour.
+    """
 
     def at(station: float, chord: float) -> npt.NDArray[np.intp]:
         return np.asarray(nearest(wing, {"station": np.array([station]), "chord": np.array([chord])})[0])
@@ -107,7 +118,7 @@ def shown_markers(wing: Wing, effect: Effect) -> dict[str, int]:
 
 
 def vehicle_panels(rig: Rig, effect: Effect) -> list[Panel]:
-    """Change of force over the beat, and its size in all tests."""
+    """Return two panels of the change of force (mN) by an effect: over the beat, and its RMS in all tests."""
     moved = displacements(rig, effect, rig.recordings(rig.stands_for(effect)))
     recording, change = moved[TRIAL]
     beats = recording.condition.flap_frequency * recording.times
@@ -125,13 +136,16 @@ def vehicle_panels(rig: Rig, effect: Effect) -> list[Panel]:
 
 
 def around_zero(lines: Sequence[Line]) -> tuple[float, ...]:
-    """What an axis of changes holds at least: zero, and LEAST either way where there is next to nothing."""
+    """Return the values that the y axis must include: zero, or -LEAST and LEAST if all changes are small."""
     largest = max(float(np.abs(line.y).max()) for line in lines)
     return (0.0,) if largest > LEAST else (-LEAST, LEAST)
 
 
 def displacements(rig: Rig, effect: Effect, recordings: Sequence[Recording]) -> list[tuple[Recording, Array]]:
-    """What the effect at its typical size changes in each recording, [T, C], m or N."""
+    """Return each recording with the change that the effect at its typical size makes to it.
+
+    The change is [T, C] (T samples, C recorded columns), in m or N.
+    """
     whole = displacement(rig, effect, effect.typical(rig.description), tuple(recordings))
     ends = np.cumsum([one.values.size for one in recordings])[:-1]
     parts = np.split(whole, ends)
@@ -145,7 +159,7 @@ def _wing_of(rig: Rig) -> Wing:
 
 
 def draw(names: Sequence[str], folder: Path, say: Callable[[str], None]) -> None:
-    """Write the figures of the effects called ``names``."""
+    """Write the figures of the effects ``names`` to ``folder``; ``say`` gets a line of progress for each."""
     folder.mkdir(parents=True, exist_ok=True)
     for k, name in enumerate(names):
         began = time.monotonic()
@@ -155,7 +169,7 @@ def draw(names: Sequence[str], folder: Path, say: Callable[[str], None]) -> None
 
 
 def main() -> None:
-    """Command line."""
+    """Parse the command line, and draw the figures."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("names", nargs="*", metavar="NAME", help="effects; all without")
     parser.add_argument("--folder", type=Path, default=FOLDER, help="where the figures go")

@@ -1,7 +1,7 @@
 """Write the generated parts of docs/effects: ``python -m docs.generate.effect_pages``.
 
 A page is written by hand except between ``<!-- NAME -->`` and ``<!-- end of NAME -->``: these blocks are generated from
-the effect's declaration, and a test fails where they are stale.
+the effect's declaration, and a test fails if they are out of date.
 """
 
 from __future__ import annotations
@@ -44,12 +44,15 @@ _KINDS = {
 
 
 def page_of(name: str) -> Path:
-    """The page of an effect."""
+    """Return the path of the page of the effect called ``name``."""
     return FOLDER / f"{name}.md"
 
 
 def filled(text: str, blocks: dict[str, str]) -> str:
-    """``text`` with its named ``blocks`` updated; ValueError for a block without its pair of comments in it."""
+    """Return ``text`` with its named ``blocks`` updated.
+
+    ValueError if ``text`` lacks the pair of comments of a block.
+    """
     for name, block in blocks.items():
         opening, closing = f"<!-- {name} -->\n", f"<!-- end of {name} -->"
         before, found, rest = text.partition(opening)
@@ -61,7 +64,7 @@ def filled(text: str, blocks: dict[str, str]) -> str:
 
 
 def blocks_of(effect: Effect) -> dict[str, str]:
-    """Generated blocks of the page of an effect, by name."""
+    """Return the generated blocks of the page of an effect, by name."""
     law = "\n".join(f"    {line}" for line in effect.law.splitlines())
     return {
         "law": law,
@@ -73,7 +76,10 @@ def blocks_of(effect: Effect) -> dict[str, str]:
 
 
 def genes(effect: Effect) -> str:
-    """Legend and table of the genes. Bounds that grow with the rig are multiples of its span, mean chord or mass."""
+    """Return an explanation and a table of the genes of an effect.
+
+    Bounds that grow with the rig are given as multiples of its span, mean chord or mass.
+    """
     kinds = [_kind(effect, one) for one in effect.parameters]
     legend = ["A gene is a parameter that a calibration can fit; the law uses the part of its name after the dot."]
     legend += [text for kind, text in _KINDS.items() if kind in kinds]
@@ -100,7 +106,7 @@ def _of(parameter: Parameter) -> str:
 
 
 def signature(effect: Effect) -> str:
-    """How the effect looks in a recording, the effects that look alike, and what the figure below shows."""
+    """Return how the effect looks in a recording, which effects look alike, and what the page's figure shows."""
     others = ", ".join(f"[{EFFECTS[name].title}]({name}.md)" for name in effect.confused_with)
     rigs = " and ".join(_RIGS[kind] for kind in effect.rigs)
     figure = f"The figure shows the change that the effect makes at its typical size on {rigs} ([details]({_DETAILS}))."
@@ -108,7 +114,7 @@ def signature(effect: Effect) -> str:
 
 
 def power(effect: Effect) -> str:
-    """Port, energy exchange and internal states."""
+    """Return a text on where the effect acts (its port), the energy that it exchanges, and its internal states."""
     memory = f"Internal states: {effect.memory}." if effect.memory else "The effect has no internal states."
     if effect.port == "observation":
         text = "Port: observation. The effect changes simulated recordings, not the motion, and exchanges no energy."
@@ -124,13 +130,13 @@ def _power_of(effect: Effect) -> str:
 
 
 def source(effect: Effect) -> str:
-    """Source of the law, and its test file."""
+    """Return a text with the source of the effect's law, and its test file."""
     (tests,) = (ROOT / "tests" / "sim" / "effects").glob(f"*/test_{effect.name}.py")
     return f"{_capital(effect.source)}.\n\nTests: `{tests.relative_to(ROOT)}`."
 
 
 def index() -> str:
-    """Table of all effects."""
+    """Return a table of all effects."""
     lines = ["| effect | family | acts on | what it looks like | similar effects |", "|---|---|---|---|---|"]
     for effect in EFFECTS.values():
         others = ", ".join(f"[{name}](effects/{name}.md)" for name in effect.confused_with)
@@ -146,12 +152,12 @@ def index() -> str:
 
 
 def files(names: Iterable[str]) -> dict[Path, dict[str, str]]:
-    """Generated blocks of every file: the index and the pages of ``names``."""
+    """Return the generated blocks of every file, by path: of the index, and of the pages of the effects ``names``."""
     return {INDEX: {"effects": index()}} | {page_of(name): blocks_of(EFFECTS[name]) for name in names}
 
 
 def main() -> None:
-    """Command line."""
+    """Update the generated blocks of all pages, and print the paths of changed files."""
     argparse.ArgumentParser(prog="python -m docs.generate.effect_pages", description=__doc__).parse_args()
     for file, blocks in files(EFFECTS).items():
         text = file.read_text(encoding="utf-8")
