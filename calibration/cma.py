@@ -18,7 +18,7 @@ from deap import cma
 from wingfit.calibration.genetic import FAILED, Individual, finite, reflected
 from wingfit.records.array_types import Array
 
-SIGMA = 0.2  # unit coordinates: the start is an estimate, and the truth some tenths of the box away
+SIGMA = 0.2  # initial step size, genes scaled to 0..1: the true values are some tenths away from the estimates
 
 
 @dataclass

@@ -1,4 +1,4 @@
-"""Effects (physics or faults of a measurement, added to a model) in a calibration: which genes are theirs, and when."""
+"""Which genes belong to effects (physics or faults of a measurement, added to a model), and when they are fitted."""
 
 from __future__ import annotations
 
@@ -46,7 +46,10 @@ def is_measured(gene: str) -> bool:
 
 
 def refuse_idle(names: Collection[str], free: Collection[str], fixed: Mapping[str, float]) -> None:
-    """Raise ValueError if an effect in ``names`` would stay off: no size is ``free``, or ``fixed`` to non-zero."""
+    """Raise ValueError if an effect in ``names`` would stay switched off, as none of its sizes can be non-zero.
+
+    A size can be non-zero if it is searched (in ``free``) or has a non-zero value in ``fixed``.
+    """
     for name in names:
         mine = sizes(EFFECTS[name])
         if not any(size in free or fixed.get(size) for size in mine):

@@ -43,7 +43,7 @@ class Unit:
 
 
 def units(problem: Problem, individuals: int) -> list[Unit]:
-    """Split a batch of so many ``individuals`` into units of at most LANES individuals, recording by recording."""
+    """Split a batch of so many ``individuals`` into units of one recording and at most LANES individuals each."""
     return [
         Unit(start, min(start + LANES, individuals), recording)
         for recording in range(len(problem.recordings))

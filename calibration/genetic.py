@@ -1,4 +1,4 @@
-"""The genetic search (thesis IV): selection, crossover and mutation are DEAP's; the loop is written here.
+"""The genetic search of van der Grinten's thesis (IV): DEAP's operators, and a loop that is written here.
 
 Individuals are points of the unit box: genes are scaled so that their bounds are 0 and 1. The random generator of each
 individual is seeded with the seed, stage, generation and its number, so a resumed search equals an uninterrupted one
@@ -21,7 +21,7 @@ from wingfit.records.array_types import Array
 _LOCK = threading.Lock()
 
 TOURNAMENT = 3
-DIFFERENTIAL, BLEND = 0.6, 0.3  # share of children by each crossover; the rest are mutations
+DIFFERENTIAL, BLEND = 0.6, 0.3  # fractions of children by crossover; the rest are mutations
 DIFFERENCE_SCALE = (0.3, 0.9)
 BLEND_ALPHA = 0.4
 MUTATION_ETA = 20.0

@@ -1,9 +1,9 @@
 """Chooses where an effect that is switched off acts when Gauss-Newton starts.
 
-While the size of an effect is zero, the misfit does not depend on the effect's other genes, its place, which say where
-and how it acts. So Gauss-Newton cannot move them, and at a wrong place it may keep the size at zero. Therefore, before
-the first iteration, the place is set to the one of several at which a small size would lower the misfit most if all
-other genes were refitted. The size stays zero, so the simulation of the start does not change.
+While the size of an effect is zero, the misfit does not depend on the effect's other genes, which say where and how it
+acts (below: its place). So Gauss-Newton cannot move them, and at a wrong place it may keep the size at zero. Therefore
+several places are tried before the first iteration, and the one is taken at which a small size would lower the misfit
+most if all other genes were refitted. The size stays zero, so the simulation of the start does not change.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from wingfit.records.array_types import Array
 from wingfit.sim.effects.contract import Effect
 
 PLACES = 15  # places tried, besides the initial one: with a single size a batch of two groups of lanes
-SMALL = 0.02  # of a size's box
+SMALL = 0.02  # step of a size, as a fraction of the range between its bounds
 
 
 def placed(problem: Problem, evaluator: Evaluator, unit: Array) -> tuple[Array, int]:

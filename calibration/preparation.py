@@ -115,9 +115,10 @@ def fitted_through(spec: CalibrationSpec, recording: Recording) -> LowPass | Non
 
 
 def _staged(free: tuple[str, ...], recordings: tuple[Recording, ...]) -> tuple[Stage, ...]:
-    """Return two stages: structural genes are fitted in vacuum, then aerodynamic genes in air (thesis Fig. 2).
+    """Return two stages: structural genes in vacuum, aerodynamic genes in air (van der Grinten's thesis, Fig. 2).
 
-    Effects that are not aerodynamic act in vacuum as well, and are fitted there.
+    Genes of effects that are not aerodynamic are fitted in vacuum. A stage without genes is omitted. ValueError if a
+    stage has genes but no recordings.
     """
     vacuum = tuple(r for r in recordings if r.condition.airspeed == 0 and r.condition.pressure <= VACUUM_LIMIT)
     air = tuple(r for r in recordings if r not in vacuum)

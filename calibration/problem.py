@@ -23,7 +23,7 @@ class Problem:
     """All that is needed to compute misfits from values of the free genes. Picklable; sent to workers once.
 
     ``free`` are the genes searched, in the order of the columns of a batch; all others have their value in ``base``.
-    ``axes`` are the force axes that are fitted, by default DEFAULT_AXES; recordings of tracks are fitted whole.
+    ``axes`` are the force axes that are fitted, by default DEFAULT_AXES; of tracks, all coordinates are fitted.
     """
 
     model: Model
@@ -56,7 +56,8 @@ class Misfit:
 
     Attributes:
         squares: [B] sum of squares, inf for a failed individual. Of tracks: squared distance over frames and markers,
-            m^2 (thesis Eq. 14); of forces: squared difference over instants and fitted axes, N^2.
+            m^2 (van der Grinten's thesis, Eq. 14); of forces: squared difference over instants and fitted axes,
+            N^2.
         distance: [B] mean distance per marker and frame, m; of forces the RMS difference, N; inf for a failed one.
         samples: number of (frame, marker) pairs, or of (instant, axis) pairs, compared.
         reasons: [B] why an individual failed, None if it did not.
@@ -118,7 +119,7 @@ def compared(recording: Recording, axes: tuple[str, ...] = ()) -> Mask:
 
 @dataclass(frozen=True)
 class Evaluation:
-    """Misfits of B individuals to all R recordings of a problem."""
+    """Misfits of B individuals to all recordings of a problem, one Misfit for each recording."""
 
     per_recording: tuple[Misfit, ...]
 

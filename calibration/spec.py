@@ -18,7 +18,9 @@ Method = Literal["genetic", "cma_es", "gauss_newton"]
 
 @dataclass(frozen=True)
 class CalibrationSpec:
-    """Settings of a calibration; defaults are the thesis's (IV-E) for a wing, those of Armanini et al. for a vehicle.
+    """Settings of a calibration.
+
+    Defaults are those of van der Grinten's thesis (IV-E) for a wing, of Armanini et al. (2016) for a vehicle.
 
     Attributes:
         division: rigid bodies of the simulated wing: a number ("4", "11", "24"), or bodies along the chord of each
@@ -30,19 +32,19 @@ class CalibrationSpec:
         stall: generations without improvement of the best fitness after which a search ends.
         tolerance: smallest relative decrease of the best fitness that counts as an improvement.
         max_generations: largest number of generations of a stage, or of Gauss-Newton iterations.
-        seed: the same seed gives the same numbers, bit for bit.
+        seed: of the random generators; the same seed gives the same results, bit for bit.
         bounds_factor: genes are searched in [estimate / factor, estimate * factor]; for wings only.
-        accuracy: largest error (m) of any simulated marker at any instant (`sim/solver/numerics.py`).
-        recordings: names to fit; empty means all that are not held out.
-        genes: names to search; empty means those that the model searches by itself.
+        accuracy: largest numerical error (m) of any simulated marker at any instant (`sim/solver/numerics.py`).
+        recordings: names of recordings to fit; empty means all that are not held out.
+        genes: names of genes to search; empty means those that the model searches by default.
         fixed: values, by name, of genes that are not searched and have these values instead of their estimates.
         method: how a stage is searched. None: genetic for a wing, Gauss-Newton for a vehicle.
         finish: whether Gauss-Newton follows each stage's search.
         preset: blade-element model (:data:`wingfit.sim.vehicle.terms.PRESETS`); for vehicles only.
         without: names of terms of the preset that are omitted.
-        axes: force axes that are fitted.
-        low_pass: cut-off (Hz) of the low-pass for forces before they are fitted. None: 3.2 times the flap frequency, as
-            Armanini et al. (40 Hz at 12.5 Hz); 0: none. Recordings with a ``low_pass`` of their own are not filtered.
+        axes: force axes that are fitted, of "x" and "z".
+        low_pass: cut-off (Hz) of the low-pass for forces before they are fitted. None: 3.2 times the flap frequency
+            (Armanini et al.: 40 Hz at 12.5 Hz); 0: none. Recordings with a ``low_pass`` of their own are not filtered.
         peel_width: beats over which the end of the peel (wings that touched have separated) is smoothed.
         effects: names of effects (`sim/effects/registry.py`) that the model contains; their genes start
             switched off and are searched, within bounds of their own, by default.

@@ -2,7 +2,8 @@
 
 BLAS splits a matrix product among its threads, and the rounding depends on the split. A difference in the last bit can
 change the outcome of a search or of a significance test. All code that computes numbers of a result therefore runs with
-one BLAS thread (docs/decisions/0012-threads.md), whatever the environment says; afterwards the number is restored.
+one BLAS thread (docs/decisions/0012-threads.md), whatever number the environment sets; the former number is
+restored afterwards.
 """
 
 from __future__ import annotations

@@ -36,10 +36,11 @@ class FourierDrive(FourierSeries):
 
 @dataclass(frozen=True)
 class FourBarDrive:
-    """Crank-rocker four-bar linkage: a motor turns the crank, the rocker carries the driving rod (thesis III-F).
+    """Crank-rocker four-bar linkage: a motor turns the crank, the rocker carries the driving rod.
 
-    Lengths of the links in m; ``ground`` is the distance of the two fixed pivots. The crank angle equals the drive
-    phase psi. ``offset`` (rad) is added to the rocker angle so that the wing is horizontal at zero flap angle.
+    From van der Grinten's thesis, III-F. Lengths of the links in m; ``ground`` is the distance of the two fixed pivots.
+    The crank angle equals the drive phase psi. ``offset`` (rad) is added to the rocker angle so that the wing is
+    horizontal at zero flap angle.
     """
 
     ground: float

@@ -84,7 +84,8 @@ def fail(where: str, value: object, message: str) -> DatasetError:
 def check_most(where: str, what: str, found: float, most: float, unit: str, remedy: str) -> None:
     """Raise DatasetError if ``found`` is more than ``most``.
 
-    ``what``, ``unit`` and ``remedy`` make the message: "WHAT 5 UNIT; at most 4 UNIT are read: REMEDY".
+    The message is "WHAT FOUND UNIT; at most MOST UNIT are read: REMEDY", with the arguments in capitals filled in;
+    ``where`` is the file or place that it is about.
     """
     if found > most:
         number = f"{round(found, 1):.15g}"

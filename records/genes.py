@@ -15,7 +15,7 @@ Scale = Literal["log", "linear"]
 
 
 class EstimateError(ValueError):
-    """Raised if a dataset has an estimate of a gene that its model does not have, or one outside the gene's bounds."""
+    """Raised if a dataset has an estimate of a gene that its model does not have, or one that cannot be right."""
 
 
 @dataclass(frozen=True)
@@ -23,9 +23,9 @@ class Gene:
     """One parameter that a calibration may search, bounded by ``lower`` and ``upper``, in ``unit``.
 
     ``nominal`` is its value without a calibration. ``scale`` says how a search spreads its values between the bounds:
-    evenly ("linear") or evenly in the logarithm ("log").
-    ``share_of`` names a group whose values are weights: the model divides each by the sum of its group, so
-    that the shares sum to one for every genome (thesis Eqs. 12-13).
+    evenly ("linear") or evenly in the logarithm ("log"). ``share_of`` names a group of genes whose values are weights:
+    the model divides each by the sum of its group, so that these shares of a total (the lift of a strip,
+    by quarters of its chord) always add up to one (van der Grinten's thesis, Eqs. 12-13). None: the gene is no weight.
     """
 
     name: str
@@ -46,7 +46,7 @@ class Gene:
         self.check(self.nominal)
 
     def check(self, value: float) -> None:
-        """Raise ValueError naming the value, the limits and the unit when ``value`` is not admissible."""
+        """Raise ValueError, which names value, bounds and unit, if ``value`` is not finite or outside the bounds."""
         if not (math.isfinite(value) and self.lower <= value <= self.upper):
             unit = "" if self.unit == "1" else f" {self.unit}"
             bounds = f"[{self.lower:g}, {self.upper:g}]{unit}"
@@ -95,7 +95,7 @@ class Genome:
         return {gene.name: value for gene, value in zip(self.genes, self.values, strict=True)}
 
     def replace(self, values: Mapping[str, float]) -> Genome:
-        """Return a genome with the named values changed; an unknown name raises ValueError with the known ones."""
+        """Return a genome with ``values`` (by name) changed; ValueError for an unknown name or an impossible value."""
         known = self.as_dict()
         unknown = sorted(set(values) - set(known))
         if unknown:

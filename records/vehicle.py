@@ -89,7 +89,7 @@ class Vehicle:
     """A flapping vehicle or animal: all inputs of a blade-element model that are not genes.
 
     Attributes:
-        layout: "x4" two pairs crossed like an X, whose upper and lower wings meet; "pair"; "single" one wing.
+        layout: "x4" two pairs crossed like an X, whose upper and lower wings meet; "pair" two wings; "single" one wing.
         claps: whether wings touch at the start of the beat; if so, models with peel (the chords separate from the
             leading edge backwards) and fling circulation apply.
         stations: chord from the flapping axis (r = 0) to the tip.

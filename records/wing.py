@@ -67,8 +67,8 @@ class Wing:
 
     ``stations`` are sections from root to tip, linear in between. ``driven_rods`` are the names of the front and
     the rear rod; the rear rod lags by the condition's phase lag. ``reference_markers`` define the start of the beat:
-    where their mean height crosses that of the hinge on the upstroke (thesis IV-A). ``estimates`` are the user's
-    estimates of genes by name, overriding the model's defaults.
+    where their mean height crosses that of the hinge on the upstroke (van der Grinten's thesis, IV-A). ``estimates``
+    are the user's estimates of genes by name, overriding the model's defaults.
     """
 
     name: str

@@ -39,8 +39,8 @@ from wingfit.records.blas_threads import one_blas_thread
 # large makes tiny steps.
 DAMPINGS = 10.0 ** np.array([-4, -3, -2, -1.5, -1, -0.75, -0.5, -0.25, 0, 0.25, 0.5, 0.75, 1, 1.5, 2, 3])
 FIRST_DAMPING, LEAST_DAMPING, LARGEST_DAMPING = 1e-3, 1e-4, 1e6  # of each gene's curvature
-LEAST_CURVATURE = 4.0  # damps at least as a prior of the box's half width does: an unidentifiable gene stays
-LEAST_GAIN = 1e-3  # of the decrease that the linearised problem promises
+LEAST_CURVATURE = 4.0  # that of a prior with half the range as standard deviation: an unidentifiable gene stays
+LEAST_GAIN = 1e-3  # of the decrease that the linearised problem predicts
 STEP = 1e-3  # unit coordinates
 COST = 1e-5  # of J's 1/2 sum v^T R^-1 v, which is half the number of samples
 ITERATIONS = 50
@@ -226,8 +226,9 @@ def _better(
 ) -> _Move:
     """Try steps with dampings around ``damping``, and return the best that lowers the cost; no move if none does.
 
-    Larger dampings follow while none succeeds. ``unit`` [F]: present genes, scaled to 0..1. ``quadratic``: second-order
-    model of the cost there; ``power``: sum of v^T R^-1 v there (v residuals, R covariance in ``noise``).
+    Larger dampings are tried until one succeeds or they reach a limit. ``unit`` [F]: present genes, scaled to
+    0..1. ``quadratic``: second-order model of the cost there; ``power``: sum of v^T R^-1 v there (v residuals, R
+    covariance in ``noise``).
     """
     genes, evaluations, reasons = free_genes(problem), 0, list[str]()
     while True:

@@ -25,8 +25,8 @@ from wingfit.records.array_types import Array, Mask
 from wingfit.records.blas_threads import one_blas_thread
 
 IDENTIFIABLE = 0.075  # relative standard error: a 95 % interval within 15 %
-PRIOR = 0.5  # standard deviation of the box as a prior, in unit coordinates: its half width
-SMALL = 0.05  # of the box: what a value of a linear gene is at least compared with
+PRIOR = 0.5  # standard deviation of the prior, genes scaled to 0..1: half the range between the bounds
+SMALL = 0.05  # of the range: errors of linear genes with smaller values are relative to this
 
 
 @dataclass(frozen=True)

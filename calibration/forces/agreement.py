@@ -1,7 +1,7 @@
 """Compares modelled forces with recorded ones: mean beats, differences and spectra.
 
 A model's forces come from ``Model.observe``, which samples and low-passes them like the recording; all functions here
-treat modelled and recorded forces alike.
+treat modelled and recorded forces alike. A quantity is "lift", "drag", or the force along a body axis, "x" or "z".
 """
 
 from __future__ import annotations

@@ -20,8 +20,8 @@ from wingfit.records.blas_threads import one_blas_thread
 from wingfit.sim.atmosphere import density
 
 AFFINE = ("C_l", "C_F")
-FEWEST = 4  # conditions: three coefficients of the law, and one more to contradict it
-FREE_FOR_SCATTER = 3  # conditions beyond the coefficients of the law, for its own scatter to be estimated
+FEWEST = 4  # conditions: as many as the coefficients of the equation, and one more to test it
+FREE_FOR_SCATTER = 3  # conditions beyond the coefficients of the equation, to estimate the scatter about it
 SMALL = 0.05  # of the root mean square of a coefficient: errors of smaller values are relative to this
 WEATHER = 0.05  # relative difference of air density without a warning: it differs by as much from day to day
 COLLINEAR = 0.99  # correlation of frequency and pitch from which their slopes cannot be separated
@@ -235,9 +235,9 @@ def _extrapolation(model: GlobalModel, condition: Condition) -> tuple[str, ...]:
 def _outside(
     name: str, unit: str, value: float, fitted: tuple[float, float], *, scale: float = 1.0, slack: float = 0.0
 ) -> list[str]:
-    """Return a remark if ``value`` is outside the range ``fitted``, widened by the fraction ``slack``; else none.
+    """Return a remark if ``value`` is outside the range ``fitted``, widened by the fraction ``slack``; else [].
 
-    ``scale`` converts to ``unit`` for the remark.
+    ``value`` and ``fitted``, times ``scale``, are in ``unit``.
     """
     low, high = fitted
     if low * (1 - slack) - 1e-9 <= value <= high * (1 + slack) + 1e-9:

@@ -1,7 +1,9 @@
 """The result of a calibration on forces: coefficients for each condition, a global model, how well each fits.
 
 Plain data in SI units, forces in N, which are computed in :mod:`wingfit.calibration.forces.estimation` and
-:mod:`wingfit.calibration.forces.agreement`.
+:mod:`wingfit.calibration.forces.agreement`. A source says whose coefficients a model has: the nominal ones, those
+fitted to one recording ("local") or to several together ("joint"), those of the global model, or the "average" of the
+local ones.
 """
 
 from __future__ import annotations
@@ -67,7 +69,7 @@ class GlobalGene:
 class GlobalModel:
     """Coefficients as functions of flap frequency and body pitch, and the conditions to which they were fitted.
 
-    ``recordings`` are the names of the fitted recordings, ``conditions`` theirs.
+    ``recordings`` are the names of the fitted recordings, ``conditions`` those under which they were made.
     """
 
     genes: tuple[GlobalGene, ...]

@@ -101,7 +101,7 @@ class _Builder:
         return Document(self.file, data, self.places)
 
     def _counted(self, events: Iterator[Any]) -> Iterator[Any]:
-        """Yield the events; DatasetError for too many, because data built from them need far more memory than text."""
+        """Yield the events; DatasetError for more than MAX_ITEMS: the data need far more memory than their text."""
         for number, event in enumerate(events):
             if number > MAX_ITEMS:
                 raise self._error(event, f"more than {MAX_ITEMS} keys, items and values; put samples in CSV")

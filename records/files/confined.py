@@ -153,7 +153,7 @@ def _failure(status: int, label: str, limits: Limits) -> Exception:
 
 
 def _faults(answer: bytes, label: str) -> DatasetError:
-    """Return the error with the faults that the reading process reported as JSON; they are not trusted: text only."""
+    """Return the error with the faults that the reading process reported as JSON; not trusted, converted to text."""
     try:
         report = json.loads(answer)
         faults = [Fault(str(where), value and str(value), str(message)) for where, value, message in report["faults"]]

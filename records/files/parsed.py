@@ -114,7 +114,7 @@ def _samples(archive: zipfile.ZipFile, name: str, layout: Mapping[str, Any], roo
 
 
 def _array(stream: IO[bytes], shape: tuple[int, ...]) -> Array:
-    """Read a writable array of this ``shape`` from ``stream``: to numba, read-only arrays are another type."""
+    """Read an array of this ``shape`` from ``stream``; writable, since numba treats read-only ones as another type."""
     array = np.empty(shape, dtype=NUMBER)
     rest = array.reshape(-1).view(np.uint8).data
     while rest:

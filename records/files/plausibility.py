@@ -91,7 +91,7 @@ def _check_positions(
 
 
 def _typical(values: Float[Array, "T C"], hinge: tuple[float, float, float]) -> float:
-    """Return the median distances (m) of ``values`` [T, 3 M] from the ``hinge`` along x, y and z, the largest of them.
+    """Return the largest of three median distances (m) of ``values`` [T, 3 M] from ``hinge``: along x, y and z.
 
     0 if there are no values. The axes are treated one after the other, to save memory.
     """
