@@ -1,1 +1,1 @@
-"""Calibration: find the genes with which a model reproduces recordings."""
+"""Calibration: searches the values of genes with which a model reproduces recordings best."""

@@ -1,7 +1,8 @@
-"""CMA-ES (Hansen and Ostermeier 2001): DEAP's update of the distribution, draws and loop of ours.
+"""The search CMA-ES (Hansen and Ostermeier 2001): DEAP updates the distribution; draws and loop are written here.
 
-Individuals live in the unit box; what is drawn outside is mirrored back. Every draw is keyed by seed, stage, generation
-and slot, and the state is plain numbers, so a resumed search equals an uninterrupted one bit for bit.
+Individuals are points of the unit box: genes are scaled so that their bounds are 0 and 1; a draw outside is mirrored at
+the bound. The random generator of each draw is seeded with the seed, stage, generation and number of the individual,
+and the state is plain numbers. So a resumed search equals an uninterrupted one bit for bit.
 """
 
 from __future__ import annotations
@@ -17,16 +18,17 @@ from deap import cma
 from wingfit.calibration.genetic import FAILED, Individual, finite, reflected
 from wingfit.records.array_types import Array
 
-SIGMA = 0.2  # unit coordinates: the start is an estimate, and the truth some tenths of the box away
+SIGMA = 0.2  # initial step size, genes scaled to 0..1: the true values are some tenths away from the estimates
 
 
 @dataclass
 class Distribution:
-    """State of a search between generations, its own checkpoint.
+    """State of a CMA-ES search after a generation; its fields are plain numbers and are stored as the checkpoint.
 
-    ``centroid``, ``paths``, ``covariance``, ``sigma`` and ``updates`` are those of the strategy; ``unit``, ``fitness``
-    and ``distance`` the best individual so far; ``mean`` the mean fitness of those of the last generation that did not
-    fail. ``generation``, ``stall`` and ``best`` as in :class:`wingfit.calibration.genetic.Population`.
+    ``centroid`` [F], ``step_path`` [F], ``path`` [F], ``covariance`` [F, F], ``sigma`` (step size) and ``updates`` are
+    those of DEAP's strategy, for F free genes. ``unit`` [F] (genes scaled to 0..1), ``fitness`` and ``distance`` are
+    those of the best individual so far; ``mean`` is the last generation's mean fitness, without failed individuals.
+    ``generation``, ``stall`` and ``best`` are as in :class:`wingfit.calibration.genetic.Population`.
     """
 
     centroid: list[float] = field(default_factory=list)
@@ -45,18 +47,18 @@ class Distribution:
 
     @classmethod
     def about(cls, start: Sequence[float]) -> Distribution:
-        """A search that begins at ``start`` in unit coordinates."""
+        """Return the initial state of a search from ``start`` [F], genes scaled to 0..1."""
         zeros = [0.0] * len(start)
         return cls([float(u) for u in start], zeros, list(zeros), np.eye(len(start)).tolist(), unit=list(start))
 
     @property
     def diversity(self) -> float:
-        """Mean over the genes of the standard deviation in unit coordinates."""
+        """Standard deviation of the distribution (genes scaled to 0..1), mean over the genes."""
         return float(self.sigma * np.mean(np.sqrt(np.diag(np.array(self.covariance)))))
 
 
 def drawn(state: Distribution, seed: int, stage: str, size: int) -> Array:
-    """Unit coordinates [size, F] of the next generation; row 0 of the first generation is the start itself."""
+    """Draw the next generation [size, F], genes scaled to 0..1; row 0 of the first generation is the start itself."""
     generation = state.generation + 1
     rows = []
     for slot in range(size):
@@ -70,9 +72,10 @@ def drawn(state: Distribution, seed: int, stage: str, size: int) -> Array:
 
 
 def learnt(state: Distribution, unit: Array, fitness: Array, distance: Array, tolerance: float) -> Distribution:
-    """The distribution updated with a generation ``unit`` [size, F] and its ``fitness`` and ``distance`` [size].
+    """Return ``state`` updated with a generation ``unit`` [size, F] and its ``fitness`` and ``distance`` [size].
 
-    If more than half of the individuals failed, the step size is halved and the rest of the distribution stays.
+    ``tolerance`` is the relative decrease of the best fitness that resets ``stall``. If more than half of the
+    individuals failed, the step size is halved and the rest of the distribution is unchanged.
     """
     scores = [finite(f) for f in fitness]
     good = [f for f in scores if f < FAILED]
@@ -98,7 +101,7 @@ def learnt(state: Distribution, unit: Array, fitness: Array, distance: Array, to
 
 
 def _strategy(state: Distribution, size: int) -> Any:
-    """DEAP's strategy object for generations of ``size`` individuals, set to ``state``."""
+    """Make DEAP's strategy object for generations of ``size`` individuals and set it to ``state``."""
     strategy = cma.Strategy(state.centroid, state.sigma, lambda_=size, cmatrix=np.array(state.covariance))
     strategy.ps, strategy.pc = np.array(state.step_path), np.array(state.path)
     strategy.update_count = state.updates

@@ -1,4 +1,4 @@
-"""Effects in a calibration: the stage that fits their genes, and remarks on effects that stay switched off."""
+"""Which genes belong to effects (physics or faults of a measurement, added to a model), and when they are fitted."""
 
 from __future__ import annotations
 
@@ -13,25 +13,25 @@ _SEEN_IN_VACUUM = ("residual_air",)
 
 
 def effect_of(gene: str) -> Effect | None:
-    """The effect that a gene belongs to; None for a gene of the model itself."""
+    """Return the effect that the gene called ``gene`` belongs to; None for a gene of the model itself."""
     name, _, short = gene.partition(".")
     effect = EFFECTS.get(name)
     return effect if effect and any(p.name == short for p in effect.parameters) else None
 
 
 def sizes(effect: Effect) -> tuple[str, ...]:
-    """The sizes of ``effect``: it is switched off when all these genes are zero."""
+    """Return the names of the size genes of ``effect``; if all of them are zero, the effect is switched off."""
     return tuple(f"{effect.name}.{parameter.name}" for parameter in effect.size)
 
 
 def is_size(gene: str) -> bool:
-    """Whether a gene is a size of an effect, which is switched off when all its sizes are zero."""
+    """Return whether the gene is a size of an effect, that is, says how strong the effect is (zero: off)."""
     effect = effect_of(gene)
     return effect is not None and gene in sizes(effect)
 
 
 def group_of(gene: str) -> Group:
-    """Whether a staged calibration fits a gene of a wing with the structure or with the aerodynamics."""
+    """Return in which stage of a staged calibration a gene of a wing is fitted: "structure" or "aerodynamics"."""
     effect = effect_of(gene)
     if effect is None:
         return group(gene)
@@ -40,13 +40,16 @@ def group_of(gene: str) -> Group:
 
 
 def is_measured(gene: str) -> bool:
-    """Whether a gene belongs to a fault of a measurement, which does not act on the wing or its forces."""
+    """Return whether the gene belongs to a fault of the measurement, which changes recordings but not the motion."""
     effect = effect_of(gene)
     return effect is not None and effect.family == "measurement"
 
 
 def refuse_idle(names: Collection[str], free: Collection[str], fixed: Mapping[str, float]) -> None:
-    """ValueError for an effect that stays switched off because none of its sizes is searched or fixed."""
+    """Raise ValueError if an effect in ``names`` would stay switched off, as none of its sizes can be non-zero.
+
+    A size can be non-zero if it is searched (in ``free``) or has a non-zero value in ``fixed``.
+    """
     for name in names:
         mine = sizes(EFFECTS[name])
         if not any(size in free or fixed.get(size) for size in mine):
@@ -57,7 +60,10 @@ def refuse_idle(names: Collection[str], free: Collection[str], fixed: Mapping[st
 
 
 def absent(genome: Mapping[str, float], free: Collection[str]) -> tuple[str, ...]:
-    """Remarks on effects that are switched off in ``genome``: the values of their other genes are meaningless."""
+    """Return remarks on effects that are switched off in ``genome``: the values of their other genes are meaningless.
+
+    ``genome`` has the value of every gene by name; effects without a ``free`` gene are not considered.
+    """
     found = {effect.name: effect for name in free if (effect := effect_of(name))}
     remarks = []
     for effect in found.values():

@@ -1,4 +1,4 @@
-"""The interface through which a search evaluates individuals, and the units of work of every implementation.
+"""The interface through which a search simulates individuals (genomes), and how every implementation splits the work.
 
 Work is cut into units of at most ``LANES`` individuals and one recording, always in the same way, so that every
 implementation does the same arithmetic on the same units and returns the same bits.
@@ -22,17 +22,20 @@ class Evaluator(Protocol):
     """Evaluates batches of individuals; the implementation decides where the work runs."""
 
     def evaluate(self, problem: Problem, values: ArrayLike, *, residuals: bool = False) -> Evaluation:
-        """Misfits of ``values`` [B, F] to every recording of the problem."""
+        """Return the misfits of B individuals, ``values`` [B, F] of the free genes, to every recording of ``problem``.
+
+        With ``residuals``, simulated minus recorded values are returned as well.
+        """
         ...
 
     def close(self) -> None:
-        """Release processes and memory; further calls are errors."""
+        """Release processes and memory; the evaluator must not be called afterwards."""
         ...
 
 
 @dataclass(frozen=True)
 class Unit:
-    """One piece of work: individuals ``start`` to ``stop`` of the batch against one recording."""
+    """One piece of work: individuals ``start`` to ``stop`` (excluded) of a batch, on recording number ``recording``."""
 
     start: int
     stop: int
@@ -40,7 +43,7 @@ class Unit:
 
 
 def units(problem: Problem, individuals: int) -> list[Unit]:
-    """Cut a batch into units, recording by recording."""
+    """Split a batch of so many ``individuals`` into units of one recording and at most LANES individuals each."""
     return [
         Unit(start, min(start + LANES, individuals), recording)
         for recording in range(len(problem.recordings))
@@ -50,18 +53,18 @@ def units(problem: Problem, individuals: int) -> list[Unit]:
 
 @one_blas_thread
 def run_unit(problem: Problem, values: Array, unit: Unit, *, residuals: bool = False) -> Misfit:
-    """Evaluate one unit of the batch ``values`` [B, F]."""
+    """Return the misfit of the individuals of ``unit`` in the batch ``values`` [B, F], with residuals if requested."""
     return misfit(problem, values[unit.start : unit.stop], unit.recording, residuals=residuals)
 
 
 def gather(problem: Problem, done: Sequence[Misfit]) -> Evaluation:
-    """Assemble results, in the order of :func:`units`, into one evaluation."""
+    """Join the results ``done`` of all units, in the order of :func:`units`, to the evaluation of the batch."""
     per = len(done) // len(problem.recordings)
     return Evaluation(tuple(concatenate(done[r * per : (r + 1) * per]) for r in range(len(problem.recordings))))
 
 
 def as_batch(values: ArrayLike) -> Array:
-    """``values`` as a contiguous, non-empty [B, F] array."""
+    """Convert ``values`` to a contiguous array [B, F], B individuals and F genes; ValueError if B is 0."""
     batch = np.ascontiguousarray(np.atleast_2d(np.asarray(values, float)))
     if batch.ndim != 2 or not len(batch):
         raise ValueError(f"a batch needs shape [B, F] with B >= 1, got {list(np.shape(values))}")

@@ -1,8 +1,9 @@
-"""The genetic search: DEAP's operators, a loop of ours (thesis IV).
+"""The genetic search of van der Grinten's thesis (IV): DEAP's operators, and a loop that is written here.
 
-Individuals live in the unit box of the genes' scales. Every random draw is keyed by seed, stage, generation and slot,
-so a resumed search equals an uninterrupted one bit for bit. DEAP draws from Python's global generator; it is seeded for
-each child and put back, under a lock, so that searches in other threads neither see nor disturb it.
+Individuals are points of the unit box: genes are scaled so that their bounds are 0 and 1. The random generator of each
+individual is seeded with the seed, stage, generation and its number, so a resumed search equals an uninterrupted one
+bit for bit. DEAP draws from Python's global generator; under a lock, its state is replaced for each child and restored
+afterwards, so that searches in other threads neither see nor change it.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from wingfit.records.array_types import Array
 _LOCK = threading.Lock()
 
 TOURNAMENT = 3
-DIFFERENTIAL, BLEND = 0.6, 0.3  # share of children by each crossover; the rest are mutations
+DIFFERENTIAL, BLEND = 0.6, 0.3  # fractions of children by crossover; the rest are mutations
 DIFFERENCE_SCALE = (0.3, 0.9)
 BLEND_ALPHA = 0.4
 MUTATION_ETA = 20.0
@@ -32,7 +33,7 @@ class _Fitness(base.Fitness):  # type: ignore[misc]
 
 
 class Individual(list[float]):
-    """Unit coordinates with DEAP's fitness attached."""
+    """An individual as DEAP needs it: genes scaled to 0..1 as a list, and a fitness (invalid if None)."""
 
     def __init__(self, u: Sequence[float], fitness: float | None = None) -> None:
         super().__init__(u)
@@ -41,15 +42,15 @@ class Individual(list[float]):
 
 @dataclass
 class Population:
-    """State of a search between generations; plain numbers, so that it is its own checkpoint.
+    """State of a genetic search after a generation; its fields are plain numbers and are stored as the checkpoint.
 
     Attributes:
-        unit: individuals in unit coordinates, best first.
-        fitness: of each (FAILED for one that failed).
-        distance: mean distance per marker of each, m.
-        generation: number of the generation that these are.
+        unit: individuals with genes scaled to 0..1, best first.
+        fitness: sum of squares of each individual, m^2 or N^2 (FAILED for one that failed).
+        distance: of each individual, mean distance per marker (m) or RMS difference of forces (N).
+        generation: number of this generation, from 0; -1 before the first.
         stall: generations since the best fitness last improved.
-        best: the fitness that a further improvement is measured against.
+        best: best fitness at the last improvement by more than the tolerance; the next one is relative to it.
     """
 
     unit: list[list[float]] = field(default_factory=list)
@@ -61,17 +62,17 @@ class Population:
 
     @property
     def mean(self) -> float:
-        """Mean fitness of those that did not fail."""
+        """Mean fitness of the individuals that did not fail."""
         return float(np.mean([f for f in self.fitness if f < FAILED]))
 
     @property
     def diversity(self) -> float:
-        """Mean over the genes of the standard deviation in unit coordinates."""
+        """Standard deviation over the individuals (genes scaled to 0..1), mean over the genes."""
         return float(np.mean(np.std(np.array(self.unit), axis=0)))
 
 
 def first_generation(seed: int, stage: str, size: int, start: Sequence[float]) -> Array:
-    """Unit coordinates [size, F]: the start itself, the rest uniform over the box."""
+    """Draw the first generation [size, F], genes scaled to 0..1: ``start`` [F], then uniform draws over the box."""
     rows = [list(start)]
     for slot in range(1, size):
         draw = random.Random(f"{seed}/{stage}/0/{slot}")  # noqa: S311  (a search, not a secret)
@@ -80,7 +81,7 @@ def first_generation(seed: int, stage: str, size: int, start: Sequence[float]) -
 
 
 def offspring(population: Population, seed: int, stage: str, size: int) -> Array:
-    """Unit coordinates [size, F] of the next generation's children."""
+    """Make ``size`` children [size, F] (genes scaled to 0..1) of ``population``."""
     parents = [Individual(u, f) for u, f in zip(population.unit, population.fitness, strict=True)]
     generation = population.generation + 1
     with _LOCK:
@@ -92,11 +93,11 @@ def offspring(population: Population, seed: int, stage: str, size: int) -> Array
 
 
 def _child(parents: list[Individual], key: str) -> list[float]:
-    """One child by differential crossover, blend crossover or mutation.
+    """Make one child [F] by differential crossover, blend crossover or mutation; ``key`` seeds the random generator.
 
-    Stiffnesses compensate each other, so good individuals lie in narrow oblique valleys. Crossovers that mix gene by
-    gene (blend, simulated binary) lose them; a step along the difference of two others (Storn and Price 1997) keeps to
-    the valley, whatever its direction. docs/decisions/0003 has the figures.
+    Stiffnesses compensate each other, so good individuals lie in narrow oblique valleys of the misfit. Crossovers that
+    mix gene by gene (blend, simulated binary) leave the valley; a step along the difference of two other individuals
+    (Storn and Price 1997) follows it, whatever its direction (figures: docs/decisions/0003).
     """
     random.seed(key)
     draw = random.random()  # noqa: S311
@@ -117,13 +118,17 @@ def _child(parents: list[Individual], key: str) -> list[float]:
 
 
 def reflected(u: float) -> float:
-    """``u`` mirrored at the bounds into [0, 1]; clipping would pile individuals on the bounds."""
+    """Return ``u`` mirrored at the bounds into [0, 1]; clipping would put too many individuals on the bounds."""
     u = abs(u) % 2.0
     return 2.0 - u if u > 1.0 else u
 
 
 def survive(population: Population, unit: Array, fitness: Array, distance: Array, tolerance: float) -> Population:
-    """The best of parents and children; of equal fitness the parent stays, so that the order is reproducible."""
+    """Return the best of ``population`` and its children ``unit`` [size, F], as many as there are children.
+
+    ``fitness`` and ``distance`` [size] are those of the children. At equal fitness the parent is preferred, so that the
+    order is reproducible. ``tolerance`` is the relative decrease of the best fitness that resets ``stall``.
+    """
     size = len(unit)
     everyone = population.unit + [[float(v) for v in row] for row in unit]
     scores = population.fitness + [finite(f) for f in fitness]
@@ -142,5 +147,5 @@ def survive(population: Population, unit: Array, fitness: Array, distance: Array
 
 
 def finite(value: float) -> float:
-    """``value``, or the constant FAILED when it is not finite."""
+    """Return ``value``, or the constant FAILED if ``value`` is not finite."""
     return float(value) if np.isfinite(value) else FAILED

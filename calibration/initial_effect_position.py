@@ -1,10 +1,9 @@
-"""The initial place of an effect that is switched off when Gauss-Newton starts.
+"""Chooses where an effect that is switched off acts when Gauss-Newton starts.
 
-While the size of an effect is zero, the misfit does not depend on the genes that say where and how the effect acts. So
-Gauss-Newton cannot move them, and from a wrong place it may keep the size at zero. Therefore, before the first
-iteration, they are set to the place at which a small size would lower the misfit most after all other genes have
-adapted.
-The size stays zero, so the simulation of the start does not change.
+While the size of an effect is zero, the misfit does not depend on the effect's other genes, which say where and how it
+acts (below: its place). So Gauss-Newton cannot move them, and at a wrong place it may keep the size at zero. Therefore
+several places are tried before the first iteration, and the one is taken at which a small size would lower the misfit
+most if all other genes were refitted. The size stays zero, so the simulation of the start does not change.
 """
 
 from __future__ import annotations
@@ -23,11 +22,14 @@ from wingfit.records.array_types import Array
 from wingfit.sim.effects.contract import Effect
 
 PLACES = 15  # places tried, besides the initial one: with a single size a batch of two groups of lanes
-SMALL = 0.02  # of a size's box
+SMALL = 0.02  # step of a size, as a fraction of the range between its bounds
 
 
 def placed(problem: Problem, evaluator: Evaluator, unit: Array) -> tuple[Array, int]:
-    """Start [F] in unit coordinates, with effects of size zero at their best place; number of individuals evaluated."""
+    """Move every effect of size zero to its best place; return the start [F] and the number of simulated individuals.
+
+    ``unit`` [F] is the start before, genes scaled to 0..1. Returned unchanged if there is no such effect.
+    """
     effects = _movable(problem, unit)
     if not effects:
         return unit, 0
@@ -48,7 +50,11 @@ def placed(problem: Problem, evaluator: Evaluator, unit: Array) -> tuple[Array, 
 
 @dataclass(frozen=True)
 class _Weighed:
-    """Whitened residuals [N] at the start, and the changes of them that the other genes can compensate."""
+    """Whitened residuals ``white`` [N] at the start, and the changes of them that the genes ``others`` can cancel.
+
+    N counts the values of all recordings. ``noise`` whitens, one per recording; ``others`` are the genes that do not
+    belong to the effects to be moved.
+    """
 
     noise: list[Noise]
     white: Array
@@ -65,7 +71,11 @@ class _Weighed:
         return cls(noise, white, Nuisance.of(np.concatenate(slopes)))
 
     def gains(self, evaluation: Evaluation, limits: tuple[Array, Array]) -> list[float]:
-        """Decrease of the sum of squares at each place; each has S individuals in ``evaluation``, one per size."""
+        """Return, for each place, by how much sizes within ``limits`` (S each) lower the whitened sum of squares.
+
+        ``evaluation`` has S individuals for each place, in each of which one of the S sizes is small and not zero. A
+        place at which one of them failed gets 0.
+        """
         parts = zip(self.noise, residuals_of(evaluation), strict=True)
         after = np.concatenate([n.whitened(v).reshape(len(v), -1) for n, v in parts], axis=1)
         blocks = (after - self.white).reshape(-1, len(limits[0]), len(self.white))
@@ -79,7 +89,7 @@ class _Weighed:
 
 
 def _movable(problem: Problem, unit: Array) -> list[Effect]:
-    """Effects of size zero at ``unit`` [F], if their size and at least one other gene are searched."""
+    """Return the effects of size zero at ``unit`` [F] of which a size and at least one other gene are searched."""
     genes = free_genes(problem)
     genome = problem.base.as_dict() | dict(zip(problem.free, values_at(genes, unit[None])[0].tolist(), strict=True))
     found = {effect.name: effect for name in problem.free if (effect := effect_of(name))}
@@ -93,23 +103,26 @@ def _movable(problem: Problem, unit: Array) -> list[Effect]:
 
 
 def _tried(unit: Array, shape: list[int]) -> Array:
-    """Starts [1 + PLACES, F]: ``unit``, then ``unit`` with its columns ``shape`` spread evenly over their boxes."""
+    """Return starts [1 + PLACES, F]: ``unit`` [F], then copies with the genes ``shape`` spread evenly over 0..1."""
     tried = np.tile(unit, (1 + PLACES, 1))
     tried[1:, shape] = spread(PLACES, len(shape))
     return tried
 
 
 def _limits(size: list[int], unit: Array) -> tuple[Array, Array]:
-    """Least and largest multiple [S] of the step of :func:`_small`, by size gene.
+    """Return the least and largest allowed multiple [S] of the step of :func:`_small` for each of the S size genes.
 
-    Only a single size that starts at a bound is limited: to at least zero.
+    ``size`` are their columns in ``unit`` [F]. Only a single size that starts at a bound is limited: to at least zero.
     """
     one_sided = len(size) == 1 and not SMALL <= unit[size[0]] <= 1.0 - SMALL
     return np.full(len(size), 0.0 if one_sided else -np.inf), np.full(len(size), np.inf)
 
 
 def _small(size: list[int], unit: Array, tried: Array) -> Array:
-    """For every row of ``tried`` [P, F], S copies [P x S, F], in each of which one size gene is moved by SMALL."""
+    """Return S copies of every row of ``tried`` [P, F], in each of which one of S size genes is moved by SMALL.
+
+    [P x S, F] in genes scaled to 0..1; ``size`` are the columns of the size genes, whose start is in ``unit`` [F].
+    """
     moves = np.array([SMALL if unit[k] + SMALL <= 1.0 else -SMALL for k in size])
     batch = np.repeat(tried, len(size), axis=0)
     batch[np.arange(len(batch)), np.tile(size, len(tried))] += np.tile(moves, len(tried))

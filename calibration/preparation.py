@@ -1,6 +1,6 @@
-"""From a request and a dataset to what is fitted: model, filtered recordings, free genes and stages.
+"""Makes, of settings and a dataset, what is fitted: model, filtered recordings, free genes and stages.
 
-All that does not fit together is refused here, before anything is simulated.
+Settings that do not fit the dataset raise ValueError here, before anything is simulated.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ VACUUM_LIMIT = 10_000.0  # Pa: still air at no more than this pressure counts as
 
 @dataclass(frozen=True)
 class Stage:
-    """One search: which genes are free, on which recordings (forces: low-passed already)."""
+    """One search of a calibration: the genes ``free`` are fitted to ``recordings`` (forces: already low-passed)."""
 
     name: str
     free: tuple[str, ...]
@@ -37,10 +37,10 @@ class Prepared:
     """A dataset as a calibration or a diagnosis uses it.
 
     Attributes:
-        spec: with mode and method decided.
-        model: with its effects.
+        spec: settings, with mode and method chosen.
+        model: the simulation, with the requested effects.
         stages: searches in their order; a joint calibration has one.
-        held_out: recordings that are never fitted, filtered like the others.
+        held_out: recordings that are never fitted, filtered like those that are.
     """
 
     spec: CalibrationSpec
@@ -55,7 +55,7 @@ class Prepared:
 
 
 def prepare(spec: CalibrationSpec, dataset: Dataset) -> Prepared:
-    """Decide model, stages and filters, without simulating; ValueError when the spec does not fit the dataset."""
+    """Choose model, stages and filters, without simulating; ValueError if ``spec`` does not fit ``dataset``."""
     spec = resolved(spec, dataset)
     model = model_for(dataset, spec)
     known = [gene.name for gene in model.genes]
@@ -77,7 +77,7 @@ def prepare(spec: CalibrationSpec, dataset: Dataset) -> Prepared:
 
 
 def _fitted(spec: CalibrationSpec, dataset: Dataset) -> tuple[Recording, ...]:
-    """The unfiltered recordings that are to be fitted."""
+    """Return the recordings to be fitted, unfiltered; ValueError if one is held out or repeated, or there is none."""
     for name, times in Counter(spec.recordings).items():
         if times > 1:
             raise ValueError(f"recording {name!r} is named {times} times; name it once")
@@ -99,22 +99,26 @@ def _stages(mode: Mode | None, free: tuple[str, ...], recordings: tuple[Recordin
 
 
 def as_fitted(spec: CalibrationSpec, recording: Recording) -> Recording:
-    """``recording`` as it is fitted: forces are low-passed, unless they already are or ``spec`` asks for no filter."""
+    """Return ``recording`` as it is fitted: forces low-passed, unless they already are or ``spec`` has no filter."""
     through = fitted_through(spec, recording)
     return recording if through in (None, recording.low_pass) else low_passed(recording, through)
 
 
 def fitted_through(spec: CalibrationSpec, recording: Recording) -> LowPass | None:
-    """The low-pass of the fitted forces, applied before or after recording; None for tracks and unfiltered forces."""
+    """Return the low-pass of the forces that are fitted, whoever applied it; None for tracks and unfiltered forces.
+
+    A recording that is already low-passed keeps its filter; otherwise ``spec`` defines it.
+    """
     if recording.kind == "tracks" or spec.low_pass == 0 or recording.low_pass is not None:
         return recording.low_pass
     return LowPass(spec.low_pass or default_cutoff(recording.condition.flap_frequency))
 
 
 def _staged(free: tuple[str, ...], recordings: tuple[Recording, ...]) -> tuple[Stage, ...]:
-    """Two stages: structural genes fitted to recordings in vacuum, aerodynamic genes to the others (thesis Fig. 2).
+    """Return two stages: structural genes in vacuum, aerodynamic genes in air (van der Grinten's thesis, Fig. 2).
 
-    Effects that are not aerodynamic act in vacuum as well, and are fitted there.
+    Genes of effects that are not aerodynamic are fitted in vacuum. A stage without genes is omitted. ValueError if a
+    stage has genes but no recordings.
     """
     vacuum = tuple(r for r in recordings if r.condition.airspeed == 0 and r.condition.pressure <= VACUUM_LIMIT)
     air = tuple(r for r in recordings if r not in vacuum)

@@ -1,4 +1,4 @@
-"""The only definition of misfit, and what an evaluator evaluates: a model, recordings and the genes that are free."""
+"""Defines the misfit of a genome, and a Problem: a model, recordings, and the genes that are searched."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ DEFAULT_AXES = ("x",)  # Armanini et al. 2016 fit the X force only
 
 @dataclass(frozen=True)
 class Problem:
-    """Everything that turns values of the free genes into misfits. Picklable; sent to workers once.
+    """All that is needed to compute misfits from values of the free genes. Picklable; sent to workers once.
 
-    ``free`` are the genes searched, in the order of the columns of a batch; all others keep their value in ``base``.
-    ``axes`` are the force axes that are fitted, by default DEFAULT_AXES; recordings of tracks are fitted whole.
+    ``free`` are the genes searched, in the order of the columns of a batch; all others have their value in ``base``.
+    ``axes`` are the force axes that are fitted, by default DEFAULT_AXES; of tracks, all coordinates are fitted.
     """
 
     model: Model
@@ -34,13 +34,13 @@ class Problem:
 
     @cached_property
     def key(self) -> str:
-        """Content hash, by which workers cache problems."""
+        """Hash of the contents, under which workers cache the problem."""
         return hashlib.sha256(
             pickle.dumps((self.model, self.recordings, self.free, self.base, self.axes), 5)
         ).hexdigest()
 
     def genomes(self, values: ArrayLike) -> Array:
-        """Full genomes [B, G] for ``values`` [B, F] of the free genes."""
+        """Return genomes [B, G] with all G genes of the model, from ``values`` [B, F] of the free genes."""
         batch = np.atleast_2d(np.asarray(values, float))
         if batch.shape[1] != len(self.free):
             raise ValueError(f"values need {len(self.free)} columns ({', '.join(self.free)}), got {batch.shape[1]}")
@@ -56,13 +56,14 @@ class Misfit:
 
     Attributes:
         squares: [B] sum of squares, inf for a failed individual. Of tracks: squared distance over frames and markers,
-            m^2 (thesis Eq. 14); of forces: squared difference over instants and fitted axes, N^2.
+            m^2 (van der Grinten's thesis, Eq. 14); of forces: squared difference over instants and fitted axes,
+            N^2.
         distance: [B] mean distance per marker and frame, m; of forces the RMS difference, N; inf for a failed one.
         samples: number of (frame, marker) pairs, or of (instant, axis) pairs, compared.
-        reasons: per individual, why it failed, else None.
+        reasons: [B] why an individual failed, None if it did not.
         residuals: [B, T, C] simulated minus recorded, m or N, NaN where not recorded or not fitted; None unless
             requested.
-        kind: whether of tracks or of forces.
+        kind: "tracks" or "forces", which were compared.
     """
 
     squares: Array
@@ -74,7 +75,7 @@ class Misfit:
 
 
 def misfit(problem: Problem, values: ArrayLike, recording: int, *, residuals: bool = False) -> Misfit:
-    """Misfit of ``values`` [B, F] to the problem's recording number ``recording``."""
+    """Simulate B individuals, ``values`` [B, F] of the free genes, and compare with recording no. ``recording``."""
     record = problem.recordings[recording]
     observed = problem.model.observe(problem.genomes(values), record)
     difference = observed.channels - record.values
@@ -100,7 +101,10 @@ def misfit(problem: Problem, values: ArrayLike, recording: int, *, residuals: bo
 
 
 def compared(recording: Recording, axes: tuple[str, ...] = ()) -> Mask:
-    """True [T, C] where a recording of forces is fitted: at instants at which every fitted axis was recorded."""
+    """Return True [T, C] for the values of forces that are fitted: those of ``axes``, at instants with all of them.
+
+    No ``axes``: DEFAULT_AXES. ValueError for an axis that was not recorded.
+    """
     axes = axes or DEFAULT_AXES
     for axis in axes:
         if axis not in recording.forces:
@@ -115,13 +119,13 @@ def compared(recording: Recording, axes: tuple[str, ...] = ()) -> Mask:
 
 @dataclass(frozen=True)
 class Evaluation:
-    """Misfits of B individuals to all R recordings of a problem."""
+    """Misfits of B individuals to all recordings of a problem, one Misfit for each recording."""
 
     per_recording: tuple[Misfit, ...]
 
     @property
     def fitness(self) -> Array:
-        """[B] total of the squares over the recordings, m^2 or N^2; inf for a failed individual."""
+        """Sum of squares of each individual [B] over all recordings, m^2 or N^2; inf for a failed individual."""
         total = np.zeros_like(self.per_recording[0].squares)
         for part in self.per_recording:
             total = total + part.squares
@@ -129,7 +133,7 @@ class Evaluation:
 
     @property
     def distance(self) -> Array:
-        """[B] over all recordings: mean distance per marker and frame, m; of forces the RMS difference, N."""
+        """Misfit of each individual [B] over all recordings: mean distance per marker and frame, m; forces: RMS, N."""
         total = np.zeros_like(self.per_recording[0].distance)
         for part in self.per_recording:
             total = total + (part.squares if part.kind == "forces" else part.distance * part.samples)
@@ -138,13 +142,13 @@ class Evaluation:
 
     @property
     def reasons(self) -> tuple[str | None, ...]:
-        """Per individual the first reason of failure, else None."""
+        """Why each individual [B] failed, the first reason; None if it did not fail."""
         columns = zip(*(part.reasons for part in self.per_recording), strict=True)
         return tuple(next((r for r in column if r is not None), None) for column in columns)
 
 
 def concatenate(parts: Sequence[Misfit]) -> Misfit:
-    """Join misfits of consecutive individuals to the same recording."""
+    """Join the misfits of consecutive groups of individuals to one recording."""
     residuals = [part.residuals for part in parts if part.residuals is not None]
     return Misfit(
         np.concatenate([part.squares for part in parts]),
@@ -157,5 +161,5 @@ def concatenate(parts: Sequence[Misfit]) -> Misfit:
 
 
 def base_genome(model: Model, values: Mapping[str, float] | None = None) -> Genome:
-    """The model's nominal genome with ``values`` changed."""
+    """Return the model's nominal genome with the genes in ``values`` (by name) changed."""
     return Genome.nominal(model.genes).replace(values or {})

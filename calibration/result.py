@@ -26,11 +26,12 @@ ADEQUATE = 1.3  # times the tracking noise: the largest misfit that noise is tak
 
 @dataclass(frozen=True)
 class GeneResult:
-    """One gene after the calibration. Shares are normalised to sum to one, and bounded by 0 and 1 in that form.
+    """One gene after a calibration; weights of a group (``Gene.share_of``) are divided by their sum, bounds 0 and 1.
 
-    ``standard_error`` is relative to the value (:mod:`wingfit.calibration.estimates.uncertainty`); ``identifiable``
-    is true for an error of at most 7.5 %, a value off its bounds, and a misfit that noise explains (ADEQUATE); None
-    where the gene was not searched. ``absolute_error`` is the standard error in ``unit``.
+    ``nominal`` is its value before, ``best`` after. ``standard_error`` is relative to the value
+    (:mod:`wingfit.calibration.estimates.uncertainty`), ``absolute_error`` in ``unit``. ``identifiable`` is true for an
+    error of at most 7.5 %, a value not at its bounds, and a misfit that noise explains (ADEQUATE). All three are None
+    if the gene was not searched.
     """
 
     name: str
@@ -47,7 +48,7 @@ class GeneResult:
 
     @classmethod
     def of(cls, gene: Gene, nominal: float, best: float, found: Standing | None) -> GeneResult:
-        """Result of ``gene``; ``found`` is its standard error, None where the gene was not searched."""
+        """Make the result of ``gene``; ``found`` has its standard error, or is None if the gene was not searched."""
         lower, upper = (gene.lower, gene.upper) if gene.share_of is None else (0.0, 1.0)
         error, identifiable, absolute = (
             (found.standard_error, found.identifiable, found.absolute) if found else [None] * 3
@@ -60,7 +61,10 @@ class GeneResult:
 
 @dataclass(frozen=True)
 class RecordingResult:
-    """Mean distance per marker (m) on one recording, with the nominal and with the best genome."""
+    """Misfit to one recording: mean distance per marker (m), ``before`` (nominal genome) and ``after`` (best genome).
+
+    ``stage`` is the stage that fitted the recording, None if none did; ``samples`` counts (frame, marker) pairs.
+    """
 
     name: str
     held_out: bool
@@ -72,10 +76,11 @@ class RecordingResult:
 
 @dataclass(frozen=True)
 class Result:
-    """Outcome of a calibration; distances in m, means over recordings weighted by samples.
+    """Outcome of a calibration on tracks; all distances in m, means over recordings weighted by samples.
 
-    ``noise`` is the mean distance by tracking noise alone, estimated from the scatter between beats.
-    ``remarks`` say in words what a reader must know before trusting the rest.
+    ``before`` and ``after`` are the mean distances of the nominal and of the best genome on the fitted recordings,
+    ``held_out_before`` and ``held_out_after`` on the held-out ones (None without any). ``noise`` is the mean distance
+    by tracking noise alone, from the scatter between beats, None if unknown. ``remarks`` are warnings about the result.
     """
 
     genes: tuple[GeneResult, ...]
@@ -90,10 +95,11 @@ class Result:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Simulated and recorded tracks of one recording, [T, M, 3] in m; NaN where not recorded.
+    """Simulated and recorded tracks of one recording, [T, M, 3] in m: T instants, M markers; NaN where not recorded.
 
-    ``phase`` is the phase of the beat in [0, 1), zero where the reference crosses the horizontal on the upstroke.
-    ``accuracy`` is the largest error (m) of a requested marker, ``solution`` the numerical effort.
+    ``phase`` [T] is the phase of the beat in [0, 1), zero where the reference markers cross the hinge's height on the
+    upstroke. ``accuracy`` is the largest numerical error (m) of a marker that the request allows, ``solution`` the
+    numerical steps and error of the simulation.
     """
 
     recording: str
@@ -107,7 +113,7 @@ class Comparison:
 
 @one_blas_thread
 def judge(spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, genome: Mapping[str, float]) -> Result:
-    """Compare a wing's ``genome`` (full, by name) with every recording of the dataset, held-out ones included."""
+    """Compare a wing's ``genome`` (all genes, by name) with every recording of ``dataset``, also held-out ones."""
     ready = prepare(spec, dataset)
     model, stages = wing_model(dataset, spec), ready.stages
     nominal, best = base_genome(model, spec.fixed), base_genome(model, genome)
@@ -157,7 +163,7 @@ def judge(spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, genome:
 
 @one_blas_thread
 def compare(spec: CalibrationSpec, dataset: Dataset, genome: Mapping[str, float], recording: str) -> Comparison:
-    """Tracks of ``genome`` over the recording called ``recording``; ValueError when the simulation fails."""
+    """Simulate the recording called ``recording`` with ``genome`` (values by name); ValueError if it fails."""
     model = wing_model(dataset, spec)
     record = dataset.recording(recording)
     observed = model.observe([base_genome(model, genome).values], record)
@@ -192,7 +198,7 @@ def _genes(
 
 
 def _at_bound(gene: Gene, best: Genome) -> bool:
-    """Whether the search was stopped by the box: within a hundredth of it from either side."""
+    """Return whether the best value is at a bound: within a hundredth of the range, in the gene's scale."""
     return not 0.01 < float(gene.to_unit(best[gene.name])) < 0.99
 
 

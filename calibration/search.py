@@ -31,17 +31,17 @@ Population = genetic.Population | cma.Distribution
 
 @dataclass(frozen=True)
 class Generation:
-    """Progress after one generation; ``checkpoint`` (JSON) is all that is needed to resume from here.
+    """Progress after one generation; a calibration can be resumed from its ``checkpoint`` (JSON).
 
-    A Gauss-Newton iteration is a generation too. It minimises the cost of Eq. 22, which weighs recordings and channels
-    by their noise, so that its ``best`` need not fall every time.
+    A Gauss-Newton iteration is a generation too. It minimises the cost of Armanini et al. 2016, Eq. 22, which weighs
+    recordings and channels by their noise, so that ``best`` need not fall in every iteration.
 
     ``best`` and ``mean`` are sums of squares, m^2 or N^2; ``distance`` is the best individual's misfit, m or N
-    (:class:`wingfit.calibration.problem.Misfit`); ``diversity`` the mean over the free genes of the population's
-    standard deviation in unit coordinates (of an iteration: the largest move of a gene); ``failed`` counts this
-    generation's failed individuals, of which ``reasons`` lists up to ten different ones; ``genome`` is full;
-    ``progress`` is a fraction of the whole calibration (an estimate, non-decreasing, 1 only at the end). In
-    ``checkpoint``, ``found`` maps the names of the stages so far to the best full genome of each.
+    (:class:`wingfit.calibration.problem.Misfit`); ``diversity`` is the standard deviation of the population, genes
+    scaled to 0..1, mean over the free genes (of an iteration: the largest move of a gene); ``evaluations`` counts
+    individuals simulated since the start; ``failed`` counts the generation's failed individuals, with up to ten
+    different ``reasons``; ``genome`` is the best, all genes by name; ``progress`` estimates the finished part of
+    the calibration (never decreases, 1 only at the end). In ``checkpoint``, ``found`` has the best genome by stage.
     """
 
     stage: str
@@ -62,9 +62,10 @@ class Generation:
 def calibrate(
     spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, checkpoint: dict[str, Any] | None = None
 ) -> Iterator[Generation]:
-    """Run the calibration, yielding after each generation; with ``checkpoint``, go on from there.
+    """Run the calibration, and yield its progress after each generation; a ``checkpoint`` resumes an earlier run.
 
-    Resumed equals uninterrupted, bit for bit. ValueError when the spec does not fit the dataset.
+    A resumed run gives the same results as an uninterrupted one, bit for bit. ValueError if ``spec`` does not fit
+    ``dataset``.
     """
     ready = prepare(spec, dataset)
     spec = ready.spec
@@ -81,15 +82,16 @@ def calibrate(
 
 
 def found(spec: CalibrationSpec, dataset: Dataset, checkpoint: dict[str, Any]) -> dict[str, dict[str, float]]:
-    """Full genome of each stage so far, by name, from the last generation's checkpoint."""
+    """Return the best genome (all genes, by name) of each stage in ``checkpoint``, by name of the stage."""
     return _State.from_json(checkpoint, resolved(spec, dataset)).found
 
 
 @dataclass
 class _State:
-    """Everything on which the next generation depends.
+    """State of a calibration between generations, from which it continues; ``stage`` is the number of the stage.
 
-    ``base`` is the genome that a stage starts from; ``newton`` the checkpoint of a Gauss-Newton iteration under way.
+    ``base`` is the genome from which the stage starts, ``population`` the state of its search, ``found`` the best
+    genome of each stage, ``newton`` the checkpoint of its Gauss-Newton iterations (None before the first).
     """
 
     stage: int
@@ -120,7 +122,7 @@ def _empty(spec: CalibrationSpec) -> Population:
 
 
 class _Run:
-    """The search of one stage; ``state`` is replaced after every generation."""
+    """The search of one stage; ``state`` is updated after every generation."""
 
     def __init__(self, ready: Prepared, state: _State, evaluator: Evaluator) -> None:
         self.spec, self.stages, self.state, self.evaluator = ready.spec, ready.stages, state, evaluator
@@ -130,21 +132,21 @@ class _Run:
         self.genes = free_genes(self.problem)
 
     def search(self) -> Iterator[Generation]:
-        """Generations of the genetic search or of CMA-ES until it stalls."""
+        """Yield generations of the genetic search or of CMA-ES until the best fitness no longer improves."""
         while not _ended(self.state.population, self.spec):
             yield self._generation()
 
     def iterations(self) -> Iterator[Generation]:
-        """Gauss-Newton iterations, from where the search ended or from the base, to convergence."""
+        """Yield Gauss-Newton iterations until they converge; start: result of the search or, without one, the base."""
         start = self.state.found.get(self.stage.name, self.state.base)
         limit = ITERATIONS
-        if self.spec.method == "gauss_newton":  # a finish goes to the end, however short the search before it was
+        if self.spec.method == "gauss_newton":  # after a search, the limit of its generations does not apply
             limit = min(ITERATIONS, self.spec.max_generations)
         for step in iterate(self.problem, self.evaluator, start, self.state.newton, limit):
             yield self._iteration(step, step.converged or step.index + 1 >= limit)
 
     def _generation(self) -> Generation:
-        """One generation: make children, evaluate them and select the survivors."""
+        """Compute one generation: draw individuals, simulate them, and update the population."""
         spec, state, name = self.spec, self.state, self.stage.name
         unit = self._drawn()
         evaluation = self.evaluator.evaluate(self.problem, values_at(self.genes, unit))
@@ -191,7 +193,7 @@ class _Run:
         self, genome: dict[str, float], evaluated: int, progress: float, stage: str, index: int,
         best: float, mean: float, diversity: float, distance: float, reasons: list[str],
     ) -> Generation:  # fmt: skip
-        """Update the state with a finished generation, and return the report on it."""
+        """Update the state with the finished generation, and return its progress; ``evaluated``: new individuals."""
         state = self.state
         state.found[self.stage.name] = dict(genome)
         state.evaluations += evaluated
@@ -212,7 +214,10 @@ class _Run:
         )
 
     def _progress(self) -> float:
-        """Fraction done, assuming EXPECTED_GENERATIONS generations, or as many more as the stall limit still allows."""
+        """Estimate the finished fraction of the calibration.
+
+        EXPECTED_GENERATIONS generations are assumed, or more if the search cannot end before.
+        """
         population, spec = self.state.population, self.spec
         done = population.generation + 1
         left = 0 if _ended(population, spec) else max(spec.stall - population.stall, EXPECTED_GENERATIONS - done)
@@ -226,7 +231,7 @@ def _ended(population: Population, spec: CalibrationSpec) -> bool:
 
 
 def _leader(population: Population) -> tuple[float, float, list[float]]:
-    """Fitness, distance and unit coordinates of the best individual."""
+    """Return fitness, distance and genes (scaled to 0..1) of the best individual."""
     if isinstance(population, cma.Distribution):
         return population.fitness, population.distance, population.unit
     return population.fitness[0], population.distance[0], population.unit[0]

@@ -18,31 +18,34 @@ Method = Literal["genetic", "cma_es", "gauss_newton"]
 
 @dataclass(frozen=True)
 class CalibrationSpec:
-    """What to calibrate and how; defaults are the thesis's (IV-E) for a wing, those of Armanini et al. for a vehicle.
+    """Settings of a calibration.
+
+    Defaults are those of van der Grinten's thesis (IV-E) for a wing, of Armanini et al. (2016) for a vehicle.
 
     Attributes:
-        division: preset ("4", "11", "24") or strips as "3,3,3,2" (bodies along the chord of each strip, root first).
+        division: rigid bodies of the simulated wing: a number ("4", "11", "24"), or bodies along the chord of each
+            strip of the span, root first ("3,3,3,2").
         mode: "staged" (wings) fits structural genes on vacuum recordings, then aerodynamic ones on the rest; "joint"
-            fits all on all; "local" (vehicles) fits each recording by itself. None: staged for a wing, local for a
-            vehicle.
+            fits all genes to all recordings; "local" (vehicles) fits each recording by itself. None: staged for a
+            wing, local for a vehicle.
         population: individuals per generation.
         stall: generations without improvement of the best fitness after which a search ends.
-        tolerance: relative improvement that counts as one.
-        max_generations: per stage; of Gauss-Newton, iterations.
-        seed: the same seed gives the same numbers, bit for bit.
-        bounds_factor: the box is [estimate / factor, estimate * factor]; for wings only.
-        accuracy: largest error (m) of any simulated marker at any instant (`sim/solver/numerics.py`).
-        recordings: names to fit; empty means all that are not held out.
-        genes: names to search; empty means those that the model searches by itself.
-        fixed: values of genes that keep them instead of their estimates.
+        tolerance: smallest relative decrease of the best fitness that counts as an improvement.
+        max_generations: largest number of generations of a stage, or of Gauss-Newton iterations.
+        seed: of the random generators; the same seed gives the same results, bit for bit.
+        bounds_factor: genes are searched in [estimate / factor, estimate * factor]; for wings only.
+        accuracy: largest numerical error (m) of any simulated marker at any instant (`sim/solver/numerics.py`).
+        recordings: names of recordings to fit; empty means all that are not held out.
+        genes: names of genes to search; empty means those that the model searches by default.
+        fixed: values, by name, of genes that are not searched and have these values instead of their estimates.
         method: how a stage is searched. None: genetic for a wing, Gauss-Newton for a vehicle.
         finish: whether Gauss-Newton follows each stage's search.
         preset: blade-element model (:data:`wingfit.sim.vehicle.terms.PRESETS`); for vehicles only.
-        without: names of its terms that are left out.
-        axes: force axes that are fitted.
-        low_pass: cut-off in Hz through which forces go before they are fitted. None: 3.2 times the flap frequency, the
-            seed's 40 Hz at 12.5 Hz; 0: none. Recordings that say that they have been filtered stay as they are.
-        peel_width: beats over which the end of the peel is smoothed.
+        without: names of terms of the preset that are omitted.
+        axes: force axes that are fitted, of "x" and "z".
+        low_pass: cut-off (Hz) of the low-pass for forces before they are fitted. None: 3.2 times the flap frequency
+            (Armanini et al.: 40 Hz at 12.5 Hz); 0: none. Recordings with a ``low_pass`` of their own are not filtered.
+        peel_width: beats over which the end of the peel (wings that touched have separated) is smoothed.
         effects: names of effects (`sim/effects/registry.py`) that the model contains; their genes start
             switched off and are searched, within bounds of their own, by default.
     """
@@ -70,7 +73,7 @@ class CalibrationSpec:
 
 
 def resolved(spec: CalibrationSpec, dataset: Dataset) -> CalibrationSpec:
-    """``spec`` with mode and method decided; ValueError for one that does not exist or does not fit the dataset."""
+    """Return ``spec`` with mode and method chosen; ValueError if one does not exist or does not fit ``dataset``."""
     wing = dataset.kind == "tracks"
     mode, method = spec.mode or ("staged" if wing else "local"), spec.method or ("genetic" if wing else "gauss_newton")
     for what, value, known in (("mode", mode, get_args(Mode)), ("method", method, get_args(Method))):
@@ -90,7 +93,7 @@ def resolved(spec: CalibrationSpec, dataset: Dataset) -> CalibrationSpec:
 
 
 def wing_model(dataset: Dataset, spec: CalibrationSpec) -> FlexibleWing:
-    """The model of a dataset of a wing, solved to ``spec.accuracy``; ValueError where one of them is impossible."""
+    """Return the model of a dataset of a wing; ValueError for an impossible discretisation, estimate or effect."""
     numerics = Numerics(accuracy=spec.accuracy)
     model = FlexibleWing(dataset.wing, spec.division, spec.bounds_factor, numerics, spec.effects)
     _ = model.structure, model.genes
@@ -98,7 +101,7 @@ def wing_model(dataset: Dataset, spec: CalibrationSpec) -> FlexibleWing:
 
 
 def vehicle_model(dataset: Dataset, spec: CalibrationSpec) -> BladeElementWing:
-    """The model of a dataset of a vehicle; ValueError for a term or effect that there is not."""
+    """Return the model of a dataset of a vehicle; ValueError for a term or effect that does not exist."""
     terms = chosen(spec.preset, spec.without)
     model = BladeElementWing(dataset.vehicle, terms, peel_width=spec.peel_width, effects=spec.effects)
     _ = model.genes
@@ -106,5 +109,5 @@ def vehicle_model(dataset: Dataset, spec: CalibrationSpec) -> BladeElementWing:
 
 
 def model_for(dataset: Dataset, spec: CalibrationSpec) -> FlexibleWing | BladeElementWing:
-    """The model for the kind of the dataset."""
+    """Return the model for ``dataset``: of a flexible wing for tracks, of a blade-element wing for forces."""
     return wing_model(dataset, spec) if dataset.kind == "tracks" else vehicle_model(dataset, spec)

@@ -1,4 +1,4 @@
-"""The outcome of a calibration of either kind, from its last checkpoint."""
+"""Summarises a calibration, on tracks or on forces, from its last checkpoint."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from wingfit.records.blas_threads import one_blas_thread
 def summarise(
     spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, checkpoint: dict[str, Any]
 ) -> Result | ForceResult:
-    """The result of a calibration's last ``checkpoint`` on every recording of the dataset, held-out ones included."""
+    """Compare the result in the last ``checkpoint`` with every recording of ``dataset``, held-out ones included."""
     if dataset.kind == "forces":
         return summarise_forces(spec, dataset, evaluator, checkpoint)
     (*_, genome) = found(spec, dataset, checkpoint).values()

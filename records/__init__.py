@@ -1,4 +1,4 @@
-"""The data of wingfit: wings, vehicles, conditions, recordings, genes, and their files. No physics is computed here.
+"""Data classes of wingfit: wings, vehicles, conditions, recordings, genes; and their files. No physics is computed.
 
 All quantities are SI, angles in radians; unit suffixes appear only in files and over HTTP.
 Axes (docs/notation.md) of a wing: x aft along the chord, y outboard along the span, z up, the hinge axis parallel to x;

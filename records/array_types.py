@@ -1,4 +1,4 @@
-"""Types of arrays. Tests check the shape that ``Float[Array, "T C"]`` names (docs/decisions/0017-array-shapes.md)."""
+"""Types of arrays. ``Float[Array, "T C"]`` names the shape, which tests check (docs/decisions/0017-array-shapes.md)."""
 
 import numpy as np
 import numpy.typing as npt

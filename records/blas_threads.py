@@ -1,8 +1,9 @@
-"""Linear algebra on one thread, so that results do not depend on the number of threads of the machine.
+"""Runs linear algebra on one thread, so that results do not depend on the number of threads of the machine.
 
-BLAS divides a product among its threads, and the rounding depends on the division. A difference in the last bit can
+BLAS splits a matrix product among its threads, and the rounding depends on the split. A difference in the last bit can
 change the outcome of a search or of a significance test. All code that computes numbers of a result therefore runs with
-one BLAS thread (docs/decisions/0012-threads.md), for any setting of the environment, and the setting is restored then.
+one BLAS thread (docs/decisions/0012-threads.md), whatever number the environment sets; the former number is
+restored afterwards.
 """
 
 from __future__ import annotations
@@ -26,14 +27,17 @@ _PREFIXES, _SUFFIXES = ("scipy_", ""), ("64_", "_64", "")
 
 
 class _Library(NamedTuple):
-    """Functions that read and set the number of threads of a BLAS library."""
+    """The functions of one loaded BLAS library that return (``get``) and change (``set``) its number of threads."""
 
     get: Callable[[], int]
     set: Callable[[int], object]
 
 
 def _library(found: LibController) -> _Library:
-    """Thread functions of a library; OpenBLAS's own, since threadpoolctl 3.8 sets it only from the first thread."""
+    """Return the functions that read and set the number of threads of the library ``found``.
+
+    OpenBLAS's own functions are called, since those of threadpoolctl 3.8 work only in the first thread of a process.
+    """
     if found.internal_api == "openblas" and found.threading_layer != "openmp":
         handle = ctypes.CDLL(found.filepath)
         for prefix, suffix in itertools.product(_PREFIXES, _SUFFIXES):
@@ -44,11 +48,11 @@ def _library(found: LibController) -> _Library:
 
 
 class OneBlasThread:
-    """Limits every loaded BLAS library to one thread; a context manager and a decorator.
+    """Context manager and decorator that limits every loaded BLAS library to one thread.
 
-    The setting belongs to the process. It holds while any thread is inside; the last thread to leave restores the
-    setting from before the first one entered. It takes a few microseconds and may be nested. A decorated generator is
-    inside only while it computes its next item, not between items.
+    The limit belongs to the process. It holds while any thread is inside such a block; the last thread to leave
+    restores the numbers of threads from before the first one entered. Entering takes a few microseconds, and blocks may
+    be nested. A decorated generator is inside only while it computes its next item, not between items.
     """
 
     def __init__(self) -> None:
@@ -83,7 +87,7 @@ class OneBlasThread:
                     self._libraries[path].set(threads)
 
     def __call__(self, function: F) -> F:
-        """``function``, or each step of the generator it returns, with one BLAS thread."""
+        """Wrap ``function`` so that it runs with one BLAS thread; if it is a generator, each of its steps does."""
 
         @wraps(function)
         def call(*args: Any, **kwargs: Any) -> Any:
@@ -111,7 +115,7 @@ class OneBlasThread:
             generator.close()
 
     def _scan(self) -> None:
-        """Find the BLAS libraries that are loaded; takes about a millisecond."""
+        """Add the BLAS libraries that are loaded to ``_libraries``, by file; takes about a millisecond."""
         self._modules = len(sys.modules)
         found = ThreadpoolController().select(user_api="blas").lib_controllers
         self._libraries |= {one.filepath: _library(one) for one in found if one.filepath not in self._libraries}

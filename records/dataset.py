@@ -1,4 +1,4 @@
-"""Conditions, recordings and datasets. SI units, radians; a missing sample is NaN with ``valid`` False."""
+"""Conditions, recordings and datasets, in SI units and radians; a missing sample is NaN."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ STANDARD_GRAVITY = 9.80665
 
 @dataclass(frozen=True)
 class Condition:
-    """Setting of the rig during one recording.
+    """What was set for one recording of a rig (the measured wing or vehicle with its drive).
 
     Attributes:
         flap_frequency: beats per second, Hz.
@@ -31,7 +31,7 @@ class Condition:
         airspeed: speed of the airstream along +x (aft) at zero angle of attack, m/s.
         angle_of_attack: of the rig in the airstream, rad; positive turns the stream upwards. Of a vehicle in level
             flight it is the body pitch theta_b (Armanini et al. 2016, Eq. 16).
-        gravity: m/s^2, along -z.
+        gravity: gravitational acceleration, m/s^2, downwards.
     """
 
     flap_frequency: float
@@ -47,7 +47,7 @@ class Condition:
 class LowPass:
     """Zero-phase low-pass: a Butterworth filter run forwards and backwards.
 
-    ``cutoff`` (Hz) is the half-power frequency of one pass; ``order`` is that of one pass.
+    ``cutoff`` is the half-power frequency (Hz) of one pass, ``order`` the order of the filter of one pass.
     """
 
     cutoff: float
@@ -56,13 +56,13 @@ class LowPass:
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """Measurements under one condition: tracks of markers, or forces of a vehicle.
+    """Measurements under one condition: tracks (positions over time) of markers, or forces of a vehicle.
 
-    ``values`` [T, C] are the channels at the increasing ``times`` [T] (s): three per marker in the order x, y, z (m,
-    wing frame), or one per force axis (N, body axes, force of the wings on the body). ``standard_deviation`` [C] is the
-    known noise of the channels, or None. Times of forces count from the start of a beat. ``low_pass`` is the filter
-    that was applied to the values, and which a model applies too. ``motion`` of the wings and ``mass`` (kg) of the
-    vehicle replace those of the vehicle's description in this recording.
+    ``values`` [T, C] are C channels at the T increasing ``times`` (s): three per marker in the order x, y, z (m, wing
+    frame), or one per axis in ``forces`` (N, body axes, force of the wings on the body). ``markers`` names the markers,
+    none for forces. ``standard_deviation`` [C] is that of the noise, None if unknown. Times of forces count from the
+    start of a beat. ``low_pass`` is the filter that was applied to the values; a model applies the same filter.
+    ``motion`` of the wings and ``mass`` (kg), if given, replace those of the vehicle's description in this recording.
     """
 
     name: str
@@ -79,29 +79,29 @@ class Recording:
 
     @cached_property
     def valid(self) -> Bool[Mask, "T C"]:
-        """True where a channel was recorded, [T, C]."""
+        """True [T, C] where a value was recorded, False where it is missing (NaN)."""
         return np.isfinite(self.values)
 
     @property
     def kind(self) -> Kind:
-        """Whether the recording holds tracks or forces."""
+        """Return "forces" or "tracks", which the recording holds."""
         return "forces" if self.forces else "tracks"
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """Names of the columns of ``values``: ``<marker>_x``, ``_y``, ``_z`` of each, or ``force_x``, ``force_z``."""
+        """Names of the columns of ``values``: MARKER_x, MARKER_y, MARKER_z of each marker, or force_x, force_z."""
         tracks = tuple(f"{marker}_{axis}" for marker in self.markers for axis in "xyz")
         return tracks + tuple(f"force_{axis}" for axis in self.forces)
 
     @property
     def positions(self) -> Float[Array, "T M 3"]:
-        """``values`` of a recording of tracks as [T, M, 3]."""
+        """Return the ``values`` of a recording of tracks as positions [T, M, 3] in m: M markers, axes x, y, z."""
         return self.values.reshape(len(self.times), len(self.markers), 3)
 
 
 @dataclass(frozen=True)
 class Dataset:
-    """A wing with recordings of tracks, or a vehicle with recordings of forces.
+    """A wing with recordings of tracks, or a vehicle with recordings of forces; ``rig`` describes the wing or vehicle.
 
     Recordings named in ``held_out`` are used for validation only, never for fitting.
     """
@@ -114,25 +114,25 @@ class Dataset:
 
     @property
     def kind(self) -> Kind:
-        """Whether the recordings hold tracks or forces."""
+        """Return "tracks" or "forces", which all recordings hold."""
         return "tracks" if isinstance(self.rig, Wing) else "forces"
 
     @property
     def wing(self) -> Wing:
-        """The wing; ValueError for a dataset of a vehicle."""
+        """Return the wing that was recorded; ValueError if the dataset is one of a vehicle."""
         if not isinstance(self.rig, Wing):
             raise ValueError(f"dataset {self.name!r} describes a vehicle with forces; this needs a wing with tracks")
         return self.rig
 
     @property
     def vehicle(self) -> Vehicle:
-        """The vehicle; ValueError for a dataset of a wing."""
+        """Return the vehicle that was recorded; ValueError if the dataset is one of a wing."""
         if not isinstance(self.rig, Vehicle):
             raise ValueError(f"dataset {self.name!r} describes a wing with tracks; this needs a vehicle with forces")
         return self.rig
 
     def recording(self, name: str) -> Recording:
-        """The recording called ``name``."""
+        """Return the recording called ``name``; ValueError if there is none."""
         for recording in self.recordings:
             if recording.name == name:
                 return recording
@@ -141,10 +141,10 @@ class Dataset:
         )
 
     def select(self, names: Iterable[str]) -> tuple[Recording, ...]:
-        """The recordings called ``names``, in that order."""
+        """Return the recordings called ``names``, in the order of ``names``; ValueError for an unknown name."""
         return tuple(self.recording(name) for name in names)
 
     @property
     def fitted(self) -> tuple[Recording, ...]:
-        """The recordings that a calibration may fit."""
+        """Return the recordings that a calibration may fit: all that are not held out."""
         return tuple(r for r in self.recordings if r.name not in self.held_out)

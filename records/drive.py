@@ -13,7 +13,10 @@ from wingfit.records.array_types import Complex
 
 @dataclass(frozen=True)
 class FourierSeries:
-    """An angle (rad) over the beat: mean + sum_k [cosine[k-1] cos(k psi) + sine[k-1] sin(k psi)], k = 1, 2, ..."""
+    """An angle (rad) over the beat: mean + sum_k [cosine[k-1] cos(k psi) + sine[k-1] sin(k psi)], k = 1, 2, ...
+
+    psi is the phase of the beat, from 0 to 2 pi; all coefficients are in rad.
+    """
 
     mean: float
     cosine: tuple[float, ...]
@@ -22,21 +25,22 @@ class FourierSeries:
 
     @property
     def series(self) -> Complex:
-        """Coefficients c_0, ..., c_K of the same series as Re sum_k c_k exp(i k psi)."""
+        """Complex coefficients c_0, ..., c_K (rad) of the angle written as Re sum_k c_k exp(i k psi); K harmonics."""
         pairs = zip_longest(self.cosine, self.sine, fillvalue=0.0)
         return np.array([self.mean, *(complex(c, -s) for c, s in pairs)], np.complex128)
 
 
 class FourierDrive(FourierSeries):
-    """Flap angle of the driving rods as a Fourier series of the drive phase psi."""
+    """Flap angle of the driving rods as a Fourier series of the drive phase psi, which grows by 2 pi in a beat."""
 
 
 @dataclass(frozen=True)
 class FourBarDrive:
-    """Crank-rocker four-bar linkage: a motor turns the crank, the rocker carries the driving rod (thesis III-F).
+    """Crank-rocker four-bar linkage: a motor turns the crank, the rocker carries the driving rod.
 
-    Lengths in m; ``ground`` is the distance of the two fixed pivots. The crank angle equals the drive phase psi.
-    ``offset`` is added to the rocker angle so that zero flap angle is the horizontal wing (rad).
+    From van der Grinten's thesis, III-F. Lengths of the links in m; ``ground`` is the distance of the two fixed pivots.
+    The crank angle equals the drive phase psi. ``offset`` (rad) is added to the rocker angle so that the wing is
+    horizontal at zero flap angle.
     """
 
     ground: float

@@ -1,4 +1,4 @@
-"""The exception of the file formats, a list of faults: what is wrong, where, and what to do about it."""
+"""The exception for a dataset that is not valid: it lists faults, each with what is wrong, where, and a remedy."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _SHOWN = 80
 
 @dataclass(frozen=True)
 class Fault:
-    """One error: ``where`` (file with line or key), the offending ``value``, ``message`` with the remedy."""
+    """One error: ``where`` (file with line or key), the wrong ``value`` as text or None, ``message`` with a remedy."""
 
     where: str
     value: str | None
@@ -24,10 +24,10 @@ class Fault:
 
 
 class DatasetError(ValueError):
-    """A dataset that cannot be read or written.
+    """Raised for a dataset that cannot be read or written.
 
-    ``errors`` lists the first faults, at most ``MAX_ERRORS``; ``count`` is the number of all. ``where``, ``value`` and
-    ``message`` are those of the first.
+    ``errors`` lists the first faults, at most ``MAX_ERRORS``; ``count`` is the number of all faults that were detected.
+    ``where``, ``value`` and ``message`` are those of the first fault.
     """
 
     def __init__(self, errors: Sequence[Fault], count: int | None = None) -> None:
@@ -48,48 +48,52 @@ class DatasetError(ValueError):
 
 
 class Faults:
-    """Collects faults, so that one error reports several; counts all, stores the first ``MAX_ERRORS``."""
+    """Collects faults, so that one DatasetError reports several; counts all, stores the first ``MAX_ERRORS``."""
 
     def __init__(self) -> None:
         self.faults: list[Fault] = []
         self.count = 0
 
     def add(self, where: str, value: object, message: str) -> None:
-        """Add one fault."""
+        """Add one fault: the ``message`` about a ``value`` at ``where`` (file with line or key)."""
         self.count += 1
         if len(self.faults) < MAX_ERRORS:
             self.faults.append(Fault(where, shown(value), message))
 
     def extend(self, error: DatasetError) -> None:
-        """Add the faults of another error."""
+        """Add the faults that ``error`` lists, and count all that it counts."""
         self.faults.extend(error.errors[: MAX_ERRORS - len(self.faults)])
         self.count += error.count
 
     @property
     def full(self) -> bool:
-        """Whether no more faults will be reported, so that the search for them can stop."""
+        """Return whether ``MAX_ERRORS`` faults are counted: more are not stored, so that the search can stop."""
         return self.count >= MAX_ERRORS
 
     def raise_any(self) -> None:
-        """Raise DatasetError if there is a fault."""
+        """Raise DatasetError with the collected faults, if there are any."""
         if self.faults:
             raise DatasetError(self.faults, self.count)
 
 
 def fail(where: str, value: object, message: str) -> DatasetError:
-    """Make a DatasetError with one fault, to be raised."""
+    """Return a DatasetError with one fault, which the caller raises; the arguments are those of Fault."""
     return DatasetError([Fault(where, shown(value), message)])
 
 
 def check_most(where: str, what: str, found: float, most: float, unit: str, remedy: str) -> None:
-    """DatasetError unless ``found`` is at most ``most``, for messages such as "has 5 rows; at most 4 rows are read"."""
+    """Raise DatasetError if ``found`` is more than ``most``.
+
+    The message is "WHAT FOUND UNIT; at most MOST UNIT are read: REMEDY", with the arguments in capitals filled in;
+    ``where`` is the file or place that it is about.
+    """
     if found > most:
         number = f"{round(found, 1):.15g}"
         raise fail(where, number, f"{what} {number} {unit}; at most {most:.9g} {unit} are read: {remedy}".lstrip())
 
 
 def shown(value: object) -> str | None:
-    """``value`` as short text for a message."""
+    """Return ``value`` as text of at most 80 characters for a message ("list of 3" for a container); None for None."""
     if value is None:
         return None
     if isinstance(value, (dict, list, tuple)):
@@ -99,7 +103,7 @@ def shown(value: object) -> str | None:
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
-    """Hint for an unknown name: the most similar known name, or the list of known names."""
+    """Return a hint about the unknown ``name``: the most similar of the ``known`` names, or a list of these."""
     names = list(known)
     close = difflib.get_close_matches(name, names, 1, 0.6)
     if close:
@@ -109,7 +113,7 @@ def nearest(name: str, known: Iterable[str]) -> str:
 
 
 def decode(raw: bytes, file: str) -> str:
-    """UTF-8 text of a file, a byte-order mark removed; DatasetError names the line that is not UTF-8."""
+    """Decode the UTF-8 file ``raw``, drop a byte-order mark; DatasetError names the line with a wrong byte."""
     try:
         return raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:

@@ -15,16 +15,17 @@ Scale = Literal["log", "linear"]
 
 
 class EstimateError(ValueError):
-    """An estimate of the dataset that the model refuses: of an unknown gene, or outside the gene's bounds."""
+    """Raised if a dataset has an estimate of a gene that its model does not have, or one that cannot be right."""
 
 
 @dataclass(frozen=True)
 class Gene:
     """One parameter that a calibration may search, bounded by ``lower`` and ``upper``, in ``unit``.
 
-    ``nominal`` is its value without a calibration; ``scale`` ("linear", "log") spreads a search over the bounds.
-    ``share_of`` names a group whose values are weights: the model divides each by the sum of its group, so
-    that the shares sum to one for every genome (thesis Eqs. 12-13).
+    ``nominal`` is its value without a calibration. ``scale`` says how a search spreads its values between the bounds:
+    evenly ("linear") or evenly in the logarithm ("log"). ``share_of`` names a group of genes whose values are weights:
+    the model divides each by the sum of its group, so that these shares of a total (the lift of a strip,
+    by quarters of its chord) always add up to one (van der Grinten's thesis, Eqs. 12-13). None: the gene is no weight.
     """
 
     name: str
@@ -45,21 +46,21 @@ class Gene:
         self.check(self.nominal)
 
     def check(self, value: float) -> None:
-        """Raise ValueError naming the value, the limits and the unit when ``value`` is not admissible."""
+        """Raise ValueError, which names value, bounds and unit, if ``value`` is not finite or outside the bounds."""
         if not (math.isfinite(value) and self.lower <= value <= self.upper):
             unit = "" if self.unit == "1" else f" {self.unit}"
             bounds = f"[{self.lower:g}, {self.upper:g}]{unit}"
             raise ValueError(f"gene '{self.name}' is {value:g}{unit}; it must lie in {bounds}")
 
     def to_unit(self, value: ArrayLike) -> Float[Array, "*B"]:
-        """Map values between the bounds to [0, 1], logarithmically for a log-scaled gene."""
+        """Map values (in ``unit``, any shape) from [lower, upper] to [0, 1], logarithmically for a log-scaled gene."""
         v = np.asarray(value, float)
         if self.scale == "log":
             return np.asarray(np.log(v / self.lower) / math.log(self.upper / self.lower))
         return np.asarray((v - self.lower) / (self.upper - self.lower))
 
     def from_unit(self, u: ArrayLike) -> Float[Array, "*B"]:
-        """Inverse of :meth:`to_unit`, clipped to the bounds."""
+        """Map ``u`` (any shape) from [0, 1] to values between the bounds, the inverse of :meth:`to_unit`; clipped."""
         x = np.asarray(u, float)
         if self.scale == "log":
             value = self.lower * np.exp(x * math.log(self.upper / self.lower))
@@ -70,7 +71,7 @@ class Gene:
 
 @dataclass(frozen=True)
 class Genome:
-    """Values of genes, in the order of ``genes``."""
+    """One value for each gene, in the order of ``genes``; ValueError if one lies outside the bounds of its gene."""
 
     genes: tuple[Gene, ...]
     values: tuple[float, ...]
@@ -83,18 +84,18 @@ class Genome:
 
     @classmethod
     def nominal(cls, genes: Sequence[Gene]) -> Genome:
-        """The genome of all nominal values."""
+        """Return the genome in which every gene has its nominal value."""
         return cls(tuple(genes), tuple(gene.nominal for gene in genes))
 
     def __getitem__(self, name: str) -> float:
         return self.as_dict()[name]
 
     def as_dict(self) -> dict[str, float]:
-        """Values by gene name."""
+        """Return the values by name of the gene."""
         return {gene.name: value for gene, value in zip(self.genes, self.values, strict=True)}
 
     def replace(self, values: Mapping[str, float]) -> Genome:
-        """Return a genome with the named values changed; an unknown name raises ValueError with the known ones."""
+        """Return a genome with ``values`` (by name) changed; ValueError for an unknown name or an impossible value."""
         known = self.as_dict()
         unknown = sorted(set(values) - set(known))
         if unknown:
@@ -103,7 +104,7 @@ class Genome:
         return Genome(self.genes, tuple(merged[gene.name] for gene in self.genes))
 
     def normalised(self) -> dict[str, float]:
-        """Values by name, with every share group divided by its sum: the values that the model uses."""
+        """Return the values that the model uses, by gene name: weights (``share_of``) divided by their group's sum."""
         sums: dict[str, float] = {}
         pairs = list(zip(self.genes, self.values, strict=True))
         for gene, value in pairs:

@@ -1,4 +1,4 @@
-"""Limits of a dataset. Uploads are not trusted: sizes are checked before memory is allocated."""
+"""Limits of sizes and values in a dataset. Uploads are not trusted: sizes are checked before memory is allocated."""
 
 MIB = 2**20
 

@@ -18,7 +18,7 @@ _PI = Decimal("3.14159265358979323846264338327950288419716939937510582097494459"
 
 @dataclass(frozen=True)
 class Unit:
-    """A unit of the files: SI value = ``factor`` x value + ``offset``."""
+    """A unit used in files: SI value = ``factor`` x value in this unit + ``offset``."""
 
     factor: Decimal = Decimal(1)
     offset: Decimal = Decimal(0)
@@ -31,7 +31,7 @@ CELSIUS = Unit(offset=Decimal("273.15"))
 
 
 def to_si(value: Decimal, unit: Unit = SI) -> float:
-    """Round ``value`` converted to SI to the nearest double."""
+    """Convert ``value`` from ``unit`` to SI, rounded once, to the nearest double."""
     if unit == SI:
         return float(value)
     scaled = _LONG.multiply(value, unit.factor)
@@ -40,19 +40,19 @@ def to_si(value: Decimal, unit: Unit = SI) -> float:
 
 
 def from_si(value: float, unit: Unit = SI) -> Decimal:
-    """Find the shortest decimal in ``unit`` that :func:`to_si` turns back into ``value``, bit for bit."""
+    """Return the shortest decimal in ``unit`` that :func:`to_si` converts back to the SI ``value``, bit for bit."""
     value = float(value)
     if unit == SI or not math.isfinite(value):
         return Decimal(repr(value))
     exact = _LONG.divide(_LONG.subtract(Decimal(value), unit.offset), unit.factor)
     candidates = (Decimal(0), Decimal("-0"), *(Context(prec=n).plus(exact) for n in range(1, 40)))
-    # Without a candidate only for temperatures next to absolute zero, which the format refuses.
-    bits = struct.pack("<d", value)  # unlike ==, they tell -0 from 0
+    # No candidate fits only for temperatures close to absolute zero, which the format refuses.
+    bits = struct.pack("<d", value)  # unlike ==, they distinguish -0 from 0
     return next((candidate for candidate in candidates if struct.pack("<d", to_si(candidate, unit)) == bits), exact)
 
 
 def number_text(value: Decimal) -> str:
-    """``value`` as text that is a number in YAML 1.1 and in YAML 1.2."""
+    """Return ``value`` as text that both YAML 1.1 and YAML 1.2 read as a number."""
     text = repr(float(value))
     if Decimal(text) != value:
         text = str(value).lower()

@@ -17,7 +17,7 @@ WINGS: Mapping[Layout, int] = {"x4": 4, "pair": 2, "single": 1}
 
 @dataclass(frozen=True)
 class ChordStation:
-    """Chord (m) at distance ``r`` (m) from the flapping axis; linear between stations."""
+    """Chord (m) of the wing at the distance ``r`` (m) from the flapping axis; between stations it is linear."""
 
     r: float
     chord: float
@@ -25,9 +25,10 @@ class ChordStation:
 
 @dataclass(frozen=True)
 class SplitCycleFlap:
-    """Flap angle that opens and closes at two speeds in one constant period (Armanini et al. 2016, Eqs. 20-21).
+    """Flap angle of a wing that opens and closes at different speeds (Armanini et al. 2016, Eqs. 20-21).
 
-    With omega = 2 pi, zeta(t*) = bias - amplitude cos((omega - split) t*) while the wing opens and
+    zeta is the flap angle (rad), t* the time in beats since the start of the beat. With omega = 2 pi,
+    zeta(t*) = bias - amplitude cos((omega - split) t*) while the wing opens and
     bias - amplitude cos((omega + sigma) t* + xi) while it closes, sigma = split omega / (omega - 2 split) and
     xi = -2 pi split / (omega - 2 split): a positive split (rad per beat, below pi) opens slowly and closes fast.
     ``smoothing`` is the standard deviation, in beats, of the Gaussian that smooths the flap angle.
@@ -41,14 +42,15 @@ class SplitCycleFlap:
 
 
 class FourierFlap(FourierSeries):
-    """Flap angle as a Fourier series of psi = 2 pi t*."""
+    """Flap angle zeta as a Fourier series of psi = 2 pi t*, t* being the time in beats since the beat's start."""
 
 
 @dataclass(frozen=True)
 class PassivePitch:
-    """Wing pitch that follows the flap motion (Armanini et al. 2016, Eq. 17 and Table 5), in rad and s.
+    """Wing pitch computed from the flap angle (Armanini et al. 2016, Eq. 17 and Table 5), in rad and s.
 
-    theta_w = pi/2 + constant + flap zeta + flap_rate zeta' + flap_rate_squared zeta'^2.
+    theta_w = pi/2 + constant + flap zeta + flap_rate zeta' + flap_rate_squared zeta'^2, with the wing pitch theta_w
+    (rad), the flap angle zeta (rad) and its rate zeta' (rad/s).
     """
 
     constant: float
@@ -59,7 +61,7 @@ class PassivePitch:
 
 
 class FourierPitch(FourierSeries):
-    """Wing pitch theta_w as a Fourier series of psi = 2 pi t*."""
+    """Wing pitch theta_w as a Fourier series of psi = 2 pi t*, t* being the time in beats since the beat's start."""
 
 
 Flap = SplitCycleFlap | FourierFlap
@@ -70,9 +72,9 @@ Pitch = PassivePitch | FourierPitch
 class WingMotion:
     """Prescribed motion of the wings over a beat, which starts (t* = 0) where the wings are closest and begin to open.
 
-    ``pitch`` is the wing pitch at the span fraction ``pitch_station``. The pitch is linear along the span, with the
-    value ``root_pitch`` at the flapping axis (pi/2: chord along the body). ``peel_end`` is the t* at which the chords
-    have come apart entirely.
+    t* is the time in beats. ``flap`` is the flap angle, ``pitch`` the wing pitch at the fraction ``pitch_station`` of
+    the span. The pitch is linear along the span, with the value ``root_pitch`` (rad) at the flapping axis (pi/2: chord
+    along the body). ``peel_end`` is the t* at which wings that touched have separated along the whole chord.
     """
 
     flap: Flap
@@ -87,16 +89,19 @@ class Vehicle:
     """A flapping vehicle or animal: all inputs of a blade-element model that are not genes.
 
     Attributes:
-        layout: "x4" two pairs crossed like an X, whose upper and lower wings meet; "pair"; "single" one wing.
-        claps: whether wings meet at the start of the beat, so that chord peels off and fling circulation can act.
+        layout: "x4" two pairs crossed like an X, whose upper and lower wings meet; "pair" two wings; "single" one wing.
+        claps: whether wings touch at the start of the beat; if so, models with peel (the chords separate from the
+            leading edge backwards) and fling circulation apply.
         stations: chord from the flapping axis (r = 0) to the tip.
         wing_mass: of one wing, kg.
         thickness: of the wing, m.
-        pitch_axis: position of the axis of wing pitch, in chords behind the leading edge (x0 of Eq. 4).
+        pitch_axis: distance of the axis of wing pitch behind the leading edge, in chords (x0 of Armanini et al. 2016,
+            Eq. 4).
         dihedral: zeta_0, rad, flap angle at which the wings of a pair are closed.
         mass: of the whole vehicle, kg.
         motion: of the wings in recordings without a motion of their own.
-        velocities: "mirrored" (upper wing the mirror image of the lower) or "printed" (Eq. 18 as printed).
+        velocities: how the velocities of the upper wing are computed: "mirrored" (mirror image of the lower wing) or
+            "printed" (Armanini et al. 2016, Eq. 18 as printed).
         estimates: the user's estimates of genes by name, overriding the model's defaults.
     """
 

@@ -10,7 +10,7 @@ from wingfit.records.drive import Drive
 
 @dataclass(frozen=True)
 class Station:
-    """Section of the planform at span position ``y``: leading edge ``x``, chord and thickness in m."""
+    """Section of the planform at the span position ``y``: x of the leading edge, chord and thickness, all in m."""
 
     y: float
     leading_edge: float
@@ -22,8 +22,8 @@ class Station:
 class Rod:
     """Carbon rod that slides in a straw glued into the foam, straight from (x_root, y_root) to (x_tip, y_tip), in m.
 
-    The straw with its glue adds ``glue_linear_density`` (kg/m). A driven rod
-    continues beyond the root as the driving rod that the drive turns.
+    ``density`` (kg/m^3) is that of the rod; straw and glue add ``glue_linear_density`` (kg/m). A driven rod continues
+    beyond the root as the driving rod that the drive turns.
     """
 
     name: str
@@ -38,7 +38,7 @@ class Rod:
 
 @dataclass(frozen=True)
 class Materials:
-    """Densities, which are not genes: foam (kg/m^3), skin with its glue (kg/m^2, both faces together)."""
+    """Densities of the wing, which no calibration searches: foam (kg/m^3), skin and its glue (kg/m^2, both faces)."""
 
     foam_density: float
     skin_areal_density: float
@@ -55,7 +55,7 @@ class Marker:
 
 @dataclass(frozen=True)
 class Hinge:
-    """Axis of flapping, parallel to x through (y, z), in m in the wing frame."""
+    """Axis about which the wing flaps: parallel to x, through the point (y, z), in m in the wing frame."""
 
     y: float
     z: float
@@ -65,9 +65,10 @@ class Hinge:
 class Wing:
     """A wing: all inputs of a model that are not genes.
 
-    ``driven_rods`` are the names of the front and the rear rod; the rear one lags by the condition's phase lag.
-    ``reference_markers`` define the start of the beat: where their mean height crosses that of the hinge on the
-    upstroke (thesis IV-A). ``estimates`` are the user's estimates of genes by name, overriding the model's defaults.
+    ``stations`` are sections from root to tip, linear in between. ``driven_rods`` are the names of the front and
+    the rear rod; the rear rod lags by the condition's phase lag. ``reference_markers`` define the start of the beat:
+    where their mean height crosses that of the hinge on the upstroke (van der Grinten's thesis, IV-A). ``estimates``
+    are the user's estimates of genes by name, overriding the model's defaults.
     """
 
     name: str
@@ -87,7 +88,7 @@ class Wing:
         return self.stations[-1].y - self.stations[0].y
 
     def marker(self, name: str) -> Marker:
-        """The marker called ``name``."""
+        """Return the marker called ``name``; ValueError if there is none."""
         for marker in self.markers:
             if marker.name == name:
                 return marker

@@ -1,8 +1,9 @@
-"""Maximum-likelihood estimation (Armanini et al. 2016, Eq. 22) on any model: damped Gauss-Newton in the gene box.
+"""Maximum-likelihood estimation (Armanini et al. 2016, Eq. 22) with any model: damped Gauss-Newton within gene bounds.
 
-J = 1/2 sum_i v_i^T R^-1 v_i + N/2 ln det R + N n_y/2 ln 2 pi, v the residuals. R is estimated anew in each iteration
-and held while the genes move (relaxation). A step solves the linearised problem inside the box, an active-set bounded
-least-squares problem, for several Levenberg-Marquardt dampings at once; the best of the genomes that result is taken.
+The cost is J = 1/2 sum_i v_i^T R^-1 v_i + N/2 ln det R + N n_y/2 ln 2 pi: v_i residuals [n_y] of sample i of N, R their
+covariance. R is estimated anew in each iteration and constant while the genes move (relaxation). A step solves the
+linearised problem within the bounds (active-set bounded least squares) for several Levenberg-Marquardt dampings at
+once; the best of the resulting genomes is taken.
 """
 
 from __future__ import annotations
@@ -33,13 +34,13 @@ from wingfit.records import Gene
 from wingfit.records.array_types import Array
 from wingfit.records.blas_threads import one_blas_thread
 
-# Dampings tried at once, times the last good one: two groups of lanes. Close to it they lie densely, because valleys of
-# stiffnesses that compensate each other bend: a damping three times too small leaves them, one three times too large
-# crawls along them.
+# Dampings tried at once, times the last successful one: two groups of lanes. Near 1 they lie densely, because valleys
+# of stiffnesses that compensate each other bend: a damping three times too small leaves the valley, one three times too
+# large makes tiny steps.
 DAMPINGS = 10.0 ** np.array([-4, -3, -2, -1.5, -1, -0.75, -0.5, -0.25, 0, 0.25, 0.5, 0.75, 1, 1.5, 2, 3])
 FIRST_DAMPING, LEAST_DAMPING, LARGEST_DAMPING = 1e-3, 1e-4, 1e6  # of each gene's curvature
-LEAST_CURVATURE = 4.0  # damps at least as a prior of the box's half width does: an unidentifiable gene stays
-LEAST_GAIN = 1e-3  # of the decrease that the linearised problem promises
+LEAST_CURVATURE = 4.0  # that of a prior with half the range as standard deviation: an unidentifiable gene stays
+LEAST_GAIN = 1e-3  # of the decrease that the linearised problem predicts
 STEP = 1e-3  # unit coordinates
 COST = 1e-5  # of J's 1/2 sum v^T R^-1 v, which is half the number of samples
 ITERATIONS = 50
@@ -47,19 +48,20 @@ ITERATIONS = 50
 
 @dataclass(frozen=True)
 class Step:
-    """Progress after one iteration; ``checkpoint`` (JSON) is all that is needed to resume from here.
+    """Progress after one iteration; the estimation can be resumed from its ``checkpoint`` (JSON).
 
     Attributes:
         index: number of the iteration, from 0.
-        values: of the free genes after it.
-        cost: Eq. 22 before the iteration, with the R estimated in it.
-        fitness: sum of squares after it (:attr:`wingfit.calibration.problem.Misfit.squares`).
-        distance: misfit after it, m or N.
-        step: largest move of a gene, unit coordinates.
-        gain: decrease of the cost over the decrease that the linearised problem predicts; 0 if no step was better.
-        evaluations: individuals evaluated in it.
+        values: of the free genes after the iteration, by name.
+        cost: J of Eq. 22 before the iteration, with the R estimated in it.
+        fitness: sum of squares after the iteration (:attr:`wingfit.calibration.problem.Misfit.squares`).
+        distance: misfit after the iteration, m or N.
+        step: largest move of a gene, genes scaled to 0..1.
+        gain: decrease of the cost, divided by the decrease that the linearised problem predicts; 0 if no step lowers
+            the cost.
+        evaluations: individuals simulated in the iteration.
         reasons: why individuals failed.
-        converged: whether this is the last.
+        converged: whether this is the last iteration.
     """
 
     index: int
@@ -77,7 +79,10 @@ class Step:
 
 @dataclass(frozen=True)
 class Estimate:
-    """A maximum-likelihood estimate: where the iteration ended, and its uncertainty there."""
+    """A maximum-likelihood estimate: final ``values`` of the ``free`` genes, and their uncertainty.
+
+    ``evaluations`` counts simulated individuals; ``remarks`` are warnings, such as genes at a bound.
+    """
 
     free: tuple[str, ...]
     values: dict[str, float]
@@ -90,7 +95,10 @@ class Estimate:
 
 @dataclass(frozen=True)
 class _State:
-    """Everything that the next iteration depends on; ``flat`` counts iterations that gained next to nothing."""
+    """State between iterations: genes ``unit`` (scaled to 0..1), damping, and number of the last iteration.
+
+    ``flat`` counts the last successive iterations that lowered the cost by at most the fraction COST.
+    """
 
     unit: tuple[float, ...]
     damping: float = FIRST_DAMPING
@@ -101,7 +109,11 @@ class _State:
 
 @dataclass(frozen=True)
 class _Move:
-    """The outcome of one iteration: the best step or, if no step lowers the cost, the unchanged genome."""
+    """The outcome of one iteration: the best step or, if no step lowers the cost, the unchanged genome with gain 0.
+
+    ``unit`` [F]: genes after it, scaled to 0..1; ``step``: largest move of a gene; ``decrease`` of the cost;
+    ``gain``: ``decrease`` divided by the predicted one; ``fitness``, ``distance``: misfit after it.
+    """
 
     unit: Array
     step: float
@@ -122,13 +134,13 @@ def iterate(
     checkpoint: dict[str, Any] | None = None,
     iterations: int = ITERATIONS,
 ) -> Iterator[Step]:
-    """Iterate from ``start`` (genes that it does not name start at the base) or on from ``checkpoint``.
+    """Yield Gauss-Newton iterations from ``start`` (missing genes: from the base) or, if given, from ``checkpoint``.
 
     Ends when no step lowers the cost, when a step is smaller than STEP and lowers the cost by less than the fraction
     COST, when two steps in succession lower it by less (genes that still move are then not identifiable), or after
-    ``iterations``. A resumed iteration gives the same bits as an uninterrupted one. ValueError when the start cannot
-    be simulated. An effect of size zero keeps this size at the start; its other genes start where
-    :mod:`wingfit.calibration.initial_effect_position` puts them.
+    ``iterations``. A resumed estimation gives the same bits as an uninterrupted one. ValueError if the start cannot be
+    simulated. An effect of size zero starts with this size; its other genes start with the values that
+    :mod:`wingfit.calibration.initial_effect_position` chooses.
     """
     genes, before = free_genes(problem), 0
     if checkpoint is None:
@@ -145,7 +157,7 @@ def iterate(
 
 @one_blas_thread
 def estimate(problem: Problem, evaluator: Evaluator, start: Mapping[str, float]) -> Estimate:
-    """Iterate to the end, and estimate the uncertainty there."""
+    """Iterate from ``start`` (values by name) to convergence, and estimate the uncertainty of the result."""
     evaluations, last = 0, None
     for last in iterate(problem, evaluator, start):
         evaluations += last.evaluations
@@ -166,7 +178,7 @@ def estimate(problem: Problem, evaluator: Evaluator, start: Mapping[str, float])
 
 
 def at_bounds(genes: list[Gene], values: Mapping[str, float]) -> tuple[str, ...]:
-    """Remarks on genes whose values are at a bound, except sizes of zero, which mean that an effect is absent."""
+    """Return remarks on genes whose ``values`` (by name) are at a bound, except sizes of zero (effect is off)."""
     genes = [gene for gene in genes if values[gene.name] != 0.0 or not is_size(gene.name)]
     found = np.array([values[gene.name] for gene in genes])
     return tuple(
@@ -212,9 +224,11 @@ def _better(
     power: float,
     damping: float,
 ) -> _Move:
-    """The move to the best of the genomes that the dampings give; no move where none lowers the cost.
+    """Try steps with dampings around ``damping``, and return the best that lowers the cost; no move if none does.
 
-    ``quadratic``: the cost near ``unit`` [F]; ``power``: sum of v^T R^-1 v there.
+    Larger dampings are tried until one succeeds or they reach a limit. ``unit`` [F]: present genes, scaled to
+    0..1. ``quadratic``: second-order model of the cost there; ``power``: sum of v^T R^-1 v there (v residuals, R
+    covariance in ``noise``).
     """
     genes, evaluations, reasons = free_genes(problem), 0, list[str]()
     while True:
@@ -247,7 +261,7 @@ def _better(
 
 
 def _quadratic(noise: list[Noise], linear: Linearised) -> tuple[Quadratic, float]:
-    """The cost near the point, and the sum of v^T R^-1 v there."""
+    """Return the second-order model of the cost at the point of ``linear``, and the sum of v^T R^-1 v there."""
     white = [n.whitened(v).ravel() for n, v in zip(noise, linear.residuals, strict=True)]
     steep = [
         whitened_sensitivity(n, s).reshape(-1, s.shape[-1]) for n, s in zip(noise, linear.sensitivities, strict=True)

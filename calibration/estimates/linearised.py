@@ -1,7 +1,7 @@
-"""A problem made linear about a genome by finite differences, all neighbours in one batch.
+"""Linearises a problem about a genome by finite differences; all displaced genomes are simulated in one batch.
 
-Coordinates are the genes' unit coordinates (:meth:`wingfit.records.Gene.to_unit`): logarithmic for a log gene, the box
-[0, 1].
+The variables are the genes in unit coordinates (:meth:`wingfit.records.Gene.to_unit`): scaled so that their bounds are
+0 and 1, logarithmically for a log-scaled gene.
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ SHORTER = 0.125  # of the step, where both neighbours fail
 
 @dataclass(frozen=True)
 class Linearised:
-    """Residuals r(u + d) = r + S d of a problem about unit coordinates u.
+    """Linear model r(u + d) = r + S d of the residuals of a problem for genes u + d near u, scaled to 0..1.
 
     Attributes:
-        residuals: per recording [T, C], simulated minus recorded, NaN where not compared.
-        sensitivities: per recording S = dr/du, [T, C, F]; zero for a gene that could not be differentiated.
-        known: [F], False for a gene that could not be differentiated because both of its neighbours fail.
+        residuals: r for each recording, [T, C] simulated minus recorded, m or N; NaN where not compared.
+        sensitivities: S = dr/du for each recording, [T, C, F]; zero for a gene that could not be differentiated.
+        known: [F], False for a gene that could not be differentiated because the genomes on both sides fail.
         fitness: sum of squares at u (:attr:`wingfit.calibration.problem.Evaluation.fitness`).
         distance: misfit at u, m or N.
-        evaluations: individuals evaluated.
-        reasons: why neighbours failed.
+        evaluations: individuals simulated.
+        reasons: why displaced genomes failed.
     """
 
     residuals: tuple[Array, ...]
@@ -44,29 +44,29 @@ class Linearised:
 
 
 def free_genes(problem: Problem) -> list[Gene]:
-    """The free genes, in the order of the columns of a batch."""
+    """Return the free genes of ``problem``, in the order of the columns of a batch."""
     genes = {gene.name: gene for gene in problem.model.genes}
     return [genes[name] for name in problem.free]
 
 
 def values_at(genes: list[Gene], unit: Array) -> Array:
-    """Values [B, F] at unit coordinates [B, F]."""
+    """Return the values [B, F] of the F ``genes`` for B individuals ``unit`` [B, F], genes scaled to 0..1."""
     return np.stack([gene.from_unit(column) for gene, column in zip(genes, unit.T, strict=True)], axis=1)
 
 
 def unit_at(genes: list[Gene], values: Array) -> Array:
-    """Unit coordinates [F] of values [F], inside the box."""
+    """Return the genes scaled to 0..1 [F] of their ``values`` [F]; a value outside its bounds counts as the bound."""
     return np.clip([float(gene.to_unit(value)) for gene, value in zip(genes, values, strict=True)], 0.0, 1.0)
 
 
 def stopped(genes: list[Gene], values: Array) -> Mask:
-    """Array [F], True where the value [F] lies at a bound of its gene."""
+    """Return True [F] for each gene whose value in ``values`` [F] lies at one of its bounds."""
     unit = unit_at(genes, values)
     return np.asarray((unit < AT_BOUND) | (unit > 1 - AT_BOUND))
 
 
 def residuals_of(evaluation: Evaluation) -> list[Array]:
-    """Residuals [B, T, C] of each recording."""
+    """Return the residuals [B, T, C] (B individuals) of each recording; TypeError if the evaluator returned none."""
     parts = [part.residuals for part in evaluation.per_recording]
     if any(part is None for part in parts):
         raise TypeError("the evaluator returned no residuals although they were requested")
@@ -74,10 +74,11 @@ def residuals_of(evaluation: Evaluation) -> list[Array]:
 
 
 def linearise(problem: Problem, evaluator: Evaluator, unit: Array) -> Linearised:
-    """Central differences about ``unit`` [F]; ValueError when the genome there cannot be simulated.
+    """Linearise by central differences about ``unit`` [F], genes scaled to 0..1.
 
-    Steps that would leave the box end at its edge, and a neighbour that fails is replaced by the base, so that
-    differences may become one-sided. Where both fail, shorter steps are tried once.
+    ValueError if the genome there cannot be simulated. A step beyond a bound ends at the bound, and a displaced genome
+    that fails is replaced by the one at ``unit``, so that differences may become one-sided. For genes with a failure on
+    both sides, shorter steps are tried once.
     """
     genes, evaluations = free_genes(problem), list[Evaluation]()
 

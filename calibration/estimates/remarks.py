@@ -7,19 +7,19 @@ import numpy as np
 from wingfit.records import Gene
 from wingfit.records.array_types import Array, Mask
 
-MEMBER = 0.3  # of the largest component of a direction: a gene with less has no part in it
+MEMBER = 0.3  # of the largest component of a direction: a gene with less does not belong to the direction
 ALIKE = 0.25  # components that differ by less count as equal
-HELPED = 0.5  # an error that knowing the others reduces to less than this part belongs to a trade-off
+HELPED = 0.5  # genes compensate each other if knowing the others reduces the error of each to less than this part
 ROUND_OFF = 1e-9  # of the largest variance, so that a covariance can be inverted
 
 
 def remarks(genes: list[Gene], relative: Array, known: Mask, largest: float) -> tuple[str, ...]:
-    """Name the genes whose relative standard error is larger than ``largest``.
+    """Return remarks that name the genes whose relative standard error is larger than ``largest``.
 
-    ``relative`` [F, F] is the covariance of relative changes. Its eigenvectors with large eigenvalues are the
-    directions in which the data hardly change: one gene that is not identifiable, or several that compensate each
-    other.
-    Shares of a group, which always compensate each other, are named together.
+    ``relative`` [F, F] is the covariance of relative changes of the genes. Its eigenvectors with large eigenvalues are
+    directions in the space of genes along which the data hardly change: one gene that is not identifiable, or several
+    that compensate each other. Weights of one group (``Gene.share_of``), which always compensate each other, are named
+    together. ``known`` [F] is False for a gene without a known error.
     """
     found = [
         f"{gene.name} has no known error: no neighbour of the best genome can be simulated"
@@ -40,7 +40,10 @@ def _bounds(genes: list[Gene], relative: Array, which: list[int]) -> str:
 
 
 def _directions(names: list[str], covariance: Array, largest: float) -> list[str]:
-    """Remarks on the directions in which the data hardly change, worst first; each gene is named once."""
+    """Return remarks on directions of genes along which the data hardly change, worst first; each gene is named once.
+
+    ``covariance`` [F, F]: relative changes; a direction counts if its standard error is larger than ``largest``.
+    """
     found: list[str] = []
     named: set[int] = set()
     sizes, directions = np.linalg.eigh(covariance)
@@ -55,7 +58,10 @@ def _directions(names: list[str], covariance: Array, largest: float) -> list[str
 def _direction(
     names: list[str], covariance: Array, direction: Array, members: list[int], largest: float, named: set[int]
 ) -> list[str]:
-    """Remarks on one direction [F] and the genes with a part in it."""
+    """Return remarks on one ``direction`` [F] (largest component 1): on single genes, or on how they compensate.
+
+    ``members`` are the indices of the genes that belong to the direction, ``named`` those with an earlier remark.
+    """
     errors = np.sqrt(np.diag(covariance))
     part = covariance[np.ix_(members, members)]
     part = part + ROUND_OFF * np.diag(part).max() * np.eye(len(members))

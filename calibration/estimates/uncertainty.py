@@ -1,4 +1,4 @@
-"""How well each gene is identified: Cramer-Rao bounds at an estimate, correlations, and remarks."""
+"""Estimates how uncertain each gene is: Cramer-Rao bounds at an estimate, correlations, and remarks."""
 
 from __future__ import annotations
 
@@ -25,15 +25,16 @@ from wingfit.records.array_types import Array, Mask
 from wingfit.records.blas_threads import one_blas_thread
 
 IDENTIFIABLE = 0.075  # relative standard error: a 95 % interval within 15 %
-PRIOR = 0.5  # standard deviation of the box as a prior, in unit coordinates: its half width
-SMALL = 0.05  # of the box: what a value of a linear gene is at least compared with
+PRIOR = 0.5  # standard deviation of the prior, genes scaled to 0..1: half the range between the bounds
+SMALL = 0.05  # of the range: errors of linear genes with smaller values are relative to this
 
 
 @dataclass(frozen=True)
 class Standing:
-    """Relative standard error of a gene, and whether it is at most IDENTIFIABLE; of a share, after normalisation.
+    """Relative standard error of a gene, and whether it is at most IDENTIFIABLE.
 
-    ``absolute`` is the standard error in the gene's unit (of a share: of its weight).
+    For a gene that is a weight of a group (``Gene.share_of``), the relative error is that of weight / sum of weights.
+    ``absolute`` is the standard error in the gene's unit (of a weight: of the weight itself).
     """
 
     standard_error: float
@@ -46,14 +47,15 @@ class Uncertainty:
     """Covariance of an estimate.
 
     Attributes:
-        free: names of the genes.
-        values: [F], at which this was evaluated.
-        covariance: [F, F] of the values, Cramer-Rao bounds for coloured residuals, the gene box being a weak prior.
-        relative: [F, F] covariance of the values relative to themselves, shares normalised.
-        known: [F], False for a gene that a bound stopped, or whose neighbours cannot be simulated: its error is
-            infinite, and those of the others are for its value as it is.
-        noise: R of each recording, [C, C], m^2 or N^2.
-        cost: Eq. 22 at the values, with that R.
+        free: names of the F free genes.
+        values: [F], estimates at which the covariance was computed.
+        covariance: [F, F] of the values, Cramer-Rao bounds for coloured residuals; the range between the bounds of a
+            gene is a weak prior.
+        relative: [F, F] covariance of relative changes of the values; weights of a group divided by their sum.
+        known: [F], False for a gene at a bound, or whose displaced genomes cannot be simulated: its error is infinite,
+            and the errors of the other genes hold for its present value.
+        noise: estimated noise covariance R of each recording, [C, C], m^2 or N^2.
+        cost: J of Armanini et al. 2016, Eq. 22, at the values, with this R.
         remarks: which genes are not identifiable, and why.
     """
 
@@ -68,19 +70,19 @@ class Uncertainty:
 
     @property
     def standard_errors(self) -> dict[str, float]:
-        """Standard error of each value, in the gene's unit."""
+        """Standard error of each gene, by name, in its unit; infinite where not ``known``."""
         errors = np.where(self.known, np.sqrt(np.diag(self.covariance)), np.inf)
         return dict(zip(self.free, errors.tolist(), strict=True))
 
     @property
     def correlation(self) -> Array:
-        """Correlation of the values, [F, F]."""
+        """Correlation coefficients [F, F] of the estimated values."""
         scale = np.sqrt(np.diag(self.covariance))
         return np.asarray(self.covariance / scale / scale[:, None])
 
     @property
     def standing(self) -> dict[str, Standing]:
-        """Standard errors of each free gene, by name, and whether they identify it."""
+        """Standard errors of each free gene, by name, and whether the gene is identifiable."""
         errors = np.where(self.known, np.sqrt(np.diag(self.relative)), np.inf)
         absolute = self.standard_errors
         return {
@@ -90,10 +92,10 @@ class Uncertainty:
 
 @one_blas_thread
 def standing(problem: Problem, evaluator: Evaluator) -> dict[str, Standing]:
-    """Standard errors of each free gene at the problem's base genome; infinite where that cannot be simulated.
+    """Return the standard errors of each free gene, by name, at the base genome; infinite if it cannot be simulated.
 
-    The phase of each recording of tracks is refitted at every displaced genome, so the errors include the
-    uncertainty of the trigger.
+    For every displaced genome, the start of the simulated beat is aligned anew with each recording of tracks, so the
+    errors include the uncertainty of this start.
     """
     try:
         return uncertainty(problem, evaluator).standing
@@ -103,7 +105,7 @@ def standing(problem: Problem, evaluator: Evaluator) -> dict[str, Standing]:
 
 @one_blas_thread
 def uncertainty(problem: Problem, evaluator: Evaluator) -> Uncertainty:
-    """Uncertainty of the free genes at the problem's base genome; ValueError when that cannot be simulated."""
+    """Return the uncertainty of the free genes at the base genome; ValueError if this genome cannot be simulated."""
     genes = free_genes(problem)
     values = np.array([problem.base[gene.name] for gene in genes])
     linear = linearise(problem, evaluator, unit_at(genes, values))
@@ -129,10 +131,11 @@ def uncertainty(problem: Problem, evaluator: Evaluator) -> Uncertainty:
 
 
 def unit_covariance(problem: Problem, linear: Linearised, noise: list[Noise]) -> tuple[Array, tuple[str, ...]]:
-    """Covariance [F, F] of an estimate in unit coordinates, and remarks on recordings with too few beats.
+    """Return the covariance [F, F] of an estimate, genes scaled to 0..1, and remarks on recordings with too few beats.
 
-    The gene box is a weak prior; without it, the variance of a gene that no datum depends on would be infinite. A gene
-    that is not ``known`` has the variance of this prior, and the errors of the others hold for its present value.
+    ``linear``: the problem linearised at the estimate; ``noise``: R of each recording. The range between the bounds of
+    a gene is a weak prior; without it, the variance of a gene that has no influence on the data would be infinite. A
+    gene that is not ``known`` has the variance of this prior, and errors of other genes hold for its present value.
     """
     known = np.flatnonzero(linear.known)
     covariance = np.eye(len(problem.free)) * PRIOR**2
@@ -161,9 +164,10 @@ def unit_covariance(problem: Problem, linear: Linearised, noise: list[Noise]) ->
 
 @dataclass(frozen=True)
 class _Part:
-    """One recording, whitened: residuals [T, C], sensitivities [T, C, F], and the score of each whole beat [B, F].
+    """One recording, whitened: residuals ``white`` [T, C], their ``sensitivity`` [T, C, F] to the F genes, scores.
 
-    A score is the derivative of the log-likelihood with respect to the F genes.
+    ``scores`` [B, F], for each of B whole beats of forces, are derivatives of the log-likelihood with respect to the
+    genes; ``used`` is the fraction of the samples in these beats. ``seen`` [T, C] is True where values were compared.
     """
 
     record: Recording
@@ -188,12 +192,15 @@ class _Part:
         return np.asarray(np.einsum("tcp,tcq->pq", self.sensitivity, self.sensitivity, optimize=True))
 
     def from_beat_to_beat(self, bread: Array) -> Array:
-        """Covariance [F, F] of the sum of scores, estimated from their scatter between beats."""
+        """Return the covariance [F, F] of the sum of the scores, estimated from their scatter between beats.
+
+        ``bread`` [F, F] is the covariance of the estimate if residuals were white.
+        """
         absorbed = float(np.trace(bread @ self.information)) / len(bread)
         return beat_score_covariance(self.scores, self.used, absorbed)
 
     def block(self) -> Block:
-        """The residuals and sensitivities from which the correlation between samples is estimated."""
+        """Return residuals and sensitivities on a regular grid of times, to estimate correlations between samples."""
         white, forces = self.white, self.record.kind == "forces"
         if forces:
             white = without_mean_beat(self.record, white, len(self.scores))
@@ -201,9 +208,10 @@ class _Part:
 
 
 def _from_samples(parts: list[_Part], bread: Array) -> Array:
-    """Covariance [F, F] of the sum of all scores, from the correlations between samples.
+    """Return the covariance [F, F] of the sum of all scores, from the correlations between samples of the residuals.
 
-    Where the scores of whole beats, few as they are, scatter more than that, their scatter is used.
+    If the scores of the whole beats of a recording scatter more than this covariance predicts, it is scaled up to their
+    scatter. ``bread`` [F, F] is the covariance of the estimate if residuals were white.
     """
     total = np.zeros_like(bread)
     for part, meat in zip(parts, score_covariances([part.block() for part in parts], bread), strict=True):
@@ -216,7 +224,10 @@ def _from_samples(parts: list[_Part], bread: Array) -> Array:
 
 
 def _slopes(genes: list[Gene], values: Array) -> tuple[Array, Array]:
-    """Derivatives [F] of the values by their unit coordinates, and the same derivatives relative to the values."""
+    """Return the derivatives [F] of the ``values`` [F] by the genes scaled to 0..1, and these divided by the values.
+
+    The value of a linear gene counts as at least SMALL of its range in this division.
+    """
     width = np.array([np.log(g.upper / g.lower) if g.scale == "log" else g.upper - g.lower for g in genes])
     log = np.array([gene.scale == "log" for gene in genes])
     size = np.where(log, 1.0, np.maximum(np.abs(values), SMALL * width))
@@ -224,9 +235,10 @@ def _slopes(genes: list[Gene], values: Array) -> tuple[Array, Array]:
 
 
 def _share_map(genes: list[Gene], base: Genome) -> Array:
-    """Matrix [F, F] from relative changes of the weights to relative changes of the normalised shares.
+    """Return the matrix [F, F] that converts relative changes of genes to those of the values that the model uses.
 
-    The sum of a group runs over all its weights, also those that are not searched.
+    Of weights of a group (``Gene.share_of``) the model uses weight / sum of weights, also of those not searched; other
+    genes are unchanged.
     """
     out = np.eye(len(genes))
     for k, gene in enumerate(genes):

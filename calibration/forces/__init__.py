@@ -1,1 +1,1 @@
-"""Calibrations on forces: coefficients by condition, a global model, agreement with the recordings."""
+"""Calibrations on forces: coefficients for each condition, a global model, agreement with the recordings."""

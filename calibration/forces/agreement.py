@@ -1,7 +1,7 @@
-"""How modelled forces agree with recorded ones: mean beats, differences and spectra.
+"""Compares modelled forces with recorded ones: mean beats, differences and spectra.
 
-A model's forces come from ``Model.observe``, which samples and low-passes them like the recording; everything here then
-does the same to both.
+A model's forces come from ``Model.observe``, which samples and low-passes them like the recording; all functions here
+treat modelled and recorded forces alike. A quantity is "lift", "drag", or the force along a body axis, "x" or "z".
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ from wingfit.sim.vehicle.lift_drag import lift_drag
 
 POINTS = 200  # of a mean beat
 SEGMENT_BEATS = 4  # per piece of a spectrum: the harmonics of the beat fall on every fourth line
-CONSTANT = 1e-9  # of the largest force of a recording: what varies less is constant, but for rounding
+CONSTANT = 1e-9  # of the largest force of a recording: a force that varies less is constant, apart from rounding
 
 
 @dataclass(frozen=True)
 class Beats:
-    """The whole, gapless beats of a recording at common instants.
+    """The whole beats without gaps of a recording, interpolated at n common instants.
 
-    ``phase`` [n] is t*; ``samples`` holds [beats, n] in N per quantity.
+    ``phase`` [n] is t*, the time in beats since the start of the beat; ``samples`` [beats, n] in N, by quantity.
     """
 
     phase: Array
@@ -36,12 +36,12 @@ class Beats:
 
     @property
     def mean(self) -> dict[Quantity, Array]:
-        """Mean beat, [n] in N per quantity."""
+        """Mean over the beats, [n] in N, by quantity."""
         return {name: beats.mean(axis=0) for name, beats in self.samples.items()}
 
     @property
     def spread(self) -> dict[Quantity, Array]:
-        """Standard deviation between beats, [n] in N per quantity; NaN with a single beat."""
+        """Standard deviation between beats, [n] in N, by quantity; NaN with a single beat."""
         return {
             name: beats.std(axis=0, ddof=1) if len(beats) > 1 else np.full(len(self.phase), np.nan)
             for name, beats in self.samples.items()
@@ -49,9 +49,9 @@ class Beats:
 
 
 def quantities(recording: Recording, forces: Array) -> dict[Quantity, Array]:
-    """``forces`` [T, C] in the recording's axes by name, [T] in N each; lift and drag where both axes are there.
+    """Return ``forces`` [T, C] (N, axes of ``recording``) by name of the axis, [T] each, and lift and drag if possible.
 
-    Lift and drag after Armanini et al. 2016, Eq. 16.
+    Lift and drag need x and z (Armanini et al. 2016, Eq. 16).
     """
     named: dict[Quantity, Array] = {}
     axes = recording.forces
@@ -64,9 +64,9 @@ def quantities(recording: Recording, forces: Array) -> dict[Quantity, Array]:
 
 
 def whole_beats(recording: Recording, forces: Array | None = None, points: int = POINTS) -> Beats:
-    """Cut ``forces`` [T, C] (None: those recorded) into beats with ``points`` instants each, by cubic splines.
+    """Split ``forces`` [T, C] (None: those recorded) into beats, interpolated at ``points`` instants by cubic splines.
 
-    Beats in which the recording misses a sample are left out; ValueError when no beat is left.
+    Beats in which the recording misses a sample are left out; ValueError if none is without a gap.
     """
     cut = Cut.of(recording)
     phase = np.arange(points) / points
@@ -80,10 +80,10 @@ def whole_beats(recording: Recording, forces: Array | None = None, points: int =
 
 @one_blas_thread
 def agreements(recording: Recording, modelled: Array, source: Source) -> tuple[Agreement, ...]:
-    """How ``modelled`` [T, C], in N, agrees with the recording, one entry per quantity.
+    """Measure how ``modelled`` forces [T, C] (N) agree with ``recording``; one Agreement per quantity.
 
-    Differences and correlation over all samples of the whole beats; percentages of the range of the recorded mean beat.
-    Neither percentages nor correlation (NaN) of a force that is constant.
+    RMS difference and correlation are over all samples of the whole beats without gaps; percentages are of the range of
+    the recorded mean beat. For a constant force both are NaN. ``source`` says where the modelled forces come from.
     """
     beats, model_beats = whole_beats(recording).mean, whole_beats(recording, modelled).mean
     cut = Cut.of(recording)
@@ -107,7 +107,7 @@ def agreements(recording: Recording, modelled: Array, source: Source) -> tuple[A
 
 @one_blas_thread
 def comparison(recording: Recording, modelled: Array, source: Source) -> ForceComparison:
-    """Lay ``modelled`` [T, C], in N, over the recording: mean beats and spectra."""
+    """Return mean beats and spectra of ``modelled`` forces [T, C] (N) beside those of ``recording``."""
     recorded, model = whole_beats(recording), whole_beats(recording, modelled)
     frequency, spectra = spectrum(recording, recording.values)
     _, model_spectra = spectrum(recording, modelled)
@@ -125,11 +125,12 @@ def comparison(recording: Recording, modelled: Array, source: Source) -> ForceCo
 
 
 def spectrum(recording: Recording, forces: Array) -> tuple[Array, dict[Quantity, Array]]:
-    """One-sided power spectral densities of ``forces`` [T, C]: frequencies [m] in Hz, and [m] in N^2/Hz per quantity.
+    """Compute one-sided power spectral densities of ``forces`` [T, C] (N).
 
-    Mean of the periodograms of pieces of SEGMENT_BEATS beats without overlap or window (harmonics of the beat then stay
-    in one line), each less its mean: the sum times the width of a line is the mean variance of a piece (Parseval).
-    Pieces lie between the gaps; where no beat fits, both are empty.
+    Returns the frequencies [m] in Hz and, by quantity, the densities [m] in N^2/Hz. The mean is taken of the
+    periodograms of pieces of SEGMENT_BEATS beats without overlap or window (so that a harmonic of the beat falls on one
+    line), each less its mean: the sum times the width of a line is the mean variance of a piece (Parseval). Pieces
+    contain no gaps; if no beat fits between gaps, both results are empty.
     """
     samples = pieces(recording, SEGMENT_BEATS)
     if not len(samples):
@@ -143,13 +144,13 @@ def spectrum(recording: Recording, forces: Array) -> tuple[Array, dict[Quantity,
 
 
 def _percent(rmse: float, beat: Array, least: float) -> float:
-    """``rmse`` in per cent of the range of ``beat``; NaN when that is constant: varies by no more than ``least``."""
+    """Return ``rmse`` in per cent of the range (maximum - minimum) of ``beat`` [n]; NaN if it is <= ``least``."""
     span = float(np.ptp(beat))
     return 100 * rmse / span if span > least else float("nan")
 
 
 def _correlation(a: Array, b: Array, least: float) -> float:
-    """Pearson's correlation; NaN when one of them is constant: varies by no more than ``least``."""
+    """Return Pearson's correlation of two series; NaN if the range of one of them is at most ``least``."""
     if min(np.ptp(a), np.ptp(b)) <= least:
         return float("nan")
     a, b = a - a.mean(), b - b.mean()

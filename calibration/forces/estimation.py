@@ -1,4 +1,4 @@
-"""Results of a calibration on forces: estimates with their errors, a global model, agreements, predictions."""
+"""Computes the result of a calibration on forces: estimates with errors, a global model, agreements, predictions."""
 
 from __future__ import annotations
 
@@ -39,10 +39,10 @@ from wingfit.sim.vehicle.blade_element_wing import BladeElementWing
 
 @dataclass(frozen=True)
 class Prediction:
-    """Forces that a model predicts for a condition, over one beat and unfiltered.
+    """Forces that a global model predicts for a condition, over one beat and unfiltered.
 
-    ``phase`` [n] is t*; ``forces`` [n] in N per quantity; ``values`` the coefficients that follow from the condition;
-    ``remarks`` say where it extrapolates.
+    ``phase`` [n] is t*, the time in beats; ``forces`` [n] in N, by quantity; ``values`` are the coefficients under the
+    condition, by gene; ``remarks`` warn of extrapolation.
     """
 
     phase: Array
@@ -53,7 +53,7 @@ class Prediction:
 
 @dataclass(frozen=True)
 class _Judged:
-    """A stage with its best genome, the uncertainty of this genome, and the estimate made of both."""
+    """A stage with its best genome, the uncertainty ``known`` of this genome, and the estimate made of both."""
 
     stage: Stage
     genome: Genome
@@ -63,9 +63,10 @@ class _Judged:
 
 @dataclass(frozen=True)
 class _Compared:
-    """One recording compared with models: agreements, and the RMS difference (N) of the fitted axes by source.
+    """One recording compared with models: agreements, and RMS difference (N) of the fitted axes by source of the model.
 
-    ``scatter`` is the RMS of what does not repeat from beat to beat in these axes, the noise; None with too few beats.
+    ``samples`` counts the values compared. ``scatter`` is the RMS (N) of the noise in these axes, the part of the
+    forces that does not repeat from beat to beat; None with too few beats.
     """
 
     recording: Recording
@@ -81,8 +82,9 @@ def summarise_forces(
 ) -> ForceResult:
     """Compare the estimates of a calibration with every recording of the dataset, held-out ones included.
 
-    ``checkpoint`` is the last generation's. The global model is one of local estimates; a recording that was not fitted
-    is predicted by it or, without it, by the joint estimate or the average of the local ones.
+    ``checkpoint`` is that of the last generation. A global model is fitted to local estimates (mode "local"). A
+    recording that was not fitted is predicted by the global model or, without one, by the joint estimate or the average
+    of the local estimates.
     """
     ready = prepare(spec, dataset)
     spec, model, best = ready.spec, vehicle_model(dataset, spec), found_by_stage(spec, dataset, checkpoint)
@@ -123,7 +125,7 @@ def summarise_forces(
 def compare_forces(
     spec: CalibrationSpec, dataset: Dataset, recording: str, source: Source, genome: Mapping[str, float]
 ) -> ForceComparison:
-    """Forces of ``genome`` (full, by name) over a recording, low-passed as in the calibration."""
+    """Compare forces of ``genome`` (all genes, by name) with the recording called ``recording``, both low-passed."""
     spec = resolved(spec, dataset)
     model, record = vehicle_model(dataset, spec), as_fitted(spec, dataset.recording(recording))
     return comparison(record, _observed(model, record, [base_genome(model, genome)])[0], source)
@@ -133,9 +135,10 @@ def compare_forces(
 def predict(
     spec: CalibrationSpec, dataset: Dataset, law: GlobalModel, condition: Condition, points: int = POINTS
 ) -> Prediction:
-    """Forces under any ``condition`` from the global model of a calibration; coefficients stay in their genes' boxes.
+    """Predict the forces over one beat under any ``condition``, at ``points`` instants, from the global model ``law``.
 
-    These forces act on the vehicle; faults of the measurement that the calibration found are not applied.
+    Coefficients are limited to the bounds of their genes. The forces are those on the vehicle: estimated faults of the
+    measurement are not added.
     """
     spec = resolved(spec, dataset)
     model = vehicle_model(dataset, spec)
@@ -154,9 +157,9 @@ def predict(
 def _by_law(
     model: BladeElementWing, law: GlobalModel, condition: Condition
 ) -> tuple[dict[str, float], tuple[str, ...]]:
-    """Coefficients that the law gives under ``condition``, and remarks.
+    """Evaluate the global model ``law`` under ``condition``; return the coefficients by name, and remarks.
 
-    A coefficient that the law puts outside the box of its gene gets the nearest bound, with a remark.
+    A coefficient outside the bounds of its gene is set to the nearest bound, with a remark.
     """
     found = at(law, condition)
     values, remarks = dict(found.values), list(found.remarks)
@@ -172,7 +175,7 @@ def _by_law(
 
 
 def _observed(model: BladeElementWing, recording: Recording, genomes: list[Genome]) -> Array:
-    """Forces [B, T, C] of ``genomes``; ValueError when one of them fails."""
+    """Simulate ``recording`` with B ``genomes``; return forces [B, T, C] in N. ValueError if one of them fails."""
     observed = model.observe([genome.values for genome in genomes], recording)
     for reason in observed.reasons:
         if reason is not None:
@@ -208,7 +211,10 @@ def _judge(
 def _global(
     spec: CalibrationSpec, dataset: Dataset, estimates: list[LocalEstimate]
 ) -> tuple[GlobalModel | None, tuple[str, ...]]:
-    """The global model (Eq. 23) of local estimates and its remarks; None where they determine none, and why."""
+    """Fit the global model (Armanini et al. 2016, Eq. 23) to local estimates; return it and remarks.
+
+    No model if the mode is not "local" or, with a remark that says why, if the estimates do not determine one.
+    """
     if spec.mode != "local":
         return None, ()
     try:
@@ -226,7 +232,7 @@ def _sources(
     law: GlobalModel | None,
     recording: Recording,
 ) -> tuple[dict[Source, Genome], tuple[str, ...]]:
-    """Genomes to compare with ``recording``, and warnings about them."""
+    """Return the genomes to compare with ``recording``, by source, and warnings about the global model there."""
     found: dict[Source, Genome] = {"nominal": nominal}
     warnings: tuple[str, ...] = ()
     for one in judged:
@@ -265,7 +271,7 @@ def _scatter(recording: Recording, fitted: Mask) -> float | None:
 
 
 def _misfit_remark(judged: _Judged, everywhere: list[_Compared]) -> str | None:
-    """A remark where the residual of an estimate is larger than noise explains."""
+    """Return a remark if the residual of an estimate is larger than noise explains, else None."""
     mine = [c for c in everywhere if c.recording.name in judged.estimate.recordings and c.scatter is not None]
     left = _rms(mine, ("local", "joint"))
     if left is None:
@@ -282,9 +288,9 @@ def _misfit_remark(judged: _Judged, everywhere: list[_Compared]) -> str | None:
 
 
 def _rms(some: list[_Compared], order: tuple[Source, ...]) -> float | None:
-    """RMS difference over all samples; each recording is compared with the first source in ``order`` that it has.
+    """Return the RMS difference (N) over all samples of the recordings ``some``; None if none has the fitted axes.
 
-    None where no recording has the fitted axes.
+    Each recording is compared with the first source in ``order`` for which it has a difference.
     """
     usable = [one for one in some if one.samples]
     if not usable:
@@ -300,9 +306,9 @@ def _left_out(
     nominal: Genome,
     estimates: list[LocalEstimate],
 ) -> tuple[tuple[Agreement, ...], tuple[str, ...]]:
-    """For each fitted recording, how a global model that was fitted without this recording agrees with it.
+    """Leave out each fitted recording in turn, fit the global model to the others, and compare it with the recording.
 
-    A recording without which no global model is determined is skipped. The second tuple has remarks on these models.
+    Returns the agreements, and remarks on these models. A recording is skipped if the others determine no model.
     """
     found: list[Agreement] = []
     remarks: list[str] = []
@@ -319,7 +325,7 @@ def _left_out(
 
 
 def _filtered_before(spec: CalibrationSpec, dataset: Dataset) -> tuple[str, ...]:
-    """Remarks on recordings to which the requested low-pass was not applied."""
+    """Return remarks on recordings to which the requested low-pass was not applied, as they have another one."""
     return tuple(
         f"recording {recording.name!r} says that it has been low-passed at {recording.low_pass.cutoff:g} Hz; "
         f"{spec.low_pass:g} Hz was not applied to it"
@@ -329,7 +335,10 @@ def _filtered_before(spec: CalibrationSpec, dataset: Dataset) -> tuple[str, ...]
 
 
 def _genes(model: BladeElementWing, nominal: Genome, judged: list[_Judged], adequate: bool) -> tuple[GeneResult, ...]:
-    """Genes with the mean of the estimates, the largest standard error, and whether every estimate identifies them."""
+    """Summarise each gene over all estimates: mean value, largest standard error, whether identifiable in all of them.
+
+    ``adequate``: noise explains the residual of every estimate; otherwise no gene counts as identifiable.
+    """
     best = nominal.replace(average([one.estimate for one in judged]))
     results = []
     for gene in model.genes:

@@ -1,6 +1,6 @@
-"""Coefficients over the flight envelope: Eq. 23 of Armanini et al. 2016, with weights, checks and limits.
+"""The global model: force coefficients as functions of the flight condition (Armanini et al. 2016, Eq. 23).
 
-The coefficients that vary are affine in flap frequency and body pitch, the others constant:
+Coefficients in AFFINE are affine in flap frequency f (Hz) and body pitch theta_b (rad), all others are constant:
 
     C_g(f, theta_b) = constant + per_hz f + per_rad theta_b.
 """
@@ -20,16 +20,16 @@ from wingfit.records.blas_threads import one_blas_thread
 from wingfit.sim.atmosphere import density
 
 AFFINE = ("C_l", "C_F")
-FEWEST = 4  # conditions: three coefficients of the law, and one more to contradict it
-FREE_FOR_SCATTER = 3  # conditions beyond the coefficients of the law, for its own scatter to be estimated
+FEWEST = 4  # conditions: as many as the coefficients of the equation, and one more to test it
+FREE_FOR_SCATTER = 3  # conditions beyond the coefficients of the equation, to estimate the scatter about it
 SMALL = 0.05  # of the root mean square of a coefficient: errors of smaller values are relative to this
-WEATHER = 0.05  # relative; the density of the air differs by as much from day to day, and warns of nothing
+WEATHER = 0.05  # relative difference of air density without a warning: it differs by as much from day to day
 COLLINEAR = 0.99  # correlation of frequency and pitch from which their slopes cannot be separated
 
 
 @dataclass(frozen=True)
 class GlobalValues:
-    """Coefficients at a condition, by name; ``remarks`` warn where the condition is not like those fitted."""
+    """Coefficients under one condition, by name; ``remarks`` warn if the condition is outside those fitted."""
 
     values: dict[str, float]
     remarks: tuple[str, ...]
@@ -43,14 +43,15 @@ def fit_global(
     *,
     weighted: bool = True,
 ) -> GlobalModel:
-    """Fit Eq. 23 to ``estimates``, each from one recording under the condition at the same place.
+    """Fit Eq. 23 to ``estimates``, each from one recording under the condition with the same index in ``conditions``.
 
-    Least squares, each local coefficient weighted by 1 / (its squared standard error + the squared scatter of local
-    coefficients about the law). The scatter is chosen so that the sum of weighted squared differences equals the
-    degrees of freedom (Paule and Mandel 1982); without it, a condition with many beats would dominate the fit. With
-    fewer than FREE_FOR_SCATTER more conditions than coefficients, or ``weighted`` False, all weights are equal.
+    Coefficients named in ``affine`` vary with the condition, others are means. The fit is by least squares, each local
+    coefficient weighted by 1 / (its squared standard error + the squared scatter of local coefficients about the
+    equation). The scatter is chosen so that the sum of weighted squared differences equals the degrees of freedom
+    (Paule and Mandel 1982); without it, a condition with many beats would dominate the fit. With fewer than
+    FREE_FOR_SCATTER more conditions than coefficients, or ``weighted`` False, all weights are equal.
 
-    ValueError where the conditions are too few, or frequency and pitch cannot be separated.
+    ValueError if the conditions are too few, or frequency and pitch cannot be separated.
     """
     if len(estimates) != len(conditions):
         raise ValueError(f"{len(estimates)} estimates need as many conditions, got {len(conditions)}")
@@ -69,14 +70,14 @@ def fit_global(
 
 @one_blas_thread
 def at(model: GlobalModel, condition: Condition) -> GlobalValues:
-    """Evaluate the coefficients of ``model`` under ``condition``, with a warning where it extrapolates."""
+    """Evaluate the coefficients of ``model`` under ``condition``, with remarks if this is an extrapolation."""
     f, pitch = condition.flap_frequency, condition.angle_of_attack
     values = {gene.name: gene.constant + gene.per_hz * f + gene.per_rad * pitch for gene in model.genes}
     return GlobalValues(values, _extrapolation(model, condition))
 
 
 def average(estimates: Sequence[LocalEstimate]) -> dict[str, float]:
-    """Mean of the local coefficients: the source's average model."""
+    """Return the mean of the local coefficients, by name: the average model of Armanini et al. 2016."""
     return {name: float(np.mean([e.values[name] for e in estimates])) for name in estimates[0].values}
 
 
@@ -110,7 +111,7 @@ def _few(conditions: int) -> tuple[str, ...]:
 
 
 def _untold(names: Sequence[str], estimates: Sequence[LocalEstimate]) -> tuple[str, ...]:
-    """Remarks on coefficients that no condition identifies."""
+    """Return remarks on the coefficients ``names`` whose standard error is at least their size in every condition."""
     return tuple(
         f"{name} could not be identified in any condition; its dependence on frequency and pitch is not meaningful"
         for name in names
@@ -119,7 +120,10 @@ def _untold(names: Sequence[str], estimates: Sequence[LocalEstimate]) -> tuple[s
 
 
 def _gene(name: str, estimates: Sequence[LocalEstimate], design: Array, weighted: bool) -> GlobalGene:
-    """Fit one coefficient to ``design`` [n, 3] or, for a mean, [n, 1]."""
+    """Fit the equation of the coefficient ``name`` to n local estimates.
+
+    ``design``: columns 1, f, theta_b [n, 3] of the n conditions or, for a constant coefficient, 1 [n, 1].
+    """
     local = np.array([estimate.values[name] for estimate in estimates])
     errors = np.array([estimate.standard_errors[name] for estimate in estimates])
     identified = np.isfinite(errors)
@@ -142,10 +146,10 @@ def _gene(name: str, estimates: Sequence[LocalEstimate], design: Array, weighted
 
 
 def _fit(design: Array, local: Array, errors: Array, weighted: bool) -> tuple[Array, float | None]:
-    """Fit the law to a coefficient's ``local`` estimates, one for each condition, with standard ``errors``.
+    """Fit a coefficient's equation to its ``local`` estimates [n], one per condition, with standard ``errors`` [n].
 
-    Returns the coefficients of the law, and the scatter of the estimates about it beyond their errors (None where that
-    cannot be estimated). ``design`` has one row for each condition.
+    Returns the k numbers of the equation [k], and the scatter of the estimates about it beyond their errors (None if it
+    cannot be estimated). ``design`` [n, k] has one row for each condition.
     """
     conditions, coefficients = design.shape
     if not weighted or conditions - coefficients < FREE_FOR_SCATTER or not np.isfinite(errors).all():
@@ -160,7 +164,10 @@ def _weighted(design: Array, local: Array, variance: Array) -> Array:
 
 
 def _scatter2(design: Array, local: Array, variance: Array) -> float:
-    """Squared scatter with which the weighted sum of squares equals the degrees of freedom; at least 0."""
+    """Return the squared scatter with which the weighted sum of squares equals the degrees of freedom; at least 0.
+
+    ``design`` [n, k], ``local`` estimates [n] and their ``variance`` [n] as in :func:`_fit`.
+    """
     freedom = design.shape[0] - design.shape[1]
     variance = np.maximum(variance, 1e-12 * float(np.mean(local**2)))
 
@@ -176,7 +183,11 @@ def _scatter2(design: Array, local: Array, variance: Array) -> float:
 
 
 def _left_out(k: int, design: Array, local: Array, errors: Array, identified: Mask, weighted: bool) -> float | None:
-    """Relative error, at condition ``k``, of the law fitted to the other conditions; None if they determine no law."""
+    """Return the relative error, in condition ``k``, of a coefficient's equation that was fitted to the others.
+
+    None if the other conditions do not determine it. Arguments as in :func:`_fit`; only conditions at which
+    ``identified`` [n] is True are fitted.
+    """
     rest = identified.copy()
     rest[k] = False
     if rest.sum() < design.shape[1] or not _independent(design[rest]):
@@ -186,7 +197,7 @@ def _left_out(k: int, design: Array, local: Array, errors: Array, identified: Ma
 
 
 def _sizes(local: Array) -> Array:
-    """Denominators of relative errors: the sizes of the coefficients, but at least SMALL times their RMS."""
+    """Return denominators [n] of relative errors: absolute values of ``local`` [n], at least SMALL times their RMS."""
     least = SMALL * float(np.sqrt(np.mean(local**2)))
     return np.maximum(np.abs(local), least if least > 0 else 1.0)
 
@@ -198,11 +209,12 @@ def _independent(design: Array) -> bool:
 
 
 def _extrapolation(model: GlobalModel, condition: Condition) -> tuple[str, ...]:
-    """Remarks where ``condition`` lies outside those of ``model``: in one variable, or in frequency and pitch together.
+    """Return remarks if ``condition`` lies outside those to which ``model`` was fitted.
 
-    Airspeed and density are not in the law, but the coefficients hold only near the fitted ones. Frequency
-    and pitch together are judged by the leverage, x^T (X^T X)^-1 x, whose largest value among the conditions fitted
-    bounds an ellipse around them (hidden extrapolation: Montgomery, Peck and Vining 2012, section 3.8).
+    Flap frequency, pitch, airspeed and air density are checked one by one; the last two are not in Eq. 23, but its
+    coefficients hold only near the fitted ones. Frequency and pitch are also checked together, by the leverage
+    x^T (X^T X)^-1 x: its largest value among the fitted conditions bounds an ellipse around them (hidden extrapolation:
+    Montgomery, Peck and Vining 2012, section 3.8).
     """
     f, pitch = condition.flap_frequency, condition.angle_of_attack
     remarks = [
@@ -223,7 +235,10 @@ def _extrapolation(model: GlobalModel, condition: Condition) -> tuple[str, ...]:
 def _outside(
     name: str, unit: str, value: float, fitted: tuple[float, float], *, scale: float = 1.0, slack: float = 0.0
 ) -> list[str]:
-    """A remark when ``value`` (shown times ``scale``) is outside what was fitted by more than the share ``slack``."""
+    """Return a remark if ``value`` is outside the range ``fitted``, widened by the fraction ``slack``; else [].
+
+    ``value`` and ``fitted``, times ``scale``, are in ``unit``.
+    """
     low, high = fitted
     if low * (1 - slack) - 1e-9 <= value <= high * (1 + slack) + 1e-9:
         return []
@@ -234,7 +249,7 @@ def _outside(
 
 
 def _leverage(model: GlobalModel, f: float, pitch: float) -> float:
-    """Leverage of a condition over the largest leverage of those fitted."""
+    """Return the leverage of frequency ``f`` (Hz) and ``pitch`` (rad), relative to the largest fitted one."""
     conditions = np.array([[c.flap_frequency, c.angle_of_attack] for c in model.conditions])
     centre, spread = conditions.mean(axis=0), conditions.std(axis=0)
     fitted = (conditions - centre) / spread

@@ -1,7 +1,9 @@
-"""The result of a calibration on forces: coefficients by condition, a global model, and how well each fits.
+"""The result of a calibration on forces: coefficients for each condition, a global model, how well each fits.
 
-Plain data; :mod:`wingfit.calibration.forces.estimation` and :mod:`wingfit.calibration.forces.agreement` fill it. SI
-units, forces in N.
+Plain data in SI units, forces in N, which are computed in :mod:`wingfit.calibration.forces.estimation` and
+:mod:`wingfit.calibration.forces.agreement`. A source says whose coefficients a model has: the nominal ones, those
+fitted to one recording ("local") or to several together ("joint"), those of the global model, or the "average" of the
+local ones.
 """
 
 from __future__ import annotations
@@ -23,9 +25,10 @@ Quantity = Literal["lift", "drag", "x", "z"]
 class LocalEstimate:
     """Maximum-likelihood estimate on one recording, or on several together (Armanini et al. 2016, Eq. 22).
 
-    ``standard_errors`` are Cramer-Rao bounds that account for coloured residuals, absolute; ``correlation`` [F, F] in
-    the order of ``values``. ``noise`` is the estimated covariance R of the fitted outputs, N^2, one matrix per
-    recording. ``remarks`` say which coefficients are not identifiable.
+    ``name`` is that of the stage, ``values`` are the F free genes by name. ``standard_errors`` (in the units of the
+    values) are Cramer-Rao bounds that account for coloured residuals; ``correlation`` [F, F] is in the order of
+    ``values``. ``noise`` is the estimated covariance R (N^2) of the axes, one matrix per recording, with variance 1 for
+    an axis that is not fitted; ``cost`` is J of Eq. 22 at the values. ``remarks`` name genes that are not identifiable.
     """
 
     name: str
@@ -41,10 +44,12 @@ class LocalEstimate:
 
 @dataclass(frozen=True)
 class GlobalGene:
-    """One coefficient over the conditions (Eq. 23): constant + per_hz f + per_rad theta_b; slopes 0 for a mean.
+    """One coefficient as a function of the condition (Eq. 23): constant + per_hz f + per_rad theta_b.
+
+    f is the flap frequency (Hz), theta_b the body pitch (rad); the slopes of a constant coefficient are 0.
 
     Attributes:
-        scatter: standard deviation of the local coefficients about the law beyond their standard errors; None where
+        scatter: standard deviation of the local coefficients about this function beyond their standard errors; None if
             the conditions are too few, and all have the same weight.
         largest_error: largest relative difference from a local estimate.
         left_out_error: largest relative difference from a local estimate that was left out of the fit; None with too
@@ -64,7 +69,7 @@ class GlobalGene:
 class GlobalModel:
     """Coefficients as functions of flap frequency and body pitch, and the conditions to which they were fitted.
 
-    ``conditions`` are those of the ``recordings``.
+    ``recordings`` are the names of the fitted recordings, ``conditions`` those under which they were made.
     """
 
     genes: tuple[GlobalGene, ...]
@@ -99,11 +104,11 @@ def _range(values: list[float]) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class Agreement:
-    """How one model agrees with one recording in one quantity.
+    """How one model (``source``) agrees with one recording in one quantity; forces in N.
 
-    RMS difference and Pearson's correlation are over all samples of the whole beats; ``rmse_percent`` is relative to
-    the range (largest minus smallest) of the recorded mean beat; means are over whole beats. Of a constant force there
-    is neither percentage (NaN) nor correlation.
+    RMS difference ``rmse`` and Pearson's correlation are over all samples of the whole beats; ``rmse_percent`` is
+    relative to the range (largest minus smallest) of the recorded mean beat; means are over whole beats. For a constant
+    force, percentage and correlation are NaN.
     """
 
     recording: str
@@ -120,8 +125,9 @@ class Agreement:
 class ForceResult:
     """Outcome of a calibration on forces.
 
-    ``left_out`` are agreements of a global model fitted without the recording that it predicts. ``held_out`` names the
-    recordings that were never fitted. RMS differences in N of the fitted outputs, before (nominal) and after.
+    ``left_out`` has, for each fitted recording, agreements of a global model that was fitted without it. ``held_out``
+    names the recordings that were never fitted. ``before`` (nominal genome) and ``after`` are RMS differences in N of
+    the fitted axes on the fitted recordings, ``held_out_before`` and ``held_out_after`` on the held-out ones (or None).
     """
 
     genes: tuple[GeneResult, ...]
@@ -141,8 +147,9 @@ class ForceResult:
 class ForceComparison:
     """Recorded and modelled forces of one recording over the beat, and their power spectra.
 
-    ``phase`` [n] is t*, in [0, 1); ``recorded`` and ``modelled`` map quantities to [n] in N (recorded: mean beat);
-    ``spread`` [n] is the standard deviation between beats. ``frequency`` [m] in Hz, spectra in N^2/Hz per quantity.
+    ``phase`` [n] is t*, the time in beats, in [0, 1); ``recorded`` and ``modelled`` are the mean beats [n] in N, by
+    quantity; ``spread`` [n] is the standard deviation (N) between recorded beats. ``frequency`` [m] in Hz; spectra [m]
+    in N^2/Hz, by quantity.
     """
 
     recording: str

@@ -1,4 +1,4 @@
-"""A recording of forces cut into beats, and into pieces for spectra."""
+"""Splits a recording of forces into beats, and into pieces for spectra."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ EDGE = 1e-6  # beats by which a sample may miss the start of a beat and still be
 
 @dataclass(frozen=True)
 class Cut:
-    """``beat`` [T] number of the beat of each sample; ``gapless`` [B] numbers of the whole beats without a gap."""
+    """Beats of a recording: ``beat`` [T] numbers each sample's beat; ``gapless`` [B]: whole beats without a gap."""
 
     beat: Array
     gapless: Array
 
     @classmethod
     def of(cls, recording: Recording) -> Cut:
-        """Cut ``recording``; ValueError when no whole beat is without a gap."""
+        """Split ``recording`` into beats, from its times and flap frequency; ValueError if no whole beat has no gap."""
         f, times = recording.condition.flap_frequency, recording.times
         step = float(np.median(np.diff(times)))
         beat = np.floor(f * times + EDGE)
@@ -42,10 +42,10 @@ class Cut:
 
 
 def pieces(recording: Recording, beats: int) -> Index:
-    """Sample indices [pieces, length] of consecutive pieces of ``beats`` beats without gaps.
+    """Return the sample indices [pieces, length] of consecutive pieces of ``beats`` beats without gaps.
 
-    Pieces are shorter if no stretch without gaps is that long, and [0, 0] if none holds a beat. A piece may begin at
-    any phase, which does not change the spectrum of a periodic force.
+    If no part of the recording without gaps is that long, pieces are shorter; without a whole beat the result is empty.
+    A piece may begin at any phase of the beat, which does not change the spectrum of a periodic force.
     """
     rows = np.flatnonzero(recording.valid.all(axis=1))
     runs = np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1)

@@ -1,1 +1,1 @@
-"""The layout of ``dataset.yaml``: its models, units and checks, and its JSON Schema."""
+"""The file ``dataset.yaml``: pydantic models of its keys, conversion of units, checks, and its JSON Schema."""

@@ -21,7 +21,7 @@ Inconsistency = tuple[Path, object, str]
 
 
 def inconsistencies(dataset: DatasetFile) -> Iterator[Inconsistency]:
-    """All inconsistencies between the values of a description, each as path, value and message."""
+    """Yield every inconsistency between values of ``dataset``: path of keys in the file, wrong value, message."""
     yield from _vehicle(dataset) if isinstance(dataset, VehicleDatasetFile) else _wing(dataset.wing)
     recordings = [recording.name for recording in dataset.recordings]
     yield from _unique(("recordings",), recordings, "name", ignore_case=True)
@@ -61,7 +61,10 @@ def _vehicle(dataset: VehicleDatasetFile) -> Iterator[Inconsistency]:
 
 
 def _starts_closed(motion: MotionFile, path: Path) -> Iterator[Inconsistency]:
-    """Yield an inconsistency if wings that clap are open at the start of the beat; a split cycle never is."""
+    """Yield an inconsistency if wings that clap are open at the start of the beat.
+
+    Only a Fourier series is checked: a split cycle always starts closed.
+    """
     flap = motion.flap
     if not isinstance(flap, FourierFile):
         return
@@ -122,14 +125,14 @@ def _markers(wing: WingFile) -> Iterator[Inconsistency]:
 
 
 def planform_outline(stations: Sequence[StationFile]) -> Float[Array, "N 2"]:
-    """Corners of the planform [N, 2] as (x, y): leading edge from root to tip, then trailing edge back."""
+    """Return the corners (x, y) of the planform [N, 2] in m: leading edge from root to tip, then trailing edge back."""
     leading = [(float(s.leading_edge_m), float(s.y_m)) for s in stations]
     trailing = [(float(s.leading_edge_m + s.chord_m), float(s.y_m)) for s in stations]
     return np.array(leading + trailing[::-1])
 
 
 def distance_outside(outline: Float[Array, "N 2"], x: float, y: float) -> float:
-    """Distance from (x, y) to the planform, m; 0 inside."""
+    """Return the distance (m) of the point (x, y) from the planform with the corners ``outline`` [N, 2]; 0 inside."""
     start, end = outline, np.roll(outline, -1, axis=0)
     point, edge = np.array([x, y]), end - start
     # Inside when a ray to +x crosses the outline an odd number of times.

@@ -37,16 +37,16 @@ _OTHER_NAMES = {"body_pitch_deg": "angle_of_attack_deg"}
 
 
 def to_rig(dataset: DatasetFile) -> Wing | Vehicle:
-    """The wing or vehicle of a checked description, in SI units."""
+    """Convert the wing or vehicle of a checked description to its dataclass, in SI units."""
     if isinstance(dataset, VehicleDatasetFile):
         return to_dataclass(Vehicle, dataset.vehicle)
     return to_dataclass(Wing, dataset.wing)
 
 
 def to_recording(entry: RecordingFile, samples: Samples, document: Document, path: Path, faults: Faults) -> Recording:
-    """The recording described by ``entry``, which stands at ``path``, with its ``samples``.
+    """Convert the description ``entry`` of a recording, together with its ``samples``, to a Recording.
 
-    Errors in its standard deviations are added to ``faults``.
+    Errors in its standard deviations are added to ``faults``; ``path`` is the position of ``entry`` in ``document``.
     """
     lag = {} if isinstance(entry, WingRecordingFile) else {"phase_lag": 0.0}
     return to_dataclass(
@@ -62,7 +62,7 @@ def to_recording(entry: RecordingFile, samples: Samples, document: Document, pat
 
 
 def to_dataclass(cls: type[T], model: BaseModel, **given: object) -> T:
-    """An instance of the dataclass ``cls`` from the keys of ``model``; ``given`` attributes replace the model's."""
+    """Make an instance of the dataclass ``cls`` from the keys of ``model``; attributes in ``given`` take precedence."""
     hints, values = get_type_hints(cls), dict(given)
     for key in type(model).model_fields:
         attribute, unit = _attribute(key, hints)
@@ -74,24 +74,27 @@ def to_dataclass(cls: type[T], model: BaseModel, **given: object) -> T:
 
 
 def to_data(instance: object, model: type[BaseModel]) -> dict[str, object]:
-    """The attributes of a dataclass as the plain data of ``model``, by its keys; None and empty values are omitted."""
+    """Convert a dataclass to plain data with the keys and units of ``model``; None and empty mappings are omitted."""
     axes = dict(zip("xyz", instance.position, strict=True)) if isinstance(instance, Marker) else {}
     return _data(vars(instance) | axes, model)
 
 
 def describe_rig(rig: Wing | Vehicle) -> dict[str, object]:
-    """``rig`` as the plain data under the key ``wing`` or ``vehicle`` of ``dataset.yaml``."""
+    """Convert ``rig`` to the plain data that ``dataset.yaml`` has under its key ``wing`` or ``vehicle``."""
     return to_data(rig, VehicleFile if isinstance(rig, Vehicle) else WingFile)
 
 
 def describe_recording(recording: Recording) -> dict[str, object]:
-    """``recording`` without its samples, as the plain data of ``dataset.yaml``."""
+    """Convert ``recording``, without its samples, to plain data: an entry of ``recordings`` in ``dataset.yaml``."""
     values = vars(recording.condition) | vars(recording) | {"standard_deviation": _deviations(recording)}
     return _data(values, VehicleRecordingFile if recording.kind == "forces" else WingRecordingFile)
 
 
 def _attribute(key: str, attributes: Iterable[str]) -> tuple[str | None, Unit]:
-    """The attribute that a key of the file holds, or None, and the unit in which the key holds it."""
+    """Return the one of ``attributes`` that ``key`` of the file holds and the unit there; None and SI if there is none.
+
+    The key ``dihedral_deg`` holds the attribute ``dihedral`` in degrees.
+    """
     name = _OTHER_NAMES.get(key, key)
     attribute = max((a for a in attributes if f"{name}_".startswith(f"{a}_")), key=len, default=None)
     return attribute, _UNITS.get(name[len(attribute) + 1 :], SI) if attribute else SI
@@ -112,7 +115,7 @@ def _to_value(value: Any, hint: Any, unit: Unit) -> object:
 
 
 def _dataclasses(hint: Any) -> Iterator[type[Any]]:
-    """Dataclasses within a type such as ``tuple[Rod, ...]`` or ``LowPass | None``."""
+    """Yield the dataclasses within the type ``hint``, such as ``tuple[Rod, ...]`` or ``LowPass | None``."""
     if isinstance(hint, type) and is_dataclass(hint):
         yield hint
     for argument in get_args(hint):
@@ -120,7 +123,7 @@ def _dataclasses(hint: Any) -> Iterator[type[Any]]:
 
 
 def _data(values: Mapping[str, object], model: type[BaseModel]) -> dict[str, object]:
-    """Attributes as the keys of ``model``, without those that are None or empty."""
+    """Convert attributes to plain data under the keys of ``model``, without None and empty mappings."""
     data = dict[str, object]()
     for key, field in model.model_fields.items():
         attribute, unit = _attribute(key, values)
@@ -130,7 +133,7 @@ def _data(values: Mapping[str, object], model: type[BaseModel]) -> dict[str, obj
 
 
 def _plain(value: Any, models: Sequence[type[BaseModel]], unit: Unit) -> object:
-    """Convert an attribute to plain data, in ``unit``; a dataclass by the one of ``models`` with the same ``kind``."""
+    """Convert an attribute to plain data in ``unit``; a dataclass by that one of ``models`` with the same ``kind``."""
     if is_dataclass(value):
         kind = getattr(value, "kind", None)
         return to_data(value, next(model for model in models if tag_of(model) == kind))
@@ -146,7 +149,10 @@ def _plain(value: Any, models: Sequence[type[BaseModel]], unit: Unit) -> object:
 def _to_deviations(
     entry: RecordingFile, samples: Samples, document: Document, path: Path, faults: Faults
 ) -> Float[Array, " C"] | None:
-    """Standard deviation of each channel [C], or None; markers or axes that are missing or unknown are faults."""
+    """Return the noise's standard deviation of each channel [C] (m or N), or None if ``entry`` gives none.
+
+    Adds a fault for a marker or axis of ``samples`` without an entry, and for one that is not in the recording.
+    """
     names: Sequence[str]
     if isinstance(entry, WingRecordingFile):
         key, what, each, names, size = "standard_deviation_m", "marker", "[x, y, z] for each marker", samples.markers, 3
@@ -169,7 +175,7 @@ def _to_deviations(
 
 
 def _deviations(recording: Recording) -> object:
-    """Standard deviations as plain data: one number where all are equal, else by marker or axis of force."""
+    """Convert standard deviations to plain data: forces by axis; tracks by marker, or one number; None if unknown."""
     if recording.standard_deviation is None:
         return None
     values = recording.standard_deviation.tolist()

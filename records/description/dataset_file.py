@@ -1,6 +1,6 @@
-"""The layout of ``dataset.yaml`` as pydantic models, in the units of the file, with physical limits.
+"""The keys of ``dataset.yaml`` as pydantic models, in the units of the file, with physical limits.
 
-These check the layout and single values; ``wingfit.records.description.consistency`` checks relations between values.
+The models check keys and single values; ``wingfit.records.description.consistency`` checks relations between values.
 The published JSON Schema is generated from these models.
 """
 
@@ -26,14 +26,14 @@ class _DatasetFile(Strict):
 
 
 class WingDatasetFile(_DatasetFile):
-    """A wing with recordings of its markers."""
+    """A dataset of a wing: its description, and recordings of the positions of its markers."""
 
     wing: WingFile
     recordings: list[WingRecordingFile] = Field(min_length=1, max_length=MAX_RECORDINGS)
 
 
 class VehicleDatasetFile(_DatasetFile):
-    """A vehicle with recordings of its forces."""
+    """A dataset of a vehicle: its description, and recordings of the forces of its wings."""
 
     vehicle: VehicleFile
     recordings: list[VehicleRecordingFile] = Field(min_length=1, max_length=MAX_RECORDINGS)
@@ -43,7 +43,7 @@ DatasetFile = WingDatasetFile | VehicleDatasetFile
 
 
 def model_of(data: object) -> type[DatasetFile]:
-    """The model for unchecked ``data``: a vehicle's if it has the key ``vehicle`` or a similar one, else a wing's."""
+    """Return the model for unchecked ``data``: a wing's, unless it has no key ``wing`` but one like ``vehicle``."""
     keys = [str(key) for key in data] if isinstance(data, Mapping) else []
     meant = "wing" not in keys and difflib.get_close_matches("vehicle", keys, 1, 0.7)
     return VehicleDatasetFile if meant else WingDatasetFile

@@ -1,4 +1,4 @@
-"""Checks a description against its models and converts pydantic's errors to messages with a remedy."""
+"""Checks ``dataset.yaml`` against its models, and converts pydantic's errors to messages with a remedy."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _ROOTS: dict[str, type[DatasetFile]] = {"wing": WingDatasetFile, "vehicle": Vehi
 
 
 def check_description(document: Document) -> DatasetFile:
-    """Validate the description; DatasetError lists its errors."""
+    """Validate the parsed ``dataset.yaml`` and return it as a model; DatasetError lists all errors."""
     faults, data = Faults(), document.data
     if isinstance(data, Mapping) and "wing" in data and "vehicle" in data:
         message = f"both 'wing' and 'vehicle' are described; a dataset is of {' or '.join(_RIGS.values())}: split it"
@@ -52,17 +52,17 @@ def check_description(document: Document) -> DatasetFile:
 
 
 class _Explainer:
-    """Converts pydantic's errors on one description; ``root`` is the model it was checked against."""
+    """Converts pydantic's errors on one ``document``, which was checked against the model ``root``, to faults."""
 
     def __init__(self, document: Document, root: type[DatasetFile]) -> None:
         self.document, self.root = document, root
 
     def explain(self, errors: list[ErrorDetails], faults: Faults) -> None:
-        """Add all errors to ``faults``."""
+        """Add a fault for each of pydantic's ``errors``; a key with a wrong unit gets one, not two."""
         mistaken = {self._renamed(error["loc"]) for error in errors if error["type"] == "extra_forbidden"}
         for error in errors:
             path, unknown = _path(error, self.document.data), error["type"] == "extra_forbidden"
-            # A key with a wrong unit is one error, not an unknown key and a missing one.
+            # Pydantic reports a key with a wrong unit twice: as an unknown key and as a missing one.
             if error["type"] == "missing" and error["loc"] in mistaken:
                 continue
             value = error["input"] if error["type"] != "missing" else None
@@ -93,7 +93,7 @@ class _Explainer:
         return f"unknown key {key!r}; {nearest(key, fields)}"
 
     def _renamed(self, location: Location) -> Location | None:
-        """The location of the known key that an unknown key matches except for its unit, or None."""
+        """Return the location of the known key that differs from the key at ``location`` only in its unit, or None."""
         key = str(location[-1])
         for known in self._fields(location):
             if _SUFFIX.search(known) and _stem(known) == _stem(key):
@@ -101,12 +101,12 @@ class _Explainer:
         return None
 
     def _fields(self, location: Location) -> list[str]:
-        """Valid keys of the mapping that contains ``location``."""
+        """Return the valid keys of the mapping that contains the key at ``location``."""
         return [name for model in _models(self.root, location[:-1])[:1] for name in model.model_fields]
 
 
 def _plain_message(error: ErrorDetails) -> str:
-    """Message for an error that needs no context."""
+    """Return the message for an error that can be explained without the rest of the file."""
     what, context, value = error["type"], error.get("ctx", {}), error["input"]
     if what == FAULT:
         return error["msg"]
@@ -129,7 +129,10 @@ def _stem(key: str) -> str:
 
 
 def _models(root: type[BaseModel], location: Location) -> list[type[BaseModel]]:
-    """Models for the data at ``location``: several within a union whose tag is not given."""
+    """Return the models below ``root`` for the data at ``location`` (keys, indices, values of ``kind``).
+
+    There are several if ``location`` does not say which ``kind`` it is.
+    """
     models = [root]
     for part in location:
         fields = [model.model_fields[str(part)] for model in models if str(part) in model.model_fields]
@@ -141,7 +144,7 @@ def _models(root: type[BaseModel], location: Location) -> list[type[BaseModel]]:
 
 
 def _path(error: ErrorDetails, data: Any) -> Path:
-    """Pydantic's location as a path in the data, without the tags of unions, which are not keys of the file."""
+    """Convert pydantic's location of ``error`` to a path in ``data``, without values of ``kind``, which are no keys."""
     location, path = error["loc"], list[str | int]()
     for number, part in enumerate(location):
         inside = isinstance(data, Mapping) and part in data

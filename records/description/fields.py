@@ -1,4 +1,4 @@
-"""Types of the keys of ``dataset.yaml`` that wings and vehicles share, with their physical limits."""
+"""Types of values in ``dataset.yaml`` that wings and vehicles share, with their physical limits."""
 
 from __future__ import annotations
 
@@ -56,13 +56,13 @@ Estimates = Annotated[
 
 
 class Strict(BaseModel):
-    """Base of all models of the file; unknown keys are errors."""
+    """Base class of all models of ``dataset.yaml``: unknown keys are errors."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
 class FourierFile(Strict):
-    """An angle as a Fourier series over the beat; entry k belongs to the k-th harmonic."""
+    """An angle as a Fourier series over the beat; the k-th entry of each list belongs to the k-th harmonic."""
 
     kind: Literal["fourier"]
     mean_deg: Angle
@@ -78,7 +78,7 @@ class FourierFile(Strict):
 
 
 def models_in(annotation: Any) -> Iterator[type[BaseModel]]:
-    """Models within a type such as ``list[Model] | None``."""
+    """Yield the pydantic models within the type ``annotation``, such as ``list[Model] | None``."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         yield annotation
     for argument in get_args(annotation):
@@ -86,18 +86,18 @@ def models_in(annotation: Any) -> Iterator[type[BaseModel]]:
 
 
 def tag_of(model: type[BaseModel]) -> str | None:
-    """The value of the key ``kind`` that selects ``model`` in a union; None for a model without that key."""
+    """Return the value of the key ``kind`` that selects ``model`` among alternatives; None if it has no such key."""
     field = model.model_fields.get("kind")
     return str(get_args(field.annotation)[0]) if field else None
 
 
 def one_or_each(value: Any) -> str:
-    """Discriminator of the forms of a noise level: "one" number for all channels, or a mapping with "each"."""
+    """Return the form of a standard deviation, for pydantic: "each" for a mapping by channel, else "one"."""
     return "each" if isinstance(value, Mapping) else "one"
 
 
 def whole(value: Any) -> Any:
-    """``value`` as an int if it is a whole number, for fields that admit only ints."""
+    """Convert ``value`` to an int if it is a whole decimal number, else return it; for fields that admit only ints."""
     if isinstance(value, Decimal) and abs(value) < 10**6 and value == value.to_integral_value():
         return int(value)
     return value

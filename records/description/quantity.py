@@ -1,4 +1,4 @@
-"""Numbers and names in files: pydantic metadata that checks limits and writes them into the JSON Schema."""
+"""Pydantic metadata for numbers and texts in files: checks their limits and writes them into the JSON Schema."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ FAULT = "wingfit"  # type of the pydantic errors whose message is final
 
 
 def fault(message: str) -> PydanticCustomError:
-    """Make a pydantic error with this final message."""
+    """Return a pydantic error whose ``message`` is shown to the user as it is."""
     return PydanticCustomError(FAULT, "{message}", {"message": message})
 
 
 def limits(interval: str, description: str, remedy: str = "") -> GetPydanticSchema:
-    """Metadata of a finite number in an interval such as ``"(0, 0.5] m"``; a round bracket excludes the lower limit.
+    """Return metadata of a finite number in an ``interval`` such as "(0, 0.5] m"; "(" excludes the lower limit.
 
     The number is read as a decimal, so that its conversion to SI rounds once. Errors name value, limits and unit, and
-    ``remedy``, advice for the usual mistake.
+    ``remedy``: advice for the usual mistake. ``description`` is for the JSON Schema.
     """
     match = re.fullmatch(r"([(\[])(.+), (.+)\] ?(.*)", interval)
     if match is None:
@@ -47,9 +47,10 @@ def limits(interval: str, description: str, remedy: str = "") -> GetPydanticSche
 
 
 def text(pattern: str, length: int, description: str, rule: str, *, portable: bool = True) -> GetPydanticSchema:
-    """Metadata of text of at most ``length`` characters that matches ``pattern``, which ``rule`` describes in errors.
+    """Return metadata of text of at most ``length`` characters that matches ``pattern``.
 
-    A pattern that is not ``portable`` between dialects of regular expressions is omitted from the JSON Schema.
+    ``rule`` describes the pattern in errors, ``description`` the text in the JSON Schema. A pattern that is not
+    ``portable`` between dialects of regular expressions is omitted from the JSON Schema.
     """
 
     def check(value: Any) -> str:
@@ -67,13 +68,13 @@ def text(pattern: str, length: int, description: str, rule: str, *, portable: bo
 
 
 def _checked(check: Callable[[Any], object], schema: dict[str, Any]) -> GetPydanticSchema:
-    """Metadata of a field whose value is that returned by ``check``, with ``schema`` as its JSON Schema."""
+    """Return metadata of a field: ``check`` converts its value or raises an error, ``schema`` is its JSON Schema."""
     validator = core_schema.no_info_plain_validator_function(check)
     return GetPydanticSchema(lambda *_: validator, lambda *_: dict(schema))
 
 
 def kind(value: object) -> str:
-    """Description of ``value`` in the terms of YAML, for messages."""
+    """Describe ``value`` in the terms of YAML for a message: "empty", "the number 3", "a list of 2"."""
     if value is None:
         return "empty"
     if isinstance(value, bool):

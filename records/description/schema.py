@@ -1,4 +1,4 @@
-"""The JSON Schema of ``dataset.yaml``, generated from its models; running the module prints it."""
+"""Generates the JSON Schema of ``dataset.yaml`` from its models; running the module prints it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from wingfit.records.limits import FORMAT_VERSION
 
 
 def dataset_schema() -> dict[str, Any]:
-    """JSON Schema (2020-12) of the description, version ``FORMAT_VERSION`` of the format."""
+    """Return the JSON Schema (2020-12) of ``dataset.yaml``, version ``FORMAT_VERSION`` of the format."""
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "$id": f"urn:wingfit:schema:dataset:{FORMAT_VERSION}",
@@ -23,17 +23,17 @@ def dataset_schema() -> dict[str, Any]:
 
 
 def schema_text() -> str:
-    """The text of the published schema, docs/schemas/dataset.schema.json."""
+    """Return the text of the published schema, docs/schemas/dataset.schema.json."""
     return as_text(dataset_schema())
 
 
 def as_text(schema: dict[str, Any]) -> str:
-    """``schema`` as indented JSON."""
+    """Return ``schema`` as indented JSON text."""
     return json.dumps(schema, indent=2, ensure_ascii=False) + "\n"
 
 
 def untitled(schema: Any) -> Any:
-    """``schema`` without the titles that pydantic derives from key names."""
+    """Return ``schema`` without the titles that pydantic derives from names, at any depth."""
     if isinstance(schema, list):
         return [untitled(item) for item in schema]
     if not isinstance(schema, dict):

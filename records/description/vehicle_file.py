@@ -1,4 +1,4 @@
-"""The layout of ``vehicle:`` in ``dataset.yaml`` and of the recordings of its forces."""
+"""Models of ``vehicle:`` in ``dataset.yaml`` and of the recordings of its forces."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ Deviation = Annotated[Decimal, limits("(0, 100] N", "standard deviation of the n
 
 
 class ChordFile(Strict):
-    """Chord at a distance from the flapping axis."""
+    """Chord of the wing at one distance from the flapping axis."""
 
     r_m: Annotated[Decimal, limits("[0, 10] m", "distance from the flapping axis", fields.METRES)]
     chord_m: fields.Chord
 
 
 class SplitCycleFile(Strict):
-    """Flap angle that opens and closes at two speeds (Armanini et al. 2016, Eqs. 20-21).
+    """Flap angle of wings that open and close at different speeds (Armanini et al. 2016, Eqs. 20-21).
 
-    The wing opens during pi / (2 pi - split_rad_per_beat) of the beat; the limits are 17 % and 83 %.
+    The wing opens during the fraction pi / (2 pi - split_rad_per_beat) of the beat, which may be 17 % to 83 %.
     """
 
     kind: Literal["split_cycle"]
@@ -49,7 +49,7 @@ class SplitCycleFile(Strict):
 
 
 class PassivePitchFile(Strict):
-    """Wing pitch that follows the flap motion (Armanini et al. 2016, Eq. 17 and Table 5)."""
+    """Wing pitch computed from the flap angle and its rate (Armanini et al. 2016, Eq. 17 and Table 5)."""
 
     kind: Literal["passive"]
     constant_rad: Annotated[Decimal, limits("[-10, 10] rad", "C_theta,0", "give radians")]
@@ -59,7 +59,7 @@ class PassivePitchFile(Strict):
 
 
 class MotionFile(Strict):
-    """Prescribed motion of the wings over a beat; it starts where they are closest and begin to open."""
+    """Prescribed motion of the wings over a beat, which starts where the wings are closest and begin to open."""
 
     flap: Annotated[SplitCycleFile | fields.FourierFile, Field(discriminator="kind")]
     pitch: Annotated[PassivePitchFile | fields.FourierFile, Field(discriminator="kind")]
@@ -74,7 +74,7 @@ class MotionFile(Strict):
 
 
 class VehicleFile(Strict):
-    """The vehicle."""
+    """The vehicle: wings, masses and motion."""
 
     name: fields.Title
     layout: Literal["x4", "pair", "single"]
@@ -93,14 +93,14 @@ class VehicleFile(Strict):
 
 
 class LowPassFile(Strict):
-    """The zero-phase Butterworth filter that was applied to the values."""
+    """The zero-phase Butterworth low-pass that was applied to the forces before they were stored in the file."""
 
     cutoff_hz: Annotated[Decimal, limits("(0, 1000000] Hz", "half-power frequency of one pass")]
     order: Annotated[Literal[1, 2, 3, 4, 5, 6, 7, 8], BeforeValidator(fields.whole)] = 4
 
 
 class AxesFile(Strict):
-    """One number for each force axis recorded."""
+    """Standard deviation of the noise: one number for each force axis recorded."""
 
     x: Deviation | None = None
     z: Deviation | None = None
@@ -112,7 +112,7 @@ Noise = Annotated[
 
 
 class VehicleRecordingFile(Strict):
-    """One recording; its forces are in ``recordings/<name>.csv``."""
+    """One recording of a vehicle; its forces are in ``recordings/<name>.csv``."""
 
     name: fields.Name
     rig: Literal["wind_tunnel", "free_flight", "vacuum_chamber"]

@@ -1,4 +1,4 @@
-"""The layout of ``wing:`` in ``dataset.yaml`` and of the recordings of its markers."""
+"""Models of ``wing:`` in ``dataset.yaml`` and of the recordings of its markers."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Deviation = Annotated[Decimal, limits("(0, 0.1] m", "standard deviation of the n
 
 
 class StationFile(Strict):
-    """Section of the planform."""
+    """Section of the planform at one span position: leading edge, chord and thickness."""
 
     y_m: Place
     leading_edge_m: Place
@@ -29,7 +29,7 @@ class StationFile(Strict):
 
 
 class MaterialsFile(Strict):
-    """Densities, which are not genes."""
+    """Densities of the wing's foam and skin, which no calibration changes."""
 
     foam_density_kg_m3: Annotated[Decimal, limits("(0, 2000] kg/m^3", "density of the foam")]
     skin_areal_density_kg_m2: Annotated[
@@ -38,7 +38,7 @@ class MaterialsFile(Strict):
 
 
 class RodFile(Strict):
-    """Carbon rod in its straw."""
+    """Carbon rod that slides in a straw glued into the foam, straight from its root to its tip."""
 
     name: fields.Name
     x_root_m: Place
@@ -53,7 +53,7 @@ class RodFile(Strict):
 
 
 class MarkerFile(Strict):
-    """Tracked marker at rest."""
+    """Tracked marker: its position when the wing is at rest, and its mass."""
 
     name: fields.Name
     x_m: Place
@@ -63,14 +63,14 @@ class MarkerFile(Strict):
 
 
 class HingeFile(Strict):
-    """Axis of flapping, parallel to x."""
+    """Axis about which the wing flaps, parallel to x through the point (y_m, z_m)."""
 
     y_m: Place
     z_m: Place
 
 
 class FourBarFile(Strict):
-    """Crank-rocker linkage that drives the rods."""
+    """Crank-rocker four-bar linkage that drives the rods: lengths of its links."""
 
     kind: Literal["four_bar"]
     ground_m: Length
@@ -93,7 +93,7 @@ class FourBarFile(Strict):
 
 
 class WingFile(Strict):
-    """The wing."""
+    """The wing: planform, materials, rods, markers, hinge and drive."""
 
     name: fields.Title
     stations: list[StationFile] = Field(min_length=2, max_length=MAX_STATIONS)
@@ -115,7 +115,7 @@ Noise = Annotated[
 
 
 class WingRecordingFile(Strict):
-    """One recording; its tracks are in ``recordings/<name>.csv``."""
+    """One recording of a wing; its tracks (positions of markers over time) are in ``recordings/<name>.csv``."""
 
     name: fields.Name
     rig: Literal["vacuum_chamber", "wind_tunnel"]

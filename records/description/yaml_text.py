@@ -27,14 +27,14 @@ _WORDS: dict[str, object] = {"true": True, "false": False, "null": None, "~": No
 
 @dataclass(frozen=True)
 class Document:
-    """Parsed YAML: plain data, and the position (line, column; from 1) of every key and item."""
+    """A parsed YAML ``file``: plain ``data``; ``places`` has line and column (from 1) of every key and item."""
 
     file: str
     data: Any
     places: dict[Path, tuple[int, int]] = field(default_factory=dict)
 
     def where(self, path: Path) -> str:
-        """File, line and dotted key of ``path``; a missing key has the position of its parent."""
+        """Return file, line, column and dotted key of ``path`` as text; a missing key has its parent's position."""
         known = path
         while known and known not in self.places:
             known = known[:-1]
@@ -43,7 +43,7 @@ class Document:
         return f"{self.file}{line}: {key}" if key else f"{self.file}{line}"
 
     def names(self, *path: str) -> list[str]:
-        """Names in the list at ``path``; the data need not have been checked."""
+        """Return the value of ``name`` of each mapping in the list at ``path``; the data need not have been checked."""
         data = self.data
         for key in path:
             data = data.get(key) if isinstance(data, dict) else None
@@ -52,13 +52,13 @@ class Document:
 
 
 def dotted(path: Path) -> str:
-    """``("wing", "stations", 2, "chord_m")`` as ``wing.stations[2].chord_m``."""
+    """Write a path as text: ``("wing", "stations", 2, "chord_m")`` gives ``wing.stations[2].chord_m``."""
     text = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path)
     return text.removeprefix(".")
 
 
 def read_yaml(raw: bytes, file: str) -> Document:
-    """Parse ``raw``; DatasetError when it is not the plain YAML this format uses."""
+    """Parse the contents ``raw`` of ``file``; DatasetError if it is not the plain YAML that the format uses."""
     check_most(file, "is", len(raw) / MIB, MAX_DESCRIPTION_BYTES / MIB, "MiB", "put samples in CSV")
     text = decode(raw, file)
     try:
@@ -79,7 +79,7 @@ def write_yaml(data: object) -> str:
 
 
 class _Builder:
-    """Builds plain data from parser events."""
+    """Builds plain data from the events of the YAML parser, and stores where each key and item stands."""
 
     def __init__(self, file: str, events: Iterator[Any]) -> None:
         self.file = file
@@ -101,7 +101,7 @@ class _Builder:
         return Document(self.file, data, self.places)
 
     def _counted(self, events: Iterator[Any]) -> Iterator[Any]:
-        """The events, limited in number: the data built from them take far more memory than the text."""
+        """Yield the events; DatasetError for more than MAX_ITEMS: the data need far more memory than their text."""
         for number, event in enumerate(events):
             if number > MAX_ITEMS:
                 raise self._error(event, f"more than {MAX_ITEMS} keys, items and values; put samples in CSV")

@@ -1,1 +1,1 @@
-"""Datasets as files: folders, zips and NetCDF; uploaded files are read in a separate process."""
+"""Datasets as files: folders, zips and NetCDF; uploaded NetCDF files are read in a separate process."""

@@ -1,4 +1,7 @@
-"""A dataset as a zip of its folder. Archives are not trusted: sizes are checked first, nothing is extracted to disk."""
+"""Reads and writes a dataset as a zip of its folder.
+
+Zips are not trusted: sizes are checked before anything is read, and nothing is extracted to disk.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +25,10 @@ _EPOCH = (1980, 1, 1, 0, 0, 0)
 
 
 def read_zip(data: bytes, label: str) -> Dataset:
-    """Read a dataset from the bytes of a zip; names are relative to the top-level folder if there is only one."""
+    """Read a dataset from the bytes of a zip, which holds the dataset's files or one folder with them.
+
+    ``label`` names the zip in messages. DatasetError lists its errors.
+    """
     try:
         archive = zipfile.ZipFile(io.BytesIO(data))
     except _BROKEN as error:
@@ -42,7 +48,7 @@ def read_zip(data: bytes, label: str) -> Dataset:
 
 
 def write_zip(dataset: Dataset) -> bytes:
-    """Pack the dataset as a zip; the same dataset gives the same bytes."""
+    """Return the bytes of a zip of the dataset; the same dataset gives the same bytes."""
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w") as archive:
         for name, data in sorted(contents(dataset).items()):
@@ -86,7 +92,7 @@ def _entry_problem(entry: zipfile.ZipInfo) -> str | None:
 
 
 def _prefix(names: Sequence[str]) -> str:
-    """``folder/`` if all files are in one folder that contains the description, else the empty string."""
+    """Return ``folder/`` if all files ``names`` are in one folder with dataset.yaml, else the empty string."""
     folders = {name.partition("/")[0] for name in names}
     single = f"{folders.pop()}/" if len(folders) == 1 else ""
     return single if f"{single}{DESCRIPTION}" in names else ""

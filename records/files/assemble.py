@@ -1,4 +1,7 @@
-"""Builds a dataset from a description and samples, from any kind of file; the same checks are made before writing."""
+"""Builds a dataset from ``dataset.yaml`` and samples, whatever kind of file holds them, and checks both.
+
+The same checks are made before a dataset is written.
+"""
 
 from __future__ import annotations
 
@@ -26,10 +29,10 @@ At = Callable[[str, Samples, int], str]
 def assemble(
     document: Document, read: ReadSamples, where: Callable[[str], str], at: At, room: int = MAX_VALUES
 ) -> Dataset:
-    """Build the dataset described by ``document``, of at most ``room`` numbers; DatasetError lists all faults.
+    """Build the dataset described by ``document``, of at most ``room`` numbers; DatasetError lists the faults.
 
-    ``read(name, room)`` returns the samples of a recording of at most ``room`` numbers. For messages, ``where(name)``
-    names the place where they are stored and ``at(name, samples, row)`` that of one instant.
+    ``read(name, room)`` returns the samples, at most ``room`` numbers, of the recording called ``name``. For messages,
+    ``where(name)`` says where these samples are stored, and ``at(name, samples, row)`` where one row of them is.
     """
     checked = check_description(document)
     rig = to_rig(checked)
@@ -52,7 +55,7 @@ def assemble(
 
 
 def checked_description(dataset: Dataset) -> dict[str, object]:
-    """Plain data of ``dataset.yaml``, after the checks that reading makes, so that a written dataset can be read."""
+    """Check ``dataset`` as reading does, and return the plain data of ``dataset.yaml``; DatasetError lists errors."""
     faults = Faults()
     for recording in dataset.recordings:
         _check_kind(recording, dataset, faults)
@@ -74,7 +77,7 @@ def checked_description(dataset: Dataset) -> dict[str, object]:
 
 
 def describe(dataset: Dataset) -> dict[str, object]:
-    """``dataset`` without its numbers, as the plain data of ``dataset.yaml``."""
+    """Convert ``dataset``, without its samples, to the plain data of ``dataset.yaml``; nothing is checked."""
     return {
         "format_version": FORMAT_VERSION,
         "name": dataset.name,
@@ -86,7 +89,10 @@ def describe(dataset: Dataset) -> dict[str, object]:
 
 
 def _check_kind(recording: Recording, dataset: Dataset, faults: Faults) -> None:
-    """Add a fault for every attribute that files of this kind of dataset cannot store."""
+    """Add a fault for every attribute of ``recording`` that has a value but cannot be stored in files of ``dataset``.
+
+    A dataset of a wing stores no forces, a dataset of a vehicle no markers.
+    """
     where, kept = f"recording {recording.name!r}", dataset.kind == "forces"
     lost = ("markers", "condition.phase_lag") if kept else ("forces", "low_pass", "motion", "mass")
     for name in lost:
@@ -113,7 +119,7 @@ def _check_shapes(recording: Recording, faults: Faults) -> None:
 
 
 def check_markers(markers: Sequence[str], known: Sequence[str], where: str, faults: Faults) -> None:
-    """Add a fault for every one of ``markers`` that is not ``known`` on the wing, or is named twice."""
+    """Add a fault for every one of ``markers`` that is not among the wing's ``known`` ones, or that is repeated."""
     for index, name in enumerate(markers):
         if name not in known:
             faults.add(where, name, f"no marker of the wing is called {name!r}; {nearest(name, known)}")

@@ -1,13 +1,14 @@
 """Reads an untrusted NetCDF file in a separate process, with limits of memory, processor time and wall time.
 
-A damaged file can make the HDF5 library loop, crash or allocate gigabytes; in a separate process, only that process
-ends. Each file is read by a new process, so that a file cannot affect the next one. The process returns the dataset in
-the internal storage format (:mod:`wingfit.records.files.parsed`), which the caller checks again.
+A damaged file can make the HDF5 library loop, crash or allocate gigabytes; then only the separate process ends. Each
+file is read by a new process, so that a file cannot affect the next one. The process returns the dataset in the
+internal storage format (:mod:`wingfit.records.files.parsed`), which the caller checks again.
 
 ``python -m wingfit.records.files.confined JSON`` (label and limits) reads the file from standard input and writes the
 storage format to standard output. If the file has faults, it writes a list of them as JSON instead, and its exit
 status is ``FAULTS``. Any other status than 0 means that the process failed: a status in ``DISK_FULL`` if there was no
-room for the output, ``READ_FAILED`` or a signal while it read, and 1, the interpreter's own, before it read.
+room for the output, ``READ_FAILED`` or a signal for a failure while it read, and ``NOT_STARTED`` (the interpreter's
+own status) for a failure before it read.
 """
 
 from __future__ import annotations
@@ -44,16 +45,16 @@ LOG = logging.getLogger("wingfit")
 
 
 class ReaderError(RuntimeError):
-    """The reading process failed for a reason other than the file."""
+    """Raised if the reading process failed for a reason other than the file."""
 
 
 @dataclass(frozen=True)
 class Limits:
-    """Limits of reading one file.
+    """Limits of the process that reads one file.
 
     Attributes:
-        values: numbers in it.
-        memory_mib: address space beyond that of the process before it opens the file, MiB.
+        values: count of numbers in the file.
+        memory_mib: address space in addition to that of the process before it opens the file, MiB.
         processor_s: processor time, s.
         wall_s: elapsed time, s; more than the processor time, since processors are shared.
         output_mib: size of the output in the storage format, MiB.
@@ -69,7 +70,7 @@ class Limits:
 
 
 def limits_of_upload(size: int) -> Limits:
-    """Limits for an uploaded file of ``size`` bytes, so that every upload is answered within 20 s.
+    """Return the limits for an uploaded file of ``size`` bytes, chosen so that every upload is answered within 20 s.
 
     On a Xeon, a valid file of 14.8 million numbers, twice the limit of uploads, took 7.5 s of processor time and 327 MB
     of resident memory, interpreter and libraries included.
@@ -89,10 +90,11 @@ STORED = Limits(values=MAX_VALUES, memory_mib=3072, processor_s=300, wall_s=900,
 
 
 def convert_netcdf(data: bytes, label: str, limits: Limits | None = None) -> bytes:
-    """The dataset in ``data`` in the internal storage format; DatasetError lists its errors.
+    """Convert the NetCDF file ``data`` to the internal storage format in a separate process; return the bytes.
 
-    ``label`` names the file in messages. The default ``limits`` are those of an upload of this size. OSError if the
-    temporary folder is full or no process can be started; ReaderError if the process failed before it read the file.
+    ``label`` names the file in messages. The default ``limits`` are those of an upload of this size. DatasetError lists
+    the errors of the file. OSError if the temporary folder is full or no process can be started; ReaderError if the
+    process failed before it read the file, or was killed by the system.
     """
     limits = limits or limits_of_upload(len(data))
     with tempfile.TemporaryFile() as source, tempfile.TemporaryFile() as output, tempfile.TemporaryFile() as log:
@@ -110,7 +112,7 @@ def convert_netcdf(data: bytes, label: str, limits: Limits | None = None) -> byt
 
 
 def _run(streams: tuple[IO[bytes], IO[bytes], IO[bytes]], label: str, limits: Limits) -> int:
-    """Run the child on the standard ``streams``; its exit status, or minus the signal that ended it."""
+    """Run the reading process on ``streams`` (input, output, errors); return its exit status, or minus its signal."""
     options = json.dumps({"label": label, "limits": asdict(limits)})
     command = [sys.executable, "-P", "-m", "wingfit.records.files.confined", options]
     # Only the necessary part of the server's environment, which may contain secrets.
@@ -133,7 +135,7 @@ def _run(streams: tuple[IO[bytes], IO[bytes], IO[bytes]], label: str, limits: Li
 
 
 def _failure(status: int, label: str, limits: Limits) -> Exception:
-    """The error for a child that ended without output."""
+    """Return the error to raise for a reading process that ended with ``status`` and no output."""
     if status in DISK_FULL:
         return OSError(status, os.strerror(status))
     if status == NOT_STARTED:
@@ -151,7 +153,7 @@ def _failure(status: int, label: str, limits: Limits) -> Exception:
 
 
 def _faults(answer: bytes, label: str) -> DatasetError:
-    """The faults that the child reported as JSON; its texts are not trusted and are taken as plain text."""
+    """Return the error with the faults that the reading process reported as JSON; not trusted, converted to text."""
     try:
         report = json.loads(answer)
         faults = [Fault(str(where), value and str(value), str(message)) for where, value, message in report["faults"]]
@@ -164,7 +166,10 @@ def _faults(answer: bytes, label: str) -> DatasetError:
 
 
 def main(arguments: Sequence[str]) -> None:
-    """Convert standard input to standard output."""
+    """Convert the NetCDF file on standard input to the storage format on standard output, in the reading process.
+
+    ``arguments`` holds one JSON text with the label and the limits.
+    """
     options = json.loads(arguments[0])
     label, limits = options["label"], Limits(**options["limits"])
     os.nice(NICENESS)
@@ -195,7 +200,7 @@ def main(arguments: Sequence[str]) -> None:
 
 
 def _limit(which: int, most: int, slack: int = 0) -> None:
-    """Set the soft limit ``most`` of a resource (``resource.RLIMIT_...``), and a hard limit larger by ``slack``."""
+    """Limit the resource ``which`` (``resource.RLIMIT_...``): soft limit ``most``, hard limit larger by ``slack``."""
     _, hard = resource.getrlimit(which)
     hard = most + slack if hard == resource.RLIM_INFINITY else min(most + slack, hard)
     resource.setrlimit(which, (min(most, hard), hard))

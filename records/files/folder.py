@@ -1,4 +1,4 @@
-"""A dataset as files: ``dataset.yaml`` and ``recordings/<name>.csv``, in a folder or an archive."""
+"""Reads and writes a dataset as files ``dataset.yaml`` and ``recordings/<name>.csv``, in a folder or a zip."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ RECORDINGS = "recordings"
 
 
 def read_folder(path: Path) -> Dataset:
-    """Read the dataset in a folder; DatasetError lists its errors."""
+    """Read the dataset in the folder ``path``; DatasetError lists its errors."""
     top = [file.name for file in path.iterdir() if file.is_file()]
     names = top + [f"{RECORDINGS}/{file.name}" for file in (path / RECORDINGS).glob("*") if file.is_file()]
     check_most(str(path), "holds", len(names), MAX_ENTRIES, "files", "is this the right folder?")
@@ -37,9 +37,9 @@ def read_folder(path: Path) -> Dataset:
 
 
 def read_files(label: str, names: list[str], contents_of: Callable[[str], bytes]) -> Dataset:
-    """Read a dataset from files called ``names``, folders separated by "/"; DatasetError lists its errors.
+    """Read a dataset from the files ``names`` (folders separated by "/"); DatasetError lists its errors.
 
-    ``label`` is the name of the folder or archive in messages.
+    ``contents_of(name)`` returns the bytes of a file. ``label`` names the folder or zip in messages.
     """
     if DESCRIPTION not in names:
         raise fail(label, None, _no_description(names))
@@ -74,7 +74,7 @@ def read_files(label: str, names: list[str], contents_of: Callable[[str], bytes]
 
 
 def contents(dataset: Dataset) -> dict[str, bytes]:
-    """Contents of the files of ``dataset`` by name, sorted; DatasetError if it violates the format."""
+    """Return the contents of the files of ``dataset`` by file name; DatasetError if it violates the format."""
     files = {DESCRIPTION: write_yaml(checked_description(dataset)).encode()}
     for recording in sorted(dataset.recordings, key=lambda r: r.name):
         columns = [f"{channel}_{'n' if recording.forces else 'm'}" for channel in recording.channels]
@@ -83,7 +83,7 @@ def contents(dataset: Dataset) -> dict[str, bytes]:
 
 
 def write_folder(dataset: Dataset, path: Path) -> None:
-    """Write ``dataset`` into a new or empty folder; DatasetError if it is not empty."""
+    """Write ``dataset`` into the new or empty folder ``path``; DatasetError if ``path`` is anything else."""
     if path.exists() and (not path.is_dir() or any(path.iterdir())):
         raise fail(str(path), None, "exists and is not an empty folder; choose a new name or remove it first")
     for name, data in contents(dataset).items():
@@ -93,7 +93,7 @@ def write_folder(dataset: Dataset, path: Path) -> None:
 
 
 def sample_file(name: str) -> str:
-    """Name of the file with the samples of a recording."""
+    """Return the path, in the dataset's folder, of the file with the samples of the recording called ``name``."""
     return f"{RECORDINGS}/{name}.csv"
 
 

@@ -1,4 +1,4 @@
-"""Forces of one recording as CSV: ``time_s``, then ``force_x_n``, ``force_z_n`` or both."""
+"""Reads the forces of one recording from CSV with the columns ``time_s``, and ``force_x_n``, ``force_z_n`` or both."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ _WIND_AXES = re.compile(r"(?:lift|drag|thrust)(?:_?[a-z]+)?", re.IGNORECASE)
 
 
 def read_forces(raw: bytes, file: str, room: int = MAX_VALUES) -> Samples:
-    """Read CSV of at most ``room`` numbers. The order of the channels is x, z in any file.
+    """Read forces from the contents ``raw`` of a CSV ``file`` with at most ``room`` numbers.
 
-    DatasetError names line and column of every error.
+    The channels are in the order x, z, whatever the order of the columns. DatasetError names line and column of errors.
     """
     return read_table(raw, file, _layout, room, "nothing was measured")
 

@@ -1,4 +1,4 @@
-"""A dataset as one NetCDF-4 file: the text of ``dataset.yaml`` as an attribute, one group per recording.
+"""Reads and writes a dataset as a NetCDF-4 file: text of ``dataset.yaml`` as an attribute, one group per recording.
 
 Layout: root attributes ``format`` and ``dataset_yaml``; group ``recordings/<name>`` with ``time_s(time)`` and, NaN
 where missing, ``position_m(time, marker, axis)`` with ``marker(marker)`` or ``force_n(time, axis)`` with
@@ -43,7 +43,7 @@ _BROKEN = (OSError, KeyError, RuntimeError, ValueError, TypeError, AttributeErro
 
 
 class Limit(NamedTuple):
-    """How many numbers may still be read (``left`` of ``most``), and whether the ``storage`` layout is checked."""
+    """Limits: ``left`` numbers may still be read, of ``most`` in the file; ``storage``: check chunks and filters."""
 
     left: int
     most: int
@@ -51,7 +51,7 @@ class Limit(NamedTuple):
 
 
 def write_netcdf(dataset: Dataset) -> bytes:
-    """Pack the dataset as NetCDF-4."""
+    """Return the bytes of a NetCDF-4 file with the dataset; DatasetError if the dataset violates the format."""
     text = write_yaml(checked_description(dataset))
     buffer = io.BytesIO()
     with h5netcdf.File(buffer, "w") as file:
@@ -80,16 +80,17 @@ def _write_recording(group: Any, recording: Recording) -> None:
 
 
 def read_netcdf(data: bytes, label: str) -> Dataset:
-    """Read a dataset from the bytes of a trusted NetCDF-4 file."""
+    """Read a dataset from the bytes of a trusted NetCDF-4 file, called ``label`` in messages."""
     return parse_netcdf(io.BytesIO(data), label)[0]
 
 
 def parse_netcdf(
     opened: BinaryIO, label: str, most: int = limits.MAX_VALUES, *, storage: bool = True
 ) -> tuple[Dataset, Parsed]:
-    """Read a NetCDF-4 file of at most ``most`` numbers; returns the dataset and its parsed contents.
+    """Read a NetCDF-4 file of at most ``most`` numbers; return the dataset, and its text and samples as stored.
 
-    ``storage``: refuse chunks, filters and fixed-length texts by which a small file needs much memory.
+    ``label`` names the file in messages. ``storage``: refuse chunks, filters and fixed-length texts by which a small
+    file needs much memory. DatasetError lists the errors.
     """
 
     def place(name: str) -> str:
@@ -120,7 +121,7 @@ def parse_netcdf(
 
 @contextmanager
 def _damage(where: str) -> Iterator[None]:
-    """Convert any exception of HDF5 on a damaged file to a DatasetError."""
+    """Convert the exceptions that HDF5 raises on a damaged file to a DatasetError, which names the place ``where``."""
     try:
         yield
     except DatasetError:
@@ -145,7 +146,7 @@ def _attribute(file: Any, name: str, label: str) -> bytes:
 
 
 def _child(parent: Any, name: str, where: str, kind: type) -> Any:
-    """Member of a group; DatasetError if it is a link to elsewhere."""
+    """Return the member ``name`` of the group ``parent``; DatasetError if missing, a link, or not of type ``kind``."""
     link = parent.get(name, getlink=True)
     if link is None:
         raise fail(where, name, f"{name!r} is missing; see docs/formats.md for the groups and variables")
@@ -171,7 +172,7 @@ def _variable(group: Any, name: str, where: str) -> Any:
 
 
 def _samples(group: Any, where: str, known: list[str] | None, limit: Limit) -> Samples:
-    """The samples in a group: tracks of ``known`` markers, or forces if that is None."""
+    """Read the samples in ``group``: tracks of ``known`` markers, or forces if ``known`` is None."""
     labels, name, inner = ("axis", "force_n", ()) if known is None else ("marker", "position_m", (3,))
     times, values, names = (_variable(group, each, where) for each in ("time_s", name, labels))
     frames = times.shape[0] if len(times.shape) == 1 else -1
@@ -196,7 +197,7 @@ def _samples(group: Any, where: str, known: list[str] | None, limit: Limit) -> S
 
 
 def _numbers(variable: Any) -> Array:
-    """All values of a variable, read some chunks at a time, since the library holds a copy of what it reads."""
+    """Read all values of ``variable``, a few chunks at a time, since the library holds a copy of what it reads."""
     made, chunk = np.empty(variable.shape), (variable.chunks or (1,))[0]
     rows = max(1, BLOCK // max(1, math.prod((chunk, *variable.shape[1:])))) * chunk
     for start in range(0, len(made), rows):
@@ -206,7 +207,7 @@ def _numbers(variable: Any) -> Array:
 
 
 def _check_size(times: Any, values: Any, where: str, limit: Limit) -> None:
-    """Check the declared sizes before memory is allocated for them."""
+    """Raise DatasetError if ``times`` or ``values`` are too large or of a wrong type, before memory is allocated."""
     check_most(where, "", times.size, limits.MAX_ROWS, "times", "cut the recording in parts")
     if times.size + values.size > limit.left:
         raise too_much(where, limit.most)
@@ -219,7 +220,7 @@ def _check_size(times: Any, values: Any, where: str, limit: Limit) -> None:
 
 
 def _check_storage(variable: Any, where: str) -> None:
-    """Refuse chunks and filters by which a small file needs much memory."""
+    """Raise DatasetError if ``variable`` has chunks or filters by which a small file needs much memory."""
     chunk = math.prod(variable.chunks or ()) * variable.dtype.itemsize / MIB
     check_most(where, f"a chunk of {variable.name} takes", chunk, MAX_CHUNK_BYTES / MIB, "MiB", "write smaller chunks")
     pipeline = variable.id.get_create_plist()

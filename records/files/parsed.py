@@ -1,6 +1,6 @@
 """The internal storage format of a dataset, to which an uploaded NetCDF file is converted once.
 
-A zip that the service writes for itself and does not accept as an upload: ``dataset.yaml`` byte for byte;
+It is a zip that the service writes for its own use and does not accept as an upload: ``dataset.yaml`` byte for byte;
 ``layout.json`` with the number of instants of each recording and its markers or axes of force; ``recordings/<name>.f8``
 with its times [T], then its values [T, C], as little-endian 64-bit numbers. Reading restores the same dataset, bit for
 bit.
@@ -40,14 +40,14 @@ _EPOCH = (1980, 1, 1, 0, 0, 0)
 
 @dataclass(frozen=True)
 class Parsed:
-    """The text of ``dataset.yaml``, and the samples of each recording by its name."""
+    """Contents of a dataset's file: the text of ``dataset.yaml``, and the samples of each recording by its name."""
 
     description: bytes
     samples: Mapping[str, Samples]
 
 
 def pack(parsed: Parsed, into: IO[bytes]) -> None:
-    """Write ``parsed`` piece by piece; the same contents give the same bytes."""
+    """Write ``parsed`` to ``into`` in the storage format, piece by piece; the same contents give the same bytes."""
     layout = {
         n: {"instants": len(s.times), "markers": s.markers, "forces": s.forces} for n, s in parsed.samples.items()
     }
@@ -63,7 +63,7 @@ def pack(parsed: Parsed, into: IO[bytes]) -> None:
 
 
 def load_parsed(data: bytes, label: str) -> Dataset:
-    """The dataset that was packed; ``label`` names it in messages. DatasetError if ``data`` is damaged."""
+    """Read the dataset that :func:`pack` wrote; ``label`` names it in messages. DatasetError if ``data`` is damaged."""
     try:
         _check_directory(data)
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
@@ -75,7 +75,7 @@ def load_parsed(data: bytes, label: str) -> Dataset:
 
 
 def _check_directory(data: bytes) -> None:
-    """Check the size of the zip's directory, which zipfile reads into memory as a whole."""
+    """Raise ValueError if the zip's list of entries, which zipfile reads into memory as a whole, is too large."""
     end = data[-_END.size :]
     if len(end) < _END.size or data[-_END.size - 20 :].startswith(_END_OF_LARGE):
         raise ValueError("it does not end as it was written")
@@ -97,7 +97,7 @@ def _dataset(archive: zipfile.ZipFile, label: str) -> Dataset:
 
 
 def _text(archive: zipfile.ZipFile, name: str) -> bytes:
-    """An entry; ValueError above ``MAX_DESCRIPTION_BYTES``."""
+    """Return the contents of the entry ``name``; ValueError if larger than ``MAX_DESCRIPTION_BYTES``."""
     if archive.getinfo(name).file_size > MAX_DESCRIPTION_BYTES:
         raise ValueError(f"{name} is too large")
     return archive.read(name)
@@ -114,7 +114,7 @@ def _samples(archive: zipfile.ZipFile, name: str, layout: Mapping[str, Any], roo
 
 
 def _array(stream: IO[bytes], shape: tuple[int, ...]) -> Array:
-    """Read an array of this ``shape`` from ``stream``; writable, as read-only arrays are another type to numba."""
+    """Read an array of this ``shape`` from ``stream``; writable, since numba treats read-only ones as another type."""
     array = np.empty(shape, dtype=NUMBER)
     rest = array.reshape(-1).view(np.uint8).data
     while rest:

@@ -1,4 +1,4 @@
-"""Checks of the numbers of a recording: order of times, amount of data, plausible units."""
+"""Checks the numbers of a recording: order of times, number of samples, plausible units."""
 
 from __future__ import annotations
 
@@ -19,7 +19,10 @@ ABSURD = 1e6  # weights: in no unit is the weight so large a number
 
 
 def check_numbers(recording: Recording, rig: Wing | Vehicle, where: str, at: Locate, faults: Faults) -> None:
-    """Add the faults of the times and values of ``recording``; ``at(row)`` names the place of a row in messages."""
+    """Add a fault for each error in the times and values of ``recording``, a recording of ``rig``.
+
+    In messages, ``where`` is the place of the recording and ``at(row)`` that of one row.
+    """
     times, values, frames = recording.times, recording.values, len(recording.times)
     quantity = "force" if isinstance(rig, Vehicle) else "position"
     if not limits.MIN_FRAMES <= frames <= limits.MAX_ROWS:
@@ -46,7 +49,7 @@ def check_numbers(recording: Recording, rig: Wing | Vehicle, where: str, at: Loc
 
 
 def _check_times(times: Float[Array, " T"], at: Locate, faults: Faults) -> bool:
-    """Whether the times are finite and increase; adds faults where not."""
+    """Return whether the times [T] (s) are finite and increase; add faults for the first rows at which not."""
     bad = np.flatnonzero(~np.isfinite(times))
     for row in bad[:_SHOWN]:
         faults.add(at(int(row)), times[row], "time_s is missing or not finite; every row needs its time in seconds")
@@ -64,7 +67,7 @@ def _check_times(times: Float[Array, " T"], at: Locate, faults: Faults) -> bool:
 def _check_positions(
     values: Float[Array, "T C"], markers: tuple[str, ...], wing: Wing, where: str, faults: Faults
 ) -> None:
-    """Add a fault for markers far from the hinge: beyond about a span, unit or frame are likely to be wrong."""
+    """Add faults for markers farther than ``IMPLAUSIBLE_SPANS`` from the hinge: unit or frame are likely wrong."""
     hinge = (0.0, wing.hinge.y, wing.hinge.z)
     distance = _typical(values, hinge)
     limit = limits.IMPLAUSIBLE_SPANS * wing.span
@@ -88,9 +91,9 @@ def _check_positions(
 
 
 def _typical(values: Float[Array, "T C"], hinge: tuple[float, float, float]) -> float:
-    """Largest median distance from the hinge along an axis, of markers [T, 3 M]; 0 without any value.
+    """Return the largest of three median distances (m) of ``values`` [T, 3 M] from ``hinge``: along x, y and z.
 
-    The axes are treated one after the other, to save memory.
+    0 if there are no values. The axes are treated one after the other, to save memory.
     """
     return max(_median_distance(values[:, axis::3], hinge[axis]) for axis in range(3))
 
@@ -104,7 +107,7 @@ def _median_distance(places: Float[Array, "T M"], origin: float) -> float:
 def _check_forces(recording: Recording, vehicle: Vehicle, where: str, faults: Faults) -> None:
     """Add a fault for forces far larger or smaller than the vehicle's weight: their unit is likely to be wrong.
 
-    The larger axis counts; the other may be zero.
+    The axis with the larger RMS force is compared; the force along the other axis may be zero.
     """
     sizes = {}
     for name, axis in zip(recording.forces, recording.values.T, strict=True):
@@ -131,9 +134,9 @@ def _check_forces(recording: Recording, vehicle: Vehicle, where: str, faults: Fa
 
 
 def _unit(weights: float) -> str:
-    """The likely unit of a force that, read in newtons, is ``weights`` times the weight of the vehicle.
+    """Name the likely unit of a force that, if its numbers are newtons, is ``weights`` times the vehicle's weight.
 
-    Read in the right unit, the force is about one weight.
+    In the right unit, the force is about as large as the weight.
     """
     if weights < 1:
         return "a much larger unit"
@@ -145,7 +148,7 @@ def _unit(weights: float) -> str:
 
 
 def _check_clock(recording: Recording, where: str, at: Locate, faults: Faults) -> None:
-    """Check that forces cover a beat at even steps, fast enough for the filter that was applied to them."""
+    """Add faults for uneven steps in time, less than a beat, too few samples per beat, or an impossible low-pass."""
     times, frequency, low_pass = recording.times, recording.condition.flap_frequency, recording.low_pass
     steps = np.diff(times)
     step = float(np.median(steps))

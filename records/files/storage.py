@@ -1,4 +1,4 @@
-"""Load and save datasets as a folder, a zip of it, or NetCDF; the contents determine the type of a file."""
+"""Load and save datasets as a folder, a zip of it, or NetCDF; the first bytes of a file show its type."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _OTHERS = {
 
 
 def load_dataset(path: str | Path) -> Dataset:
-    """Read the folder, zip or NetCDF file at ``path``; DatasetError lists its errors."""
+    """Read the dataset in the folder, zip or NetCDF file ``path``; DatasetError lists its errors."""
     path = Path(path)
     if path.is_dir():
         return read_folder(path)
@@ -40,19 +40,19 @@ def load_dataset(path: str | Path) -> Dataset:
 
 
 def label_of(filename: str) -> str:
-    """The name by which messages refer to an upload called ``filename``."""
+    """Return the name by which messages refer to an upload: ``filename`` without folders, shortened."""
     return shown(filename.replace("\\", "/").rpartition("/")[2]) or "upload"
 
 
 def is_netcdf(data: bytes) -> bool:
-    """Whether ``data`` is an HDF5 file, as NetCDF-4 files are."""
+    """Return whether ``data`` begins as an HDF5 file does; NetCDF-4 files are HDF5 files."""
     return data[: len(_HDF5)] == _HDF5
 
 
 def load_archive(data: bytes, filename: str) -> Dataset:
-    """Read a zip or NetCDF file from its bytes; ``filename`` is used in messages only.
+    """Read a dataset from the bytes of a zip or NetCDF file; ``filename`` is used in messages only.
 
-    For untrusted NetCDF files use :func:`wingfit.records.files.confined.convert_netcdf`.
+    DatasetError lists its errors. For untrusted NetCDF files use :func:`wingfit.records.files.confined.convert_netcdf`.
     """
     label = label_of(filename)
     _check_size(len(data), label)

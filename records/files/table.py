@@ -1,7 +1,7 @@
-"""The numbers of one recording as CSV: a column ``time_s``, and columns that a layout knows.
+"""Reads and writes the samples of one recording as CSV: a column ``time_s``, and a column for each channel.
 
-Numbers are written by ``repr`` and read by ``float``, which is exact. Files of digits only are read by ``float`` alone;
-those with other characters are read by a slower function that names the faulty cell.
+Numbers are written by ``repr`` and read by ``float``, which is exact. If a file has only characters that occur in
+numbers, ``float`` alone reads it; else a slower function does, which rejects texts that only Python takes for numbers.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _MISSING_WORDS = {"nan", "na", "n/a", "null", "none", "-", "--", "missing", "#n/
 class Samples:
     """The numbers of a recording of ``markers`` or of ``forces`` (see :class:`wingfit.records.Recording`).
 
-    ``lines`` [T] are the lines of the file with each instant.
+    ``lines`` [T] are for messages: the line of a CSV file that holds each instant, or its index in other files.
     """
 
     times: Float[Array, " T"]
@@ -43,7 +43,7 @@ class Samples:
 
 @dataclass(frozen=True)
 class Layout:
-    """Indices of the columns of a file: of ``time``, and ``columns`` [C] in the order of the channels."""
+    """Order of a CSV file: index of the column ``time``, and indices ``columns`` [C] of the columns of the channels."""
 
     time: int
     columns: list[int]
@@ -52,16 +52,17 @@ class Layout:
 
 
 def write_table(columns: Sequence[str], times: Float[Array, " T"], values: Float[Array, "T C"]) -> str:
-    """CSV text of ``values`` [T, C] under the names ``columns``; NaN is an empty cell."""
+    """Return CSV with the column ``time_s`` and ``values`` [T, C] under the names ``columns``; NaN is an empty cell."""
     rows = zip(times.tolist(), values.tolist(), strict=True)
     lines = (",".join([repr(time), *(repr(v) if v == v else "" for v in row)]) for time, row in rows)
     return "\n".join([",".join(["time_s", *columns]), *lines, ""])
 
 
 def read_table(raw: bytes, file: str, read_layout: Callable[[list[str], str], Layout], room: int, gap: str) -> Samples:
-    """Read CSV of at most ``room`` numbers; ``read_layout(header, where)`` checks the header and returns the layout.
+    """Read samples from the contents ``raw`` of a CSV ``file`` with at most ``room`` numbers.
 
-    ``gap`` says in messages when a cell may be empty. DatasetError names line and column of every error.
+    ``read_layout(header, where)`` checks the header and returns the layout. ``gap`` says in messages when a cell may be
+    empty. DatasetError names line and column of every error.
     """
     text = decode(raw, file)
     if not text.strip():
@@ -83,7 +84,10 @@ def read_table(raw: bytes, file: str, read_layout: Callable[[list[str], str], La
 
 
 def read_columns(header: Sequence[str], where: str, problem: Callable[[str], str | None]) -> dict[str, int]:
-    """Index of each column by name; ``problem(name)`` returns the fault of a column other than ``time_s``, or None."""
+    """Check the names of the columns and return the index of each by name; DatasetError lists wrong names.
+
+    ``problem(name)`` returns what is wrong with a name other than ``time_s``, or None.
+    """
     for separator, word in ((";", "semicolons"), ("\t", "tabs")):
         if len(header) == 1 and separator in header[0]:
             message = f"the columns are separated by {word}; separate by commas, with decimal points"
@@ -113,7 +117,10 @@ def _column_problem(name: str, earlier: dict[str, int]) -> str | None:
 def _rows(
     reader: Iterable[list[str]], header: Sequence[str], file: str, room: int, gap: str | None
 ) -> tuple[Array, Index]:
-    """Read all rows as numbers [T, columns], and their lines; ``gap`` is None if the text has no letters."""
+    """Read all rows as numbers [T, columns]; return them and the line of each row [T].
+
+    ``gap`` is None if the text has only characters that occur in numbers; else it says when a cell may be empty.
+    """
     convert = _fast if gap is None else _strict
     numbers, lines, width, faults = array("d"), array("q"), len(header), Faults()
     line = getattr(reader, "line_num", 1)
@@ -163,7 +170,7 @@ def _cell(cell: str) -> float:
 
 
 def _checked_cells(row: list[str], header: Sequence[str], where: str, gap: str, faults: Faults) -> list[float]:
-    """Numbers of a row that could not be converted as a whole; adds a fault for every cell that is not a number."""
+    """Convert a row cell by cell; add a fault, and return NaN, for every cell that is not a number."""
     numbers = []
     for name, cell in zip(header, row, strict=True):
         try:
@@ -188,6 +195,6 @@ def _ragged(row: list[str], width: int) -> str:
 
 
 def too_much(where: str, most: int = MAX_VALUES) -> DatasetError:
-    """The error for a dataset with more than ``most`` numbers."""
+    """Return the error for a dataset with more than ``most`` numbers."""
     message = f"the dataset holds more than {most} numbers, the most that are read; split it or thin it out"
     return fail(where, None, message)

@@ -1,4 +1,4 @@
-"""Tracks of one recording as CSV: ``time_s``, then ``<marker>_x_m``, ``<marker>_y_m``, ``<marker>_z_m``, or nothing."""
+"""Reads tracks of one recording from CSV: ``time_s``, then MARKER_x_m, MARKER_y_m, MARKER_z_m of each marker."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ _OTHER_UNIT = re.compile(r"(?P<marker>.+?)_?(?P<axis>[xyzXYZ])(?:_?(?:mm|cm|m|px
 
 
 def read_tracks(raw: bytes, file: str, known: Sequence[str], room: int = MAX_VALUES) -> Samples:
-    """Read CSV of at most ``room`` numbers; ``known`` are the wing's markers.
+    """Read tracks from the contents ``raw`` of a CSV ``file`` with at most ``room`` numbers.
 
-    DatasetError names line and column of every error.
+    ``known`` are the names of the wing's markers. DatasetError names line and column of every error.
     """
     return read_table(raw, file, lambda header, where: _layout(header, where, known), room, "the marker was not seen")
 
