@@ -57,7 +57,7 @@ class ForkedProcess:
 
 
 def _run(module: list[str], env: dict[str, str], log: str) -> None:
-    with open(log, "wb", buffering=0) as out:
+    with Path(log).open("wb", buffering=0) as out:
         os.dup2(out.fileno(), 1)
         os.dup2(out.fileno(), 2)
     os.environ.clear()
