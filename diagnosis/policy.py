@@ -59,9 +59,8 @@ class Policy:
     # Search
     worth_refit: float = _threshold(0.25, "gain of the best score test", "suspects with less are not refitted")
     weak_after_success: float = _threshold(
-        0.6, "gain of the best score test", "once the residual is explained, weaker suspects are skipped"
+        0.6, "gain of the best score test", "once no second effect is needed, weaker suspects are skipped"
     )
-    explained_excess: float = _threshold(0.05, "nominal excess", "a hypothesis with less has explained the residual")
     worth_continuing: float = _threshold(0.7, "nominal excess", "a refit with more is not continued")
     partner_gain: float = _threshold(
         0.5, "remaining chi-squared", "a second effect must be predicted to explain as much to be refitted"
@@ -81,9 +80,7 @@ class Policy:
     finer_predicted_gain: float = _threshold(
         0.1, "excess", "a finer discretisation must be predicted to remove as much to be fitted"
     )
-    finer_matters: float = _threshold(0.25, "noise RMS", "a change by the next discretisation below this is negligible")
     finer_gain: float = _threshold(0.25, "excess", "a finer discretisation must remove as much to be worth its cost")
-    finer_limit: float = _threshold(0.3, "noise RMS", "a residual below this needs no finer discretisation")
 
 
 POLICY = Policy()

@@ -376,11 +376,8 @@ def _continue_best(state: SearchState) -> bool:
 
 def _is_outperformed(state: SearchState, trial: Trial, best: Trial) -> bool:
     """Whether ``trial`` is too weak to compete with a refit that has already explained the residual."""
-    policy, nominal = state.data.policy, state.fitted_nominal.refit
-    if not state.refits or trial.gain > policy.weak_after_success * best.gain:
-        return False
-    explained = max(policy.explained_excess * nominal.excess, tolerated_excess(state.data, 0.0, 0.0))
-    return state.by_excess[0].excess <= explained
+    weak = trial.gain <= state.data.policy.weak_after_success * best.gain
+    return weak and bool(state.refits) and state.is_explained
 
 
 def select_suspects(subject: Subject, spec: DiagnosisSpec) -> list[Suspect]:

@@ -86,9 +86,9 @@ def finer_is_promising(data: WhitenedData, changes: float, gain: float, current:
     ``changes`` (m or N) is the change that it makes, ``gain`` the fraction of the excess that it is predicted to
     remove. A linearised prediction does not hold where the change exceeds the whole residual.
     """
-    policy = data.policy
-    matters = changes >= policy.finer_matters * data.noise and current.excess >= (policy.finer_limit * data.noise) ** 2
-    return matters and (gain > policy.finer_predicted_gain or changes**2 >= current.excess)
+    negligible = data.policy.negligible * data.noise
+    matters = changes >= negligible and current.excess >= negligible**2
+    return matters and (gain > data.policy.finer_predicted_gain or changes**2 >= current.excess)
 
 
 def finer_change(finer: FitContext, refit: Refit) -> tuple[float, float]:
