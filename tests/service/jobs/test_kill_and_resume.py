@@ -18,6 +18,8 @@ SPEC = {"division": "4", "population": 8, "max_generations": 6, "stall": 6, "see
 PATIENCE = 300.0
 
 Json = dict[str, Any]
+Outcome = tuple[list[Json], Json, Json]
+"""History without times, result and genome of a run."""
 
 
 def server(data: Path, evaluator: str) -> ServerProcess:
@@ -27,42 +29,40 @@ def server(data: Path, evaluator: str) -> ServerProcess:
     return ServerProcess(data, ("wingfit.service.server",), env)
 
 
-@pytest.mark.skipif(not (EXAMPLE / "dataset.yaml").exists(), reason=f"the example campaign {EXAMPLE.name} is not there")
-def test_killed_in_mid_run_and_resumed_equals_undisturbed(tmp_path: Path) -> None:
-    with server(tmp_path / "undisturbed", "in_process") as one:
-        run = _submit(one.api)
-        expected = _outcome(one.api, run)
-    with server(tmp_path / "killed", "processes") as first:
-        run = _submit(first.api)
-        first.api.until(run, lambda r: r["generations"] >= 2 or r["state"] in FINAL, PATIENCE)
-        before = first.api.history(run)
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Outcome, Outcome]:
+    """What a run on tracks and one on forces end with on a server that is left alone."""
+    with server(tmp_path_factory.mktemp("undisturbed") / "data", "in_process") as one:
+        return _outcome(one.api, _submit(one.api)), _outcome(one.api, _submit_forces(one.api))
+
+
+def test_runs_killed_in_search_and_in_gauss_newton_equal_undisturbed(
+    tmp_path: Path, undisturbed: tuple[Outcome, Outcome]
+) -> None:
+    data = tmp_path / "killed"
+    with server(data, "processes") as first:
+        tracks = _submit(first.api)
+        first.api.until(tracks, lambda r: r["generations"] >= 2 or r["state"] in FINAL, PATIENCE)
+        before = first.api.history(tracks)
         first.kill()
     assert before, "nothing was stored before the kill"
-    with server(tmp_path / "killed", "processes") as second:
-        state = second.api.run(run)
+    with server(data, "processes") as second:
+        state = second.api.run(tracks)
         assert state["state"] in ("QUEUED", "RUNNING"), "the kill came too late to test anything"
-        outcome = _outcome(second.api, run)
-        assert second.api.history(run)[: len(before)] == before
-    assert outcome == expected
-
-
-def test_a_run_on_forces_killed_in_search_and_in_gauss_newton_equals_undisturbed(tmp_path: Path) -> None:
-    with server(tmp_path / "undisturbed", "in_process") as one:
-        expected = _outcome(one.api, _submit_forces(one.api))
-    data, before = tmp_path / "killed", []
-    with server(data, "processes") as first:
-        run = _submit_forces(first.api)
-        first.api.until(run, lambda r: r["generations"] >= 2, PATIENCE)
-        first.kill()
-    with server(data, "in_process") as second:
-        state = second.api.until(run, lambda r: _in_newton(r["stage"]) or r["state"] in FINAL, PATIENCE)
-        before = second.api.history(run)
+        assert _outcome(second.api, tracks) == undisturbed[0]
+        assert second.api.history(tracks)[: len(before)] == before
+        forces = _submit_forces(second.api)
+        second.api.until(forces, lambda r: r["generations"] >= 2, PATIENCE)
         second.kill()
+    with server(data, "in_process") as third:
+        state = third.api.until(forces, lambda r: _in_newton(r["stage"]) or r["state"] in FINAL, PATIENCE)
+        before = third.api.history(forces)
+        third.kill()
         assert state["state"] == "RUNNING", "the kill came too late to test anything"
-    with server(data, "processes") as third:
-        outcome = _outcome(third.api, run)
-        assert third.api.history(run)[: len(before)] == before
-    assert outcome == expected
+    with server(data, "processes") as fourth:
+        outcome = _outcome(fourth.api, forces)
+        assert fourth.api.history(forces)[: len(before)] == before
+    assert outcome == undisturbed[1]
     assert {_in_newton(item["stage"]) for item in outcome[0]} == {True, False}
 
 
@@ -96,7 +96,7 @@ def _two_recordings(dataset: Json) -> list[str]:
     return sorted(rigs.values())
 
 
-def _outcome(api: Api, run: str) -> tuple[list[Json], Json, Json]:
+def _outcome(api: Api, run: str) -> Outcome:
     finished = api.finish(run, PATIENCE)
     assert finished["state"] == "SUCCEEDED", finished["error"]
     history = [{key: value for key, value in item.items() if key != "elapsed_seconds"} for item in api.history(run)]

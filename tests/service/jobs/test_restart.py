@@ -55,7 +55,7 @@ def test_many_deaths_change_nothing(tmp_path: Path, undisturbed: tuple[list[Json
             assert again.client.get(f"/v1/datasets/{dataset}/archive").content == toy.archive()
             state = again.api.run(run)
             assert state["generations"] >= known, "an acknowledged generation was lost"
-            time.sleep(moments.uniform(0.05, 0.5))
+            time.sleep(moments.uniform(0.05, 1.0))
             state = again.api.run(run)
             known = state["generations"]
             again.kill()
