@@ -12,7 +12,7 @@ from wingfit.client.transport import ServerAwayError, Transport, WingfitError, i
 
 JobT = TypeVar("JobT", a.Run, Diagnosis)
 
-# By the event of a step: the field of a job that counts such steps.
+# Event that reports a finished step: the field of a job that counts such steps.
 COUNTS = {"generation": "generations", "step": "steps"}
 UPDATED = ("stage", "progress", "eta_seconds", "best_mm", "best_mn", "evaluations")
 

@@ -10,12 +10,12 @@ from typing_extensions import TypedDict
 from wingfit.client.answers import GeneInfo
 
 Source = Literal["nominal", "local", "joint", "global", "average"]
-# Of the coefficients: those of a run, or the genome given in a request.
+# Where the coefficients come from: an estimate of a run, or the genome given in a request.
 SourceOrGiven = Literal["nominal", "local", "joint", "global", "average", "given"]
 Quantity = Literal["lift", "drag", "x", "z"]
 Series = list[float]
 Pair = Annotated[list[float], Len(2, 2)]
-# Lift and drag are present where both axes were recorded.
+# A series over the beat for each force; lift and drag are present only if both axes were recorded.
 ByQuantity = dict[Quantity, Series]
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 SMALLEST, LARGEST = 1e-4, 1e6  # beyond, a power of ten is easier to read
 NEAREST_ONE = 0.99995  # rounds to 1 with four decimals
-ROUNDING = 1e-9  # of the correlation of a thing with itself
+ROUNDING = 1e-9  # error of the computed correlation of a series with itself
 
 
 def rounded(value: float | None, digits: int = 3) -> str:
