@@ -50,7 +50,7 @@ while True:
 
 
 class Guardian:
-    """Starts the small process that watches this one, and tells it through a pipe when a unit of work starts and ends.
+    """Starts the small process that watches this one, and sends to it the start and the end of each unit of work.
 
     ``silence_s``: time without a heartbeat after which the small process kills this one; ``beat_s``: time between
     heartbeats.
