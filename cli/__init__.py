@@ -1,1 +1,1 @@
-"""The commands of ``wingfit``, one module per noun."""
+"""The commands of ``wingfit``, one module for each command or group of commands."""

@@ -1,4 +1,4 @@
-"""``wingfit backup`` and ``wingfit restore``: copy all data of a server into one file, and back."""
+"""``wingfit backup`` and ``wingfit restore``: copy all data of a server into one file, and from it into a folder."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ def _about_keys(count: int, data: Path, keep_keys: bool) -> str:
 
 
 def _copy_of(data: Path, file: Path) -> None:
-    """Copy the database in the folder of a server that is not running."""
+    """Copy the database in ``data``, the data folder of a server that is not running, to ``file``."""
     from wingfit.service.storage.backup import BackupError, move, snapshot
     from wingfit.service.storage.database import FILE_NAME, DataFolderError, FolderLock
 

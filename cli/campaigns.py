@@ -51,7 +51,10 @@ def balance(
 
 @contextmanager
 def _writing(out: Path) -> Iterator[None]:
-    """Wrap the writing of ``out``: refuse an existing dataset, turn errors into messages, print the next step."""
+    """Run the with-block, which writes a dataset to ``out``, and print the next command.
+
+    WingfitError is raised if ``out`` exists already (other than as an empty folder), or for a ValueError in the block.
+    """
     if out.exists() and not (out.is_dir() and not any(out.iterdir())):
         raise WingfitError("no campaign written", f"{out} exists already; name a new folder or file")
     with refused("no campaign written"):

@@ -71,7 +71,7 @@ def download(
 
 @app.command()
 def delete(dataset_id: DatasetId, url: Url = DEFAULT_URL) -> None:
-    """Delete a dataset; delete the runs that refer to it first.
+    """Delete a dataset; delete the runs and diagnoses that refer to it first.
 
     Example: wingfit datasets delete ID
     """

@@ -1,4 +1,4 @@
-"""``wingfit diagnose``: the physics missing from a model; and ``wingfit diagnoses``, to return to a diagnosis."""
+"""``wingfit diagnose``: identifies physics missing from a model; ``wingfit diagnoses``: lists and follows diagnoses."""
 
 from __future__ import annotations
 

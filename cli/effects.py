@@ -1,4 +1,4 @@
-"""``wingfit effects``: the effects that a model can include."""
+"""``wingfit effects``: lists the effects (additional physics, measurement errors) that a model can include."""
 
 from __future__ import annotations
 

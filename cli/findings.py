@@ -1,4 +1,4 @@
-"""Prints the finding of a diagnosis."""
+"""Prints the finding (result) of a diagnosis."""
 
 from __future__ import annotations
 
@@ -14,7 +14,10 @@ NOMINAL = "nominal model alone"
 
 
 def print_finding(finding: Json) -> None:
-    """Print verdict, summary, location, ranking, validation and next recording; remarks go to standard error."""
+    """Print a finding: verdict, summary, location of the residual, ranking of hypotheses, validation, next recording.
+
+    Remarks are printed to standard error.
+    """
     probability = finding["probabilities"].get(finding["verdict"])
     about = "" if probability is None else f" ({_probability(probability)})"
     named = f": {', '.join(finding['named'])}" if finding["named"] else ""
@@ -54,7 +57,7 @@ def _ranking(finding: Json) -> None:
 
 
 def _genes(finding: Json) -> None:
-    """Print the genes of the named effects with their 90 % intervals."""
+    """Print the genes of the effects that the verdict names, with their 90 % intervals."""
     columns: Columns[Json] = {
         "gene": "name",
         ">value": lambda gene: gene["value"]["value"],
@@ -69,7 +72,7 @@ def _genes(finding: Json) -> None:
 
 
 def _probability(part: float) -> str:
-    """A probability in per cent, never rounded to 0 or 100 %."""
+    """Return the probability ``part`` (a fraction) in per cent; "<1 %" or ">99 %" instead of 0 or 100 %."""
     if part < 0.005:
         return "<1 %"
     return percent(part) if part <= 0.995 else ">99 %"

@@ -1,4 +1,4 @@
-"""What runs and diagnoses share: commands list, cancel, delete and export; following a job; uploading its dataset."""
+"""Commands for both runs and diagnoses (jobs): list, cancel, delete, export; functions to follow and upload."""
 
 from __future__ import annotations
 
@@ -29,10 +29,11 @@ Output = Annotated[Path, typer.Option("--output", "-o", help="File to write to; 
 
 @dataclass(frozen=True)
 class JobKind:
-    """Texts and client calls in which runs and diagnoses differ; ``stage_of`` and ``outcome_of`` map a job to text.
+    """Texts and client methods in which the commands for runs and for diagnoses differ.
 
-    ``outcome`` is the heading of the column of ``outcome_of``, ``work`` the title of the progress bar, ``submit`` an
-    example command, ``exported`` the help on formats.
+    ``stage_of`` and ``outcome_of`` return the stage and the outcome of a job as text; ``outcome`` is the heading of the
+    column of outcomes, ``work`` the title of the progress bar, ``submit`` an example command, ``exported`` the help on
+    export formats. ``find`` lists the jobs.
     """
 
     name: str
@@ -52,7 +53,7 @@ class JobKind:
 
 
 def commands(kind: JobKind) -> typer.Typer:
-    """A command group with list, cancel, delete and export; the modules of runs and diagnoses add further commands."""
+    """Return a command group with list, cancel, delete and export, to which the caller adds further commands."""
     app = typer.Typer(no_args_is_help=True, help=kind.help)
     group = f"wingfit {kind.plural}"
 
@@ -98,12 +99,12 @@ def _row(kind: JobKind, job: Any) -> list[object]:
 
 
 def state_of(kind: JobKind, job: Any) -> str:
-    """Kind, id and state of a job, in one line."""
+    """Return kind, id and state of a job as one line of text."""
     return f"{kind.name} {job['id']} {job['state']}"
 
 
 def follow(client: Client, kind: JobKind, job_id: str) -> Any:
-    """Show the progress of a job until it ends, and return it; Ctrl-C ends the command and not the job."""
+    """Show the progress of a job until it ends, and return the job; Ctrl-C ends the command, and the job continues."""
     try:
         with progress(kind.work) as report:
             return kind.wait(
@@ -118,7 +119,7 @@ def follow(client: Client, kind: JobKind, job_id: str) -> Any:
 
 
 def check_ended_well(kind: JobKind, job: Any) -> None:
-    """WingfitError for a job that failed or was cancelled."""
+    """Raise WingfitError if the job failed or was cancelled."""
     if job["state"] == "FAILED":
         raise WingfitError(f"{kind.name} {job['id']} failed", job["error"] or "the server gives no reason")
     if job["state"] == "CANCELLED":
@@ -126,7 +127,7 @@ def check_ended_well(kind: JobKind, job: Any) -> None:
 
 
 def upload(client: Client, path: Path, name: str | None = None) -> Any:
-    """Upload a dataset with a progress bar and return it; a folder is zipped first."""
+    """Upload the dataset at ``path`` with a progress bar, and return it; ``name`` replaces its own."""
     with progress("uploading") as report:
         return client.upload_dataset(
             path, name=name, on_bytes=lambda sent, total: report(sent / max(total, 1), note=size(total))
@@ -134,7 +135,7 @@ def upload(client: Client, path: Path, name: str | None = None) -> Any:
 
 
 def dataset_id(client: Client, dataset: str) -> str:
-    """The id of ``dataset``, which is uploaded first if it is a path."""
+    """Return ``dataset``, an id; or, if it is a path, upload the dataset there and return its new id."""
     if not Path(dataset).exists():
         return dataset
     uploaded = upload(client, Path(dataset))
@@ -143,7 +144,7 @@ def dataset_id(client: Client, dataset: str) -> str:
 
 
 def _export(kind: JobKind, job_id: str, format_name: str, output: Path, url: str) -> None:
-    """Write an export to the file ``output`` or to standard output; nothing is written unless it is complete."""
+    """Write an export of a job to the file ``output`` or, for ``-``, to standard output, once it is complete."""
     if format_name not in ENDINGS:
         raise typer.BadParameter(f"{format_name}: must be one of {', '.join(ENDINGS)}", param_hint="--format")
     if output != STANDARD_OUTPUT:

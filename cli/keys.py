@@ -1,4 +1,4 @@
-"""``wingfit keys``: API keys of a server that other machines can reach."""
+"""``wingfit keys``: manages the API keys of a server that other machines can reach."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ def _list(keys: list[Key]) -> None:
 
 
 def _here(data: Path, name: str, owner: str, scopes: list[str]) -> NewKey:
-    """Create a key in the data folder of a server that is not running."""
+    """Create a key in ``data``, the data folder of a server that is not running, and return the key with its secret."""
     from wingfit.service.auth import keys  # imported late: other commands start faster
     from wingfit.service.storage.database import Database, DataFolderError
 

@@ -1,4 +1,4 @@
-"""Writes the loads of a simulation as CSV, JSON or a page of plots, and summarises them."""
+"""Writes the loads of a simulated wing as CSV, JSON or a page of plots, and summarises them."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Column = tuple[str, list[float]]
 
 
 def write_loads(outputs: a.Outputs, path: Path) -> None:
-    """Write JSON as the server sends it, or CSV: a row per instant, a column per series."""
+    """Write ``outputs`` to ``path``: a .json file as the server sends it, else CSV, one row per instant of the beat."""
     if path.suffix.lower() == ".json":
         write_text(path, json.dumps(outputs) + "\n", "loads")
         return
@@ -34,7 +34,7 @@ def write_loads(outputs: a.Outputs, path: Path) -> None:
 
 
 def write_plot(outputs: a.Outputs, path: Path, title: str) -> None:
-    """Write one HTML file: torques, powers, forces, bending moments and energies over the beat."""
+    """Write an HTML page that plots torques, powers, forces, bending moments and energies over the beat."""
     from wingfit.report.charts import Chart, Curve, chart_page  # drawn only where a plot was requested
 
     stride = -(-len(outputs["sections"]) // SECTIONS_SHOWN)
@@ -54,7 +54,7 @@ def write_plot(outputs: a.Outputs, path: Path, title: str) -> None:
 
 
 def summary(outputs: a.Outputs) -> list[list[str]]:
-    """Averages over the beat as rows (quantity, value with unit) of a table."""
+    """Return the averages over the beat as rows of a table: [quantity, value with unit]."""
     means = outputs["averages"]
     torque, power = means["peak_motor_torque_n_m"], means["motor_power_w"]
     rows = [
@@ -75,13 +75,16 @@ def summary(outputs: a.Outputs) -> list[list[str]]:
 
 
 def accuracy(numerics: Numerics | a.OutputNumerics) -> str:
-    """Time steps and estimated error of a simulation."""
+    """Return time steps per beat and estimated error of a simulation as text."""
     error = number(numerics["estimated_error_mm"], 2)
     return f"{numerics['steps_per_beat']} steps per beat, estimated error {error} mm"
 
 
 def columns(outputs: a.Outputs) -> Iterator[Column]:
-    """Yield every time series as a column, with a unique name that ends in its unit; vectors by component."""
+    """Yield (name, values over the beat) for every time series in ``outputs``; vectors give one column per component.
+
+    A name ends with the unit.
+    """
     for key, value in outputs.items():
         if key in ("averages", "numerics"):
             continue

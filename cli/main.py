@@ -43,7 +43,7 @@ app.command()(backup.restore)
 
 
 def main() -> None:
-    """Run the command line; expected failures end as a message, not as a traceback."""
+    """Run the command line; print expected errors as a message without traceback, and exit with code 1."""
     try:
         app()
     except WingfitError as error:

@@ -1,4 +1,4 @@
-"""Prints the result of a run: misfits and genes of a wing, coefficients of a vehicle."""
+"""Prints the result of a run: for a wing misfits and genes, for a vehicle misfits and coefficients."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def print_result(answer: Any) -> None:
 
 
 def print_genes(items: list[a.GeneInfo]) -> None:
-    """Print genes: nominal and estimated value, bounds, error, and whether the data identify them."""
+    """Print a table of genes: nominal and best value, bounds, standard error, and whether the gene is identifiable."""
     columns: Columns[a.GeneInfo] = {
         "gene": "name",
         ">nominal": "nominal",
@@ -36,7 +36,7 @@ def print_genes(items: list[a.GeneInfo]) -> None:
 
 
 def misfits(answer: a.Result) -> None:
-    """Print the mean distance per marker before and after the calibration, mm."""
+    """Print the mean distance (mm) between simulated and recorded markers before and after the calibration."""
     rows = [[one["name"], _use(one), mm(one["before_mm"]), mm(one["after_mm"])] for one in answer["recordings"]]
     rows.append(["all fitted", "", mm(answer["before_mm"]), mm(answer["after_mm"])])
     if answer["held_out_after_mm"] is not None:
@@ -48,7 +48,7 @@ def misfits(answer: a.Result) -> None:
 
 
 def identifiable(gene: a.GeneInfo) -> str:
-    """Whether the data identify a gene, in words."""
+    """Return in words whether the recordings determine the value of ``gene``."""
     if not gene["searched"]:
         return "not estimated"
     error = gene.get("standard_error")
@@ -58,7 +58,7 @@ def identifiable(gene: a.GeneInfo) -> str:
 
 
 def _error(gene: a.GeneInfo) -> str:
-    """Standard error: in per cent of the value or, where the nominal value is zero, in the gene's unit."""
+    """Return the standard error as text: in percent or, if the nominal value is zero, in the gene's unit."""
     absolute, relative = gene.get("standard_error"), gene["standard_error_percent"]
     if gene["nominal"] == 0 and absolute is not None:
         return f"± {number(absolute, 2)} {gene['unit'] if gene['unit'] != '1' else ''}".strip()

@@ -23,7 +23,7 @@ from wingfit.service.units import MN
 
 
 def best(run: a.Run) -> str:
-    """The misfit of a run so far: in mm for tracks, in a fitting unit of force for forces."""
+    """Return the smallest misfit of a run so far as text, in mm (tracks) or a unit of force; a dash for none."""
     if run["kind"] == "tracks":
         return "–" if run["best_mm"] is None else f"{run['best_mm']:.2f} mm"
     return "–" if run["best_mn"] is None else with_unit(run["best_mn"] / MN)
@@ -143,7 +143,7 @@ def genome(
     url: o.Url = DEFAULT_URL,
     as_json: o.AsJson = False,
 ) -> None:
-    """Print the best genome so far and the nominal one.
+    """Print every gene of a run: its value in the best genome so far, and its nominal value.
 
     Example: wingfit runs genome ID -o best.json
     """
@@ -183,7 +183,7 @@ def _show(run: a.Run) -> None:
 
 
 def _settings(run: a.Run) -> list[str]:
-    """The settings of a run that apply to its kind of dataset and to its method."""
+    """Return "name value" for each setting that the run's kind of dataset and its method use."""
     spec = run["spec"]
     unused = set(VEHICLE_ONLY if run["kind"] == "tracks" else WING_ONLY)
     if spec["method"] == "gauss_newton":

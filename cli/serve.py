@@ -1,4 +1,4 @@
-"""``wingfit serve``: the server."""
+"""``wingfit serve``: starts the server."""
 
 from __future__ import annotations
 

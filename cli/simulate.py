@@ -1,4 +1,4 @@
-"""``wingfit simulate``: one recording simulated with given gene values."""
+"""``wingfit simulate``: simulates one recording with given gene values."""
 
 from __future__ import annotations
 
@@ -117,12 +117,12 @@ def _show(answer: a.Simulation | Loads, recording: str) -> None:
 
 
 def solved(numerics: a.Numerics) -> str:
-    """Time steps and estimated error of a simulation, in one line."""
+    """Return the number of time steps and the estimated error of a simulation as one line of text."""
     return f"solved with {accuracy(numerics)}"
 
 
 def marker_distances(tracks: a.Comparison) -> dict[str, float | None]:
-    """Mean distance per marker in mm over the recorded frames; None for a marker that was never tracked."""
+    """Return {marker: mean distance (mm) between simulation and recording}; None for a marker never tracked."""
     sums = {name: [0.0, 0] for name in tracks["markers"]}
     for recorded, simulated in zip(tracks["recorded_mm"], tracks["simulated_mm"], strict=True):
         for name, seen, drawn in zip(tracks["markers"], recorded, simulated, strict=True):
@@ -133,7 +133,7 @@ def marker_distances(tracks: a.Comparison) -> dict[str, float | None]:
 
 
 def write_tracks(tracks: a.Comparison, path: Path) -> None:
-    """Write one row per frame and marker: phase, marker, recorded x, y, z and simulated x, y, z in mm."""
+    """Write CSV, one row per frame and marker: phase, marker, recorded x, y, z and simulated x, y, z in mm."""
     header = ["phase", "marker"] + [f"{kind}_{axis}_mm" for kind in ("recorded", "simulated") for axis in "xyz"]
     frames = zip(tracks["phase"], tracks["recorded_mm"], tracks["simulated_mm"], strict=True)
     rows = (

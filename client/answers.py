@@ -1,6 +1,6 @@
-"""The answers of the server: one definition, which the server publishes (OpenAPI) and the Python client hands out.
+"""Types of the server's JSON answers: the server publishes them (OpenAPI), and the Python client returns such dicts.
 
-Names of fields end in their unit. ``docs/api.md`` explains the resources. Answers about forces, loads, effects,
+The name of a field ends with its unit. ``docs/api.md`` explains the resources. Answers about forces, loads, effects,
 diagnoses and keys are in the other ``*_answers.py`` of this folder.
 """
 
@@ -30,14 +30,14 @@ CONDITION = (
 
 
 class Page(TypedDict, Generic[Item]):
-    """One page of a list; ``next_cursor`` requests the next page and is null on the last."""
+    """One page of a list; ``next_cursor``, sent as ``?cursor=``, requests the next page; null on the last page."""
 
     items: list[Item]
     next_cursor: str | None
 
 
 class ErrorItem(TypedDict):
-    """One faulty input: its place in the request, its value, and what is wrong with it."""
+    """One fault of a request: ``where`` it is (a field, or a line of a file), the value there, and what is wrong."""
 
     where: str
     value: Any
@@ -45,7 +45,11 @@ class ErrorItem(TypedDict):
 
 
 class Problem(TypedDict):
-    """Problem details (RFC 9457); ``state`` is that of the job to which a conflict refers."""
+    """Answer to a failed request, as problem details by RFC 9457.
+
+    ``status`` is the HTTP status, ``title`` a short name of the problem, ``detail`` an explanation. ``errors`` lists
+    the faults of an invalid request. ``state`` is the job's state, if it does not allow the request (status 409).
+    """
 
     type: str
     title: str
@@ -56,9 +60,10 @@ class Problem(TypedDict):
 
 
 class Health(TypedDict):
-    """Status of the service; ``detail`` gives the cause when it is degraded.
+    """Status of the service; ``detail`` gives the cause if ``status`` is "degraded".
 
-    The numbers of jobs that have not ended are null where the database does not answer.
+    ``evaluator`` says how simulations are run: ray, processes or in_process. ``runs_active`` and ``diagnoses_active``
+    count jobs that have not ended; they are null if the database does not answer.
     """
 
     status: Literal["starting", "ok", "degraded"]
@@ -72,7 +77,12 @@ class Health(TypedDict):
 
 
 class RecordingInfo(TypedDict):
-    """One recording and its condition: ``markers`` counts tracked markers, ``channels`` names the force channels."""
+    """One recording and the condition under which it was made; ``held_out`` recordings are used for validation only.
+
+    ``markers`` counts the tracked markers (0 for forces); ``channels`` names the recorded forces, "force_x", "force_z"
+    (empty for tracks). ``missing_percent`` is the percentage of samples without a value. ``phase_lag_deg`` is the lag
+    of the wing's rear driving rod; ``angle_of_attack_deg`` is that of the wing, or the body pitch of a vehicle.
+    """
 
     name: str
     rig: str
@@ -90,7 +100,7 @@ class RecordingInfo(TypedDict):
 
 
 class Dataset(TypedDict):
-    """An uploaded dataset."""
+    """An uploaded dataset: marker tracks of a wing, or forces of a vehicle; ``sha256`` is that of the uploaded file."""
 
     id: str
     name: str
@@ -104,7 +114,10 @@ class Dataset(TypedDict):
 
 
 class JobSpec(TypedDict):
-    """The settings that runs and diagnoses share, with every default filled in."""
+    """The settings that runs and diagnoses have in common; settings that the request omitted have their defaults.
+
+    Each setting is explained in :class:`wingfit.calibration.spec.CalibrationSpec` (there without the unit in the name).
+    """
 
     preset: str
     without: list[str]
@@ -121,7 +134,7 @@ class JobSpec(TypedDict):
 
 
 class RunSpec(JobSpec):
-    """The settings of a run."""
+    """The settings of a run (a calibration), explained in :class:`wingfit.calibration.spec.CalibrationSpec`."""
 
     population: int
     stall: int
@@ -133,14 +146,18 @@ class RunSpec(JobSpec):
 
 
 class Checked(TypedDict):
-    """A run as it would be submitted: its name and its settings."""
+    """A checked request for a run that was not submitted: the name and settings that the run would get."""
 
     name: str
     spec: RunSpec
 
 
 class Job(TypedDict):
-    """The fields that runs and diagnoses share."""
+    """The fields that runs and diagnoses (jobs) have in common.
+
+    ``stage`` names the present step, null before the first; ``progress`` lies in [0, 1]; ``eta_seconds`` estimates the
+    remaining time; ``evaluations`` counts simulated individuals; ``error`` says why the job failed, else null.
+    """
 
     id: str
     name: str
@@ -158,9 +175,10 @@ class Job(TypedDict):
 
 
 class Run(Job):
-    """A calibration; ``pending_action`` is a pause or cancellation that takes effect after the current generation.
+    """A calibration; ``pending_action`` is a requested pause or cancellation that has not taken effect yet, else null.
 
-    ``best_mm`` (tracks) is the mean distance per marker, ``best_mn`` (forces) the RMS difference; the other is null.
+    The misfit of the best genome so far is in ``best_mm`` for tracks (mean distance per marker), with ``best_mn`` null,
+    and in ``best_mn`` for forces (RMS difference of the fitted axes), with ``best_mm`` null.
     """
 
     spec: RunSpec
@@ -171,11 +189,15 @@ class Run(Job):
 
 
 class HistoryItem(TypedDict):
-    """One finished generation; ``best`` and ``mean`` are sums of squared differences to the recordings, m^2 or N^2.
+    """One finished generation of a search, or one iteration of Gauss-Newton.
 
-    ``diversity`` is the mean over genes of the population's standard deviation, bounds scaled to [0, 1].
-    ``evaluations`` counts simulated individuals since the start of the run, ``failed`` those of this generation that
-    could not be simulated, with up to ten ``reasons``.
+    ``sequence`` counts from 1 over the run, ``generation`` from 0 within its ``stage``. ``best`` and ``mean`` (over the
+    individuals that did not fail) are sums of squared differences to the recordings: m^2 (tracks) or N^2 (forces).
+    ``diversity`` is the mean over genes of the population's standard deviation, with bounds scaled to [0, 1]; of a
+    Gauss-Newton iteration, the largest change of a gene on that scale.
+    ``evaluations`` counts simulated individuals since the start of the run, ``failed`` the individuals of this
+    generation that could not be simulated; ``reasons`` lists up to ten different causes. ``elapsed_seconds`` is the
+    computing time since the start of the run, without pauses.
     """
 
     sequence: int
@@ -193,16 +215,18 @@ class HistoryItem(TypedDict):
 
 
 class GenerationEvent(HistoryItem):
-    """The data of the server-sent event ``generation``: the generation, and the progress of the whole run in [0, 1]."""
+    """The data of the server-sent event ``generation``: a finished generation, and the run's progress in [0, 1]."""
 
     progress: float
     eta_seconds: float | None
 
 
 class GeneInfo(TypedDict):
-    """One gene, nominal and best, with its bounds; ``identifiable`` says whether the data determine it.
+    """One gene: its nominal and its best value and its bounds; ``searched`` says whether the run estimates the gene.
 
-    Values and ``standard_error`` are in ``unit``; genes that are shares of a whole are normalised to sum to one.
+    Values, bounds and ``standard_error`` are in ``unit``. ``identifiable`` says whether the recordings determine the
+    gene. It and the standard errors are null until the run has succeeded, and for genes that are not searched.
+    Genes that are fractions of one total are normalised to sum to one.
     """
 
     name: str
@@ -219,14 +243,18 @@ class GeneInfo(TypedDict):
 
 
 class GenomeInfo(TypedDict):
-    """The best genome so far; ``final`` when the run has succeeded."""
+    """All genes with their values in the best genome so far; ``final`` is true once the run has succeeded."""
 
     genes: list[GeneInfo]
     final: bool
 
 
 class RecordingResult(TypedDict):
-    """Mean distance per marker on one recording, with the nominal and with the best genome."""
+    """Mean distance between simulated and recorded markers of one recording, for two genomes.
+
+    ``before_mm``: with the nominal genome; ``after_mm``: with the best one. ``stage`` is the stage of the run in which
+    the recording was fitted, else null; ``samples`` counts the compared pairs of frame and marker.
+    """
 
     name: str
     held_out: bool
@@ -237,7 +265,11 @@ class RecordingResult(TypedDict):
 
 
 class Result(TypedDict):
-    """Result of a calibration on tracks; means over recordings are weighted by samples."""
+    """Result of a calibration on tracks: mean distance between simulated and recorded markers, and the genes.
+
+    ``before_mm`` (nominal genome) and ``after_mm`` (best genome) are means over the fitted recordings, weighted by the
+    number of samples. ``noise_mm`` is the mean distance that tracking noise alone would cause.
+    """
 
     kind: Literal["tracks"]
     before_mm: float | None
@@ -251,9 +283,10 @@ class Result(TypedDict):
 
 
 class Numerics(TypedDict):
-    """Accuracy and cost of a simulation: the largest position error of any marker, as requested and as estimated.
+    """Accuracy and cost of a simulation.
 
-    ``beats`` were simulated until the motion was periodic, with at most ``steps_per_beat`` steps each.
+    ``accuracy_mm`` is the requested and ``estimated_error_mm`` the estimated largest position error of any marker.
+    ``beats`` were simulated until the motion was periodic; the beat in the answer has ``steps_per_beat`` time steps.
     """
 
     accuracy_mm: float
@@ -263,9 +296,10 @@ class Numerics(TypedDict):
 
 
 class Comparison(TypedDict):
-    """Recorded and simulated tracks, [time][marker][x, y, z] in mm; null where not recorded.
+    """Recorded and simulated tracks, [instant][marker][x, y, z] in mm; null where not recorded.
 
-    The answer contains every ``stride``-th instant: all, except of recordings that are too long for one answer.
+    ``phase`` is the fraction of the beat at each instant, 0 at the start of a beat. The answer contains every
+    ``stride``-th instant: all of them (1), unless the recording is too long for one answer.
     """
 
     recording: str
@@ -278,14 +312,14 @@ class Comparison(TypedDict):
 
 
 class Simulation(Comparison):
-    """Tracks, their mean distance per marker, and the loads that were requested."""
+    """Tracks, their mean distance per marker (null if none was recorded), and the loads, if these were requested."""
 
     mean_distance_mm: float | None
     outputs: NotRequired[Outputs]
 
 
 class Event(TypedDict):
-    """A server-sent event: ``generation`` or ``step`` (with the progress) or ``state`` (the job)."""
+    """A server-sent event: "generation" (of a run), "step" (of a diagnosis) or "state" (``data``: the whole job)."""
 
     id: str | None
     event: str

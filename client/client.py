@@ -1,4 +1,4 @@
-"""Python client of the wingfit server.
+"""The Python client of the wingfit server, with an example.
 
 >>> client = Client()                                               # doctest: +SKIP
 >>> dataset = client.upload_dataset("examples/robird")              # doctest: +SKIP
@@ -44,16 +44,16 @@ OnRun = Callable[[a.Run], None]
 
 
 class Client(DiagnosisCalls, KeyCalls):
-    """Talks to one server; usable as a context manager."""
+    """Sends requests to one server and returns the answers; a context manager, at whose end the connections close."""
 
     def health(self) -> a.Health:
-        """Fetch the status, version, evaluator and load of the server."""
+        """Fetch the status and version of the server, its evaluator, and the number of active jobs."""
         return cast(a.Health, self._json("GET", "/v1/health"))
 
     def backup(self, path: str | Path, *, on_bytes: OnBytes | None = None) -> Path:
-        """Write a checked copy of everything on the server to ``path``, as :meth:`download` does.
+        """Write a copy of the server's whole database to the file or into the folder ``path``; return the file's path.
 
-        Only its owner can read the file.
+        Other users cannot read the file. ``on_bytes(received, total)`` is called during the transfer.
         """
         return self._file("/v1/backup", Path(path), "wingfit.sqlite3", on_bytes, private=True)
 
@@ -62,9 +62,9 @@ class Client(DiagnosisCalls, KeyCalls):
     def upload_dataset(
         self, path: str | Path, *, name: str | None = None, on_bytes: OnBytes | None = None
     ) -> a.Dataset:
-        """Upload a dataset: a zip, a NetCDF file, or a folder, which is zipped first.
+        """Upload the dataset at ``path``: a zip, a NetCDF file, or a folder, which is zipped first.
 
-        ``on_bytes(sent, total)`` is called as the bytes go out.
+        ``name`` replaces the dataset's own; ``on_bytes(sent, total)`` is called during the transfer.
         """
         source = Path(path)
         if not source.exists():
@@ -93,35 +93,36 @@ class Client(DiagnosisCalls, KeyCalls):
         return cast(a.Dataset, self._json("GET", f"/v1/datasets/{part(dataset_id)}"))
 
     def download(self, dataset_id: str, path: str | Path, *, on_bytes: OnBytes | None = None) -> Path:
-        """Write a dataset, byte for byte as uploaded, to ``path``; if that is a folder, the server's file name is used.
+        """Write a dataset, byte for byte as uploaded, to the file ``path``, and return the path of the file.
 
-        ``on_bytes(received, total)`` is called during the transfer; total is 0 where the server does not give it.
+        If ``path`` is a folder, the file is written there under the name that the server gives.
+        ``on_bytes(received, total)`` is called during the transfer; ``total`` is 0 if the server does not report it.
         """
         return self._file(f"/v1/datasets/{part(dataset_id)}/archive", Path(path), f"{dataset_id}.zip", on_bytes)
 
     def delete_dataset(self, dataset_id: str) -> None:
-        """Delete a dataset; the server refuses while runs refer to it."""
+        """Delete a dataset; the server refuses this while runs or diagnoses of the dataset exist."""
         self._call("DELETE", f"/v1/datasets/{part(dataset_id)}")
 
     # -- runs ----------------------------------------------------------------
 
     def submit_run(self, dataset_id: str, **spec: Any) -> a.Run:
-        """Submit a calibration.
+        """Submit a calibration, and return the queued run.
 
         ``spec``: method, mode, finish, population, stall, tolerance, max_generations, seed, recordings, genes, effects,
-        name; of a wing also division, bounds_factor, accuracy_mm; of a vehicle preset, without, axes, low_pass_hz,
-        peel_width_beats. Omitted settings have the server's defaults.
+        name; for a wing also division, bounds_factor, accuracy_mm; for a vehicle also preset, without, axes,
+        low_pass_hz, peel_width_beats. Omitted settings have the server's defaults.
         """
         body = given(dataset_id=dataset_id, **spec)
         return cast(a.Run, self._json("POST", "/v1/runs", json=body, key=str(uuid.uuid4())))
 
     def check_run(self, dataset_id: str, **spec: Any) -> a.Checked:
-        """Return what :meth:`submit_run` would submit, or raise the error that it would raise; nothing is stored."""
+        """Return the name and settings that :meth:`submit_run` would submit, or raise its error; submit nothing."""
         body = given(dataset_id=dataset_id, **spec)
         return cast(a.Checked, self._json("POST", "/v1/runs?validate_only=true", json=body))
 
     def runs(self, *, dataset_id: str | None = None, state: str | None = None) -> list[a.Run]:
-        """List all runs, newest first, optionally of one dataset or in one state."""
+        """List all runs, newest first; only those of ``dataset_id`` or in ``state`` (e.g. "RUNNING") if given."""
         return cast(list[a.Run], self._all("/v1/runs", dataset_id=dataset_id, state=state))
 
     def run(self, run_id: str) -> a.Run:
@@ -129,23 +130,23 @@ class Client(DiagnosisCalls, KeyCalls):
         return cast(a.Run, self._json("GET", _run(run_id)))
 
     def cancel(self, run_id: str) -> a.Run:
-        """Stop a run permanently; its results so far stay."""
+        """Stop a run permanently, within a second; its results so far are kept. Returns the run as it is now."""
         return cast(a.Run, self._json("POST", f"{_run(run_id)}/cancel"))
 
     def pause(self, run_id: str) -> a.Run:
-        """Stop a run after its current generation."""
+        """Request that a run stop after its current generation; it can be resumed. Returns the run as it is now."""
         return cast(a.Run, self._json("POST", f"{_run(run_id)}/pause"))
 
     def resume(self, run_id: str) -> a.Run:
-        """Continue a paused run."""
+        """Continue a paused run, or withdraw a pause that has not taken effect yet; return the run."""
         return cast(a.Run, self._json("POST", f"{_run(run_id)}/resume"))
 
     def delete_run(self, run_id: str) -> None:
-        """Delete a run that has ended."""
+        """Delete a run that has ended, with its results."""
         self._call("DELETE", _run(run_id))
 
     def history(self, run_id: str, *, after: int | None = None) -> list[a.HistoryItem]:
-        """Fetch the generations so far, those after sequence number ``after``."""
+        """Fetch the generations finished so far; with ``after``, only those whose sequence number is larger."""
         items: list[Any] = []
         while True:
             page = self._json("GET", f"{_run(run_id)}/history", params=given(after=after, limit=1000))["items"]
@@ -162,22 +163,28 @@ class Client(DiagnosisCalls, KeyCalls):
         *,
         on_bytes: OnBytes | None = None,
     ) -> Path:
-        """Write a run to ``path``, as :meth:`download` does.
+        """Write a run to the file or into the folder ``path``, and return the path of the file.
 
-        ``format``: json for all of it, csv for its history, netcdf for history, genome, and every recording simulated.
+        ``format``: "json": the whole run; "csv": its generations; "netcdf": its generations, its genes, and every
+        recording with its simulation. ``on_bytes(received, total)`` is called during the transfer.
         """
         return self._export(_run(run_id), format, Path(path), run_id, on_bytes)
 
     def genome(self, run_id: str) -> a.GenomeInfo:
-        """Fetch the best genome so far, beside the nominal one, with units and bounds."""
+        """Fetch all genes of a run: value in the best genome so far, nominal value, unit and bounds."""
         return cast(a.GenomeInfo, self._json("GET", f"{_run(run_id)}/genome"))
 
     def result(self, run_id: str) -> a.Result | f.ForceResult:
-        """Fetch misfits before and after calibration, and the genes, of a finished run; ``kind``: tracks or forces."""
+        """Fetch the result of a finished run: misfits before and after, and genes; its ``kind``: tracks or forces."""
         return cast("a.Result | f.ForceResult", self._json("GET", f"{_run(run_id)}/result"))
 
     def forces(self, run_id: str, recording: str | None = None, source: f.Source | None = None) -> f.Forces:
-        """Fetch recorded and modelled forces of one recording over the beat; ``source`` of the coefficients."""
+        """Fetch recorded and modelled forces of one recording over the beat.
+
+        ``recording``: its name, None for the first of the dataset. ``source`` of the model's coefficients: "local" (the
+        estimate on this recording), "joint" (on all together), "global" (the global model), "average" (of the local
+        estimates) or "nominal"; None for the first of these that the run has.
+        """
         params = given(recording=recording, source=source)
         return cast(f.Forces, self._simulated("GET", f"{_run(run_id)}/forces", params=params))
 
@@ -191,7 +198,11 @@ class Client(DiagnosisCalls, KeyCalls):
         pressure_mbar: float | None = None,
         temperature_c: float | None = None,
     ) -> f.Prediction:
-        """Predict the forces over a beat under any condition, from the global model of a finished run."""
+        """Predict the forces over a beat under a given condition, from the global model of a finished run.
+
+        The global model gives the coefficients as linear functions of flap frequency and body pitch. The default air
+        has 1013.25 mbar and 20 degrees C.
+        """
         condition = given(
             flap_frequency_hz=flap_frequency_hz,
             body_pitch_deg=body_pitch_deg,
@@ -202,7 +213,7 @@ class Client(DiagnosisCalls, KeyCalls):
         return cast(f.Prediction, self._simulated("POST", f"{_run(run_id)}/predictions", json=condition))
 
     def models(self) -> f.Models:
-        """List the blade-element models of vehicles and their terms."""
+        """Fetch the blade-element models of vehicles (presets) and the terms of which they consist."""
         return cast(f.Models, self._json("GET", "/v1/models"))
 
     def effects(self) -> list[Effect]:
@@ -210,13 +221,13 @@ class Client(DiagnosisCalls, KeyCalls):
         return cast(list[Effect], self._json("GET", "/v1/effects")["effects"])
 
     def effect(self, name: str) -> Effect:
-        """Fetch one effect."""
+        """Fetch the description of the effect ``name``."""
         return cast(Effect, self._json("GET", f"/v1/effects/{part(name)}"))
 
     def comparison(
         self, run_id: str, recording: str | None = None, genome: Literal["best", "nominal"] = "best"
     ) -> a.Comparison:
-        """Fetch recorded and simulated markers of one recording."""
+        """Fetch recorded and simulated marker tracks of one recording (None: the first), simulated with ``genome``."""
         params = given(recording=recording, genome=genome)
         return cast(a.Comparison, self._simulated("GET", f"{_run(run_id)}/comparison", params=params))
 
@@ -227,23 +238,29 @@ class Client(DiagnosisCalls, KeyCalls):
         genome: Literal["best", "nominal"] = "best",
         outputs: Sequence[str] | None = None,
     ) -> Loads:
-        """Fetch motor torques, forces, powers and energies over one beat; ``outputs`` as in :meth:`simulate`."""
+        """Fetch motor torques, forces, powers and energies of one recording (None: the first) over one simulated beat.
+
+        ``outputs``: names of the groups of loads to return, as in :meth:`simulate`; None for all.
+        """
         params = given(recording=recording, genome=genome, outputs=list(outputs) if outputs else None)
         return cast(Loads, self._simulated("GET", f"{_run(run_id)}/loads", params=params))
 
     def _simulated(self, method: str, path: str, **options: Any) -> Any:
-        """Send a request that requires a simulation, with a longer time limit; repeating it changes nothing."""
+        """Send a request that requires a simulation, with the longer time limit ``simulating_s``; return the answer."""
         return self._json(method, path, key=str(uuid.uuid4()), timeout=self.simulating, **options)
 
     def events(self, run_id: str, *, last_event_id: str | None = None, patience_s: float = 60.0) -> Iterator[a.Event]:
-        """Yield the server-sent events of a run until its final state.
+        """Yield the server-sent events of a run until it ends; with ``last_event_id``, only those after that event.
 
-        A broken connection is resumed; :class:`ServerAwayError` after ``patience_s`` without a server.
+        A broken connection is resumed. Raises :class:`ServerAwayError` if no server answers for ``patience_s`` seconds.
         """
         return self._events(_run(run_id), last_event_id, patience_s)
 
     def wait(self, run_id: str, on_progress: OnRun | None = None, *, patience_s: float = 60.0) -> a.Run:
-        """Block until the run has ended and return it; ``on_progress`` gets the run after each change."""
+        """Block until the run has ended, and return it; ``on_progress(run)`` is called after each change.
+
+        Raises :class:`ServerAwayError` if no server answers for ``patience_s`` seconds.
+        """
         return self._wait(_run(run_id), on_progress, patience_s)
 
     def simulate(
@@ -259,9 +276,10 @@ class Client(DiagnosisCalls, KeyCalls):
     ) -> a.Simulation:
         """Simulate one recording of a wing; genes not named in ``genome`` keep their nominal value.
 
-        ``accuracy_mm``: largest error of a simulated marker, 0.02 to 1; None means 0.1.
-        ``outputs`` asks for loads over the beat: True for all, or some of motors, air, strips, sections, connectors,
-        power, energy, averages.
+        ``division``: number of rigid bodies that represent the wing (4, 11, 24), or that of each strip ("3,3,3,2").
+        ``accuracy_mm``: largest error of a simulated marker, 0.02 to 1; None means 0.1. ``effects``: names of effects
+        to include. ``outputs`` requests loads over the beat: True for all, or some of motors, air, strips, sections,
+        connectors, power, energy, averages.
         """
         loads = outputs if isinstance(outputs, bool) else list(outputs)
         wing = {"division": division, "accuracy_mm": accuracy_mm, "outputs": loads}
@@ -282,8 +300,10 @@ class Client(DiagnosisCalls, KeyCalls):
     ) -> f.ForceSimulation:
         """Compute the forces of one recording of a vehicle; genes not named in ``genome`` keep their nominal value.
 
-        ``preset`` names a model and ``without`` the terms to omit from it, see :meth:`models`. ``low_pass_hz`` is the
-        cut-off of the filter for recorded and modelled forces: None is 3.2 times the flap frequency, 0 no filter.
+        ``preset`` names a model and ``without`` the terms to omit from it, see :meth:`models`; ``effects``: names of
+        effects to include. ``low_pass_hz`` is the cut-off of the filter for recorded and modelled forces: None is 3.2
+        times the flap frequency, 0 no filter. The end of the peel (the separation of the wings) is smoothed over
+        ``peel_width_beats``.
         """
         model = {"preset": preset, "without": list(without), "peel_width_beats": peel_width_beats}
         body = _simulation(dataset_id, recording, genome, effects, low_pass_hz=low_pass_hz, **model)
@@ -301,10 +321,10 @@ class Client(DiagnosisCalls, KeyCalls):
         outputs: Sequence[str] | None = None,
         effects: Sequence[str] = (),
     ) -> Loads:
-        """Simulate the loads of a genome under the condition of a recording, changed by ``condition``.
+        """Simulate the loads on a wing over a beat, under the condition of a recording as changed by ``condition``.
 
         Keys of ``condition``: flap_frequency_hz, phase_lag_deg, pressure_mbar, temperature_c, airspeed_m_s,
-        angle_of_attack_deg.
+        angle_of_attack_deg. The other arguments are as in :meth:`simulate`; ``outputs``: None for all loads.
         """
         loads = True if outputs is None else list(outputs)
         wing = {"division": division, "accuracy_mm": accuracy_mm, "outputs": loads}
@@ -315,7 +335,7 @@ class Client(DiagnosisCalls, KeyCalls):
 def _simulation(
     dataset_id: str, recording: str, genome: Mapping[str, float] | None, effects: Sequence[str], **settings: Any
 ) -> dict[str, Any]:
-    """The body of a request for a simulation; settings that are None are left to the server."""
+    """Return the JSON body of a request for a simulation, without those ``settings`` that are None."""
     model = {"genome": dict(genome or {}), "effects": list(effects)}
     return given(dataset_id=dataset_id, recording=recording, **model, **settings)
 

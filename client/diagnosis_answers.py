@@ -12,7 +12,12 @@ Verdict = Literal["adequate", "named", "ambiguous", "unnamed", "measurement faul
 
 
 class DiagnosisSpec(JobSpec):
-    """The settings of a diagnosis; ``start`` is its initial genome, empty for the dataset's estimates."""
+    """The settings of a diagnosis.
+
+    ``fixed``: values of genes that are not estimated; ``suspects``: names of the effects to be tested as explanations
+    (empty: all that apply); ``refine``: allow a finer discretisation of the wing; ``refits``: largest number of effects
+    refitted in full; ``start``: the initial genome, empty for the nominal values in the dataset.
+    """
 
     fixed: dict[str, float]
     suspects: list[str]
@@ -22,9 +27,10 @@ class DiagnosisSpec(JobSpec):
 
 
 class Diagnosis(Job):
-    """A diagnosis; ``pending_action`` is a cancellation that takes effect within seconds.
+    """A diagnosis, which identifies the physics missing from a model.
 
-    ``verdict`` and ``summary`` are null until it has succeeded.
+    ``run_id`` is the run from which it started, else null; ``pending_action`` a cancellation that has not taken effect
+    yet; ``steps`` counts its progress reports. ``verdict`` and ``summary`` are null until it has succeeded.
     """
 
     run_id: str | None
@@ -36,7 +42,11 @@ class Diagnosis(Job):
 
 
 class StepEvent(TypedDict):
-    """The data of the server-sent event ``step``; ``elapsed_seconds`` counts from the last start of the diagnosis."""
+    """The data of the server-sent event ``step``, a report on the progress of a diagnosis.
+
+    ``stage`` says what is computed; ``evaluations`` (simulated individuals) and ``elapsed_seconds`` count from the last
+    start of the diagnosis, which starts again if the server restarts; ``progress`` lies in [0, 1].
+    """
 
     sequence: int
     stage: str

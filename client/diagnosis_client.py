@@ -1,4 +1,4 @@
-"""The client's calls about diagnoses."""
+"""Methods of the client that submit, follow and fetch diagnoses."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ OnDiagnosis = Callable[[Diagnosis], None]
 
 
 class DiagnosisCalls(Watching):
-    """Submits and follows diagnoses, and fetches their findings."""
+    """Base class of the client: methods that submit and follow diagnoses, and fetch their findings."""
 
     def submit_diagnosis(self, dataset_id: str | None = None, *, run_id: str | None = None, **spec: Any) -> Diagnosis:
-        """Submit a diagnosis of a dataset, or of a run (from its best genome, with its settings).
+        """Submit a diagnosis of a dataset or of a run, and return it; a run gives its best genome and its settings.
 
-        ``spec``: seed, recordings, genes, fixed, effects, suspects, refine, refits, name; of a wing also division,
-        bounds_factor, accuracy_mm; of a vehicle preset, without, axes, low_pass_hz, peel_width_beats. Omitted
-        settings are those of the run, without a run the server's defaults.
+        ``spec``: seed, recordings, genes, fixed, effects, suspects, refine, refits, name; for a wing also division,
+        bounds_factor, accuracy_mm; for a vehicle also preset, without, axes, low_pass_hz, peel_width_beats. Omitted
+        settings are those of the run, or have the server's defaults.
         """
         body = given(dataset_id=dataset_id, run_id=run_id, **spec)
         return cast(Diagnosis, self._json("POST", "/v1/diagnoses", json=body, key=str(uuid.uuid4())))
@@ -32,7 +32,7 @@ class DiagnosisCalls(Watching):
     def diagnoses(
         self, *, dataset_id: str | None = None, run_id: str | None = None, state: str | None = None
     ) -> list[Diagnosis]:
-        """List all diagnoses, newest first, optionally of one dataset, of one run or in one state."""
+        """List all diagnoses, newest first, optionally only those of a dataset, of a run, in a state."""
         found = self._all("/v1/diagnoses", dataset_id=dataset_id, run_id=run_id, state=state)
         return cast(list[Diagnosis], found)
 
@@ -41,7 +41,7 @@ class DiagnosisCalls(Watching):
         return cast(Diagnosis, self._json("GET", _path(diagnosis_id)))
 
     def finding(self, diagnosis_id: str) -> dict[str, Any]:
-        """Fetch the finding of a diagnosis; its schema is at /v1/schemas/finding."""
+        """Fetch the finding (result) of a diagnosis; its JSON schema is at /v1/schemas/finding."""
         return cast(dict[str, Any], self._json("GET", f"{_path(diagnosis_id)}/finding"))
 
     def export_diagnosis(
@@ -52,18 +52,19 @@ class DiagnosisCalls(Watching):
         *,
         on_bytes: OnBytes | None = None,
     ) -> Path:
-        """Write a diagnosis that has succeeded to ``path``, as :meth:`Client.download` does.
+        """Write a diagnosis that has succeeded to the file or into the folder ``path``; return the path of the file.
 
-        ``format``: json for all of it, csv for its ranking, netcdf for its maps and its misfit to every recording.
+        ``format``: "json": the whole diagnosis; "csv": the ranking of the hypotheses; "netcdf": the misfit to every
+        recording, and maps of the residual. ``on_bytes(received, total)`` is called during the transfer.
         """
         return self._export(_path(diagnosis_id), format, Path(path), diagnosis_id, on_bytes)
 
     def report(self, diagnosis_id: str) -> str:
-        """Fetch the report: one HTML file without external resources."""
+        """Fetch the report on the finding of a diagnosis, as the text of one self-contained HTML file."""
         return self._call("GET", f"{_path(diagnosis_id)}/report").text
 
     def cancel_diagnosis(self, diagnosis_id: str) -> Diagnosis:
-        """Stop a diagnosis permanently."""
+        """Stop a diagnosis permanently, within seconds, and return it as it is now."""
         return cast(Diagnosis, self._json("POST", f"{_path(diagnosis_id)}/cancel"))
 
     def delete_diagnosis(self, diagnosis_id: str) -> None:
@@ -73,13 +74,13 @@ class DiagnosisCalls(Watching):
     def diagnosis_events(
         self, diagnosis_id: str, *, last_event_id: str | None = None, patience_s: float = 60.0
     ) -> Iterator[a.Event]:
-        """Yield the server-sent events of a diagnosis until its final state, as :meth:`Client.events` of a run."""
+        """Yield the server-sent events of a diagnosis until it ends; arguments and errors as in ``Client.events``."""
         return self._events(_path(diagnosis_id), last_event_id, patience_s)
 
     def wait_for_diagnosis(
         self, diagnosis_id: str, on_progress: OnDiagnosis | None = None, *, patience_s: float = 60.0
     ) -> Diagnosis:
-        """Block until the diagnosis has ended and return it; ``on_progress`` gets it after each change."""
+        """Block until the diagnosis has ended, and return it; arguments and errors are those of ``Client.wait``."""
         return self._wait(_path(diagnosis_id), on_progress, patience_s)
 
 

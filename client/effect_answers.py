@@ -8,12 +8,13 @@ from typing_extensions import TypedDict
 
 
 class EffectParameter(TypedDict):
-    """One gene of an effect.
+    """One gene of an effect, with its bounds ``lower`` and ``upper`` and a ``typical`` value.
 
-    With ``relative_to``, ``lower``, ``upper`` and ``typical`` are fractions of that measure of the rig: its span, its
-    mean chord, or the mass of its wing. The genes of a run give the same quantities in ``unit``.
-    ``is_size``: the effect is off if this and its other sizes are zero; ``is_location``: where on the wing it acts;
-    ``scale``: how a search spreads over the bounds.
+    If ``relative_to`` is not null, bounds and typical value are fractions of that measure of the rig (span, mean chord,
+    or mass of the wing); in runs the same gene is in ``unit``. Otherwise they are in ``unit``.
+    ``is_size``: the gene says how strong the effect is; the effect is off if all such genes are zero.
+    ``is_location``: the gene says where on the wing the effect acts. ``scale``: whether a search spreads the values of
+    the gene evenly between the bounds ("linear") or evenly in their logarithm ("log").
     """
 
     name: str
@@ -31,9 +32,11 @@ class EffectParameter(TypedDict):
 class Effect(TypedDict):
     """One piece of physics, or one measurement error, that a model can contain.
 
-    The effect is off where all its parameters with ``is_size`` are zero, as in every nominal genome. ``port`` is where
-    it enters the model, ``power`` how it exchanges energy over a beat, ``memory`` its internal states in words,
-    ``law`` its equations, ``source`` their publication, ``signature`` its trace in a recording.
+    The effect is off if all its parameters with ``is_size`` are zero, as in every nominal genome. ``port`` is the part
+    of the model that the effect changes; ``power`` says whether its law gains or loses no energy over a beat
+    (conservative), loses some at every instant (dissipative), or neither is guaranteed (any). ``memory`` describes its
+    internal states (null: none), ``law`` gives its equations, one per line, ``source`` their publication; ``signature``
+    says how the effect shows in a recording, ``confused_with`` names effects that show similarly.
     """
 
     name: str

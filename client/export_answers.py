@@ -1,4 +1,4 @@
-"""Exports of runs and diagnoses as JSON: complete documents to archive."""
+"""JSON exports of runs and diagnoses: complete documents for an archive."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Format = Literal["json", "csv", "netcdf"]
 
 
 class Export(TypedDict):
-    """The fields that every export has."""
+    """The fields that every export has; ``schema_id`` names the format of the document."""
 
     schema_id: str
     wingfit_version: str
@@ -23,9 +23,9 @@ class Export(TypedDict):
 
 
 class RunExport(Export):
-    """A run with all its results; ``genome`` is null before its first generation, ``result`` before its end.
+    """A run with all its results; ``genome`` is null before the first generation, ``result`` until the run succeeds.
 
-    ``request`` is the body of POST /v1/runs that repeats the run.
+    ``request`` is a JSON body for POST /v1/runs that submits the same run again; ``history`` lists the generations.
     """
 
     run: Run

@@ -1,4 +1,4 @@
-"""Follows a job on the server through its events, over lost connections, until it ends."""
+"""Follows a run or diagnosis by its server-sent events until it ends, reconnecting if the connection is lost."""
 
 from __future__ import annotations
 
@@ -12,16 +12,19 @@ from wingfit.client.transport import ServerAwayError, Transport, WingfitError, i
 
 JobT = TypeVar("JobT", a.Run, Diagnosis)
 
-# By the event of a step: the field of a job that counts such steps.
+# Event that reports a finished step: the field of a job that counts such steps.
 COUNTS = {"generation": "generations", "step": "steps"}
 UPDATED = ("stage", "progress", "eta_seconds", "best_mm", "best_mn", "evaluations")
 
 
 class Watching(Transport):
-    """Base of the client that follows jobs; a job is identified by its path, e.g. ``/v1/runs/ID``."""
+    """Base class of the client: follows jobs (runs and diagnoses), given by their URL paths, e.g. ``/v1/runs/ID``."""
 
     def _events(self, path: str, last_event_id: str | None, patience_s: float) -> Iterator[a.Event]:
-        """Yield the events of the job until its final state; ServerAwayError after ``patience_s`` without a server."""
+        """Yield the events after ``last_event_id`` (None: all) of the job at ``path`` until the job has ended.
+
+        A broken connection is resumed; ServerAwayError is raised if no server answers for ``patience_s`` seconds.
+        """
         away_since: float | None = None
         while True:
             try:
@@ -44,7 +47,7 @@ class Watching(Transport):
             time.sleep(self.retry_wait_s)
 
     def _wait(self, path: str, on_progress: Callable[[JobT], None] | None, patience_s: float) -> JobT:
-        """Wait until the job has ended and return it; ``on_progress`` is called with the job after each change."""
+        """Wait until the job at ``path`` has ended, and return it; call ``on_progress(job)`` after each change."""
         job: JobT = self._json("GET", path)
         report = on_progress or (lambda _: None)
         report(job)
@@ -57,7 +60,7 @@ class Watching(Transport):
 
 
 def merge(job: JobT, event: a.Event) -> JobT:
-    """Return the job as it is after ``event``."""
+    """Return ``job`` with its fields updated by the server-sent ``event``; unchanged if the event is not new."""
     data = event["data"]
     if event["event"] == "state":
         return cast(JobT, dict(job) | data)

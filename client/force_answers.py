@@ -10,19 +10,20 @@ from typing_extensions import TypedDict
 from wingfit.client.answers import GeneInfo
 
 Source = Literal["nominal", "local", "joint", "global", "average"]
-# Of the coefficients: those of a run, or the genome given in a request.
+# Where the coefficients come from: an estimate of a run, or the genome given in a request.
 SourceOrGiven = Literal["nominal", "local", "joint", "global", "average", "given"]
 Quantity = Literal["lift", "drag", "x", "z"]
 Series = list[float]
 Pair = Annotated[list[float], Len(2, 2)]
-# Lift and drag are present where both axes were recorded.
+# A series over the beat for each force; lift and drag are present only if both axes were recorded.
 ByQuantity = dict[Quantity, Series]
 
 
 class Coefficient(TypedDict):
-    """A coefficient with its standard error (Cramer-Rao bound) and 90 % confidence interval.
+    """A coefficient of the force model with its standard error (Cramer-Rao bound), in the unit of the coefficient.
 
-    The true coverage is below 90 % where a recording has fewer than 24 beats.
+    ``low_90`` and ``high_90`` are the ends of the 90 % confidence interval. With fewer than 24 beats in a recording,
+    the interval contains the true value in fewer than 90 % of cases. Null: not known.
     """
 
     name: str
@@ -33,10 +34,11 @@ class Coefficient(TypedDict):
 
 
 class Estimate(TypedDict):
-    """Maximum-likelihood estimate on one recording, or on several together.
+    """Maximum-likelihood estimate of the coefficients from one recording, or from several together.
 
-    ``correlation`` is in the order of the coefficients; ``noise_mn2`` is the covariance of the fitted outputs, one
-    matrix per recording. The log-likelihood lacks its constant term.
+    ``correlation`` is the correlation matrix of the estimation errors, in the order of ``coefficients``; ``noise_mn2``
+    holds, for each recording, the covariance matrix of the noise on the fitted force axes, mN^2.
+    ``negative_log_likelihood`` omits the constant term; ``converged``: whether the iteration did.
     """
 
     name: str
@@ -50,7 +52,11 @@ class Estimate(TypedDict):
 
 
 class GlobalGene(TypedDict):
-    """A coefficient over the conditions: constant + per_hz x flap frequency + per_deg x body pitch."""
+    """A coefficient as a function of the condition: constant + per_hz x flap frequency + per_deg x body pitch.
+
+    ``scatter``: standard deviation of the single recordings' estimates about this function, beyond their own errors.
+    The errors in percent are the largest differences from these estimates, when fitted or when left out of the fit.
+    """
 
     name: str
     constant: float
@@ -62,7 +68,7 @@ class GlobalGene(TypedDict):
 
 
 class GlobalModel(TypedDict):
-    """Coefficients as functions of the condition, and the range of conditions to which they were fitted."""
+    """Coefficients as functions of flap frequency and body pitch, with the ranges of the fitted conditions."""
 
     genes: list[GlobalGene]
     recordings: list[str]
@@ -73,9 +79,11 @@ class GlobalModel(TypedDict):
 
 
 class Agreement(TypedDict):
-    """Agreement of a model with a recording in one quantity; percentages refer to the range of the recorded mean beat.
+    """Agreement between modelled and recorded force over the mean beat, for one recording and one ``quantity``.
 
-    Percentage and correlation are null for a constant force.
+    ``source`` says from which estimate the model has its coefficients. ``rmse_n`` is the RMS difference,
+    ``rmse_percent`` the same in percent of the range of the recorded force; it and ``correlation`` are null for a
+    constant force. ``mean_..._n`` are means over the beat.
     """
 
     recording: str
@@ -89,10 +97,11 @@ class Agreement(TypedDict):
 
 
 class ForceResult(TypedDict):
-    """Result of a calibration on forces; RMS differences of the fitted axes, nominal and calibrated.
+    """Result of a calibration on forces.
 
-    ``agreements`` compare each recording with every model; for ``leave_one_out`` the global model was fitted without
-    the recording that it predicts.
+    ``before_mn`` (nominal coefficients) and ``after_mn`` (estimated ones) are RMS differences between modelled and
+    recorded forces on the fitted axes. ``agreements`` compare each recording with the model for every source of
+    coefficients; in ``leave_one_out`` the global model was fitted without the recording that it predicts.
     """
 
     kind: Literal["forces"]
@@ -112,8 +121,10 @@ class ForceResult(TypedDict):
 class Forces(TypedDict):
     """Forces over the beat and their spectra: recorded (mean beat, standard deviation between beats) and modelled.
 
-    ``phase`` is t* (fraction of the beat), 0 where the wings are closest. ``standard_deviation_n`` is empty with a
-    single beat; the spectra are empty where the recording has no piece without gaps.
+    ``phase`` is t* (fraction of the beat), 0 where the wings are closest; forces are given at each ``phase``.
+    ``source`` says from which estimate the model has its coefficients. ``standard_deviation_n`` is empty with a single
+    beat. Spectra are one-sided power spectral densities at each ``frequency_hz``, empty if the recording has no piece
+    without gaps.
     """
 
     recording: str
@@ -129,13 +140,16 @@ class Forces(TypedDict):
 
 
 class ForceSimulation(Forces):
-    """Forces over the beat with the genome of a request, and their agreement in every quantity."""
+    """Forces over the beat, modelled with the genome of a request, and their agreement with the recording."""
 
     agreements: list[Agreement]
 
 
 class Prediction(TypedDict):
-    """Unfiltered forces over one beat that a global model predicts; ``warnings`` say where it extrapolates."""
+    """Unfiltered forces that a global model predicts at each ``phase`` (fraction of the beat), and their averages.
+
+    ``warnings`` say in which respect the model extrapolates.
+    """
 
     coefficients: dict[str, float]
     phase: Series
@@ -148,7 +162,7 @@ class Prediction(TypedDict):
 
 
 class TermGene(TypedDict):
-    """A coefficient of a term, its range, and its value where it is not estimated."""
+    """A coefficient of a term, with its bounds ``lower`` and ``upper``; ``nominal``: its value unless estimated."""
 
     name: str
     unit: str
@@ -159,7 +173,7 @@ class TermGene(TypedDict):
 
 
 class Term(TypedDict):
-    """One physical term of the quasi-steady force, and its source."""
+    """One physical term of the quasi-steady force on a wing, with its coefficients; ``source`` is its publication."""
 
     name: str
     genes: list[TermGene]
@@ -169,7 +183,7 @@ class Term(TypedDict):
 
 
 class Preset(TypedDict):
-    """A published model: names of its terms."""
+    """A published blade-element model: the names of the ``terms`` that it contains, and its publication."""
 
     name: str
     terms: list[str]
@@ -178,7 +192,7 @@ class Preset(TypedDict):
 
 
 class Models(TypedDict):
-    """Models of vehicles: presets, and the terms of which they consist."""
+    """Blade-element models of vehicles: presets, and the terms of which they consist."""
 
     presets: list[Preset]
     terms: list[Term]

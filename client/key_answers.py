@@ -1,4 +1,4 @@
-"""JSON answers of the server about API keys and the session of a browser."""
+"""JSON answers of the server about API keys, and about the key that a caller uses."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing_extensions import TypedDict
 
 
 class Key(TypedDict):
-    """An API key, without its secret."""
+    """An API key without its secret; ``owner``: owner of what is created with it; ``scopes``: read, write, admin."""
 
     id: str
     name: str
@@ -29,7 +29,7 @@ class Keys(TypedDict):
 
 
 class Session(TypedDict):
-    """The key with which a request came; ``keys_required`` says whether the server requires one."""
+    """The key that came with a request, null if none; ``keys_required``: whether the server requires a key."""
 
     keys_required: bool
     key_id: str | None

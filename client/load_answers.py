@@ -1,4 +1,4 @@
-"""JSON answers about loads, powers and energies over one beat; ``docs/api.md`` gives axes and signs."""
+"""JSON answers about loads, powers and energies of a wing over one beat; ``docs/api.md`` gives axes and signs."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ MotorPair = dict[Literal["front", "rear"], float]
 
 
 class Strip(TypedDict):
-    """Aerodynamic load on one spanwise strip of the wing; ``span_mm`` holds its inner and outer edge."""
+    """Force of the air on, and power into, one spanwise strip of the wing; ``span_mm``: its inner and outer edge."""
 
     name: str
     span_mm: Annotated[list[float], Len(2, 2)]
@@ -26,7 +26,10 @@ class Strip(TypedDict):
 
 
 class SectionLoad(TypedDict):
-    """Load that the inner part of the wing exerts on the outer at the cut ``span_mm``; vectors [phase][x, y, z]."""
+    """Moment and force that the part of the wing inboard of the cut at ``span_mm`` exerts on the part outboard of it.
+
+    Axes are those of the strip outboard of the cut: x aft, y along the span, z normal to the wing.
+    """
 
     name: str
     span_mm: float
@@ -35,7 +38,12 @@ class SectionLoad(TypedDict):
 
 
 class ConnectorLoad(TypedDict):
-    """Wrench on the second body of ``between``, and its motion relative to the first, in the first body's axes."""
+    """Load in the connector that joins two rigid bodies of the wing, ``between`` = [first, second].
+
+    Moment and force act on the second body; angular velocity and velocity are those of the second body relative to the
+    first; all are in the axes of the first body. ``point_mm`` is the connector's position at rest. ``dissipated_w`` is
+    the power lost in its damper, ``stored_j`` the energy in its spring.
+    """
 
     name: str
     kind: Literal["root", "spanwise", "chordwise"]
@@ -52,7 +60,8 @@ class ConnectorLoad(TypedDict):
 class Averages(TypedDict):
     """Means over the beat, and the largest motor torques.
 
-    Energy balance: ``supplied_w`` = ``dissipated_w`` + ``to_air_w`` + ``closing_error_w`` (numerical error).
+    Energy balance: ``supplied_w`` (by both motors) = ``dissipated_w`` (in dampers) + ``to_air_w`` +
+    ``closing_error_w`` (error of the integrator and transients); in percent of the mean power that enters the wing.
     """
 
     lift_n: float
@@ -69,7 +78,7 @@ class Averages(TypedDict):
 
 
 class OutputNumerics(TypedDict):
-    """Time steps and error of the simulated beat; loads are solved more accurately than tracks where possible."""
+    """Accuracy of the simulated beat: the number of beats until it was periodic, its time steps, its position error."""
 
     steps_per_beat: int
     beats: int
@@ -77,7 +86,7 @@ class OutputNumerics(TypedDict):
 
 
 class OutputGroups(TypedDict, total=False):
-    """The outputs that can be requested; each series has one value per ``phase`` of the beat."""
+    """The outputs that can be requested; an output that was not requested is absent. See :class:`Outputs`."""
 
     numerics: OutputNumerics
     motor_angle_deg: MotorSeries
@@ -96,9 +105,11 @@ class OutputGroups(TypedDict, total=False):
 
 
 class Outputs(OutputGroups):
-    """One periodic beat in order of ``phase``, with those outputs that were requested.
+    """The requested outputs over one periodic beat; each series has one value per entry of ``phase``, in that order.
 
-    ``power_w`` is the power into the wing through each port; the power through the dampers is never positive.
+    ``phase`` is the fraction of the beat, 0 at the start of a beat of the tracks; ``drive_phase`` is counted from the
+    zero of the drive. ``power_w`` is the power into the wing from each motor, from the air, and from the dampers (never
+    positive).
     """
 
     phase: Series
@@ -106,7 +117,7 @@ class Outputs(OutputGroups):
 
 
 class Loads(TypedDict):
-    """Simulated loads under the condition of ``recording``, with the changes to it that the request gave."""
+    """Simulated loads under the condition of ``recording``, as changed by the request if that gave a condition."""
 
     recording: str
     outputs: Outputs

@@ -1,4 +1,4 @@
-"""Creates files and folders that only the user who runs the service can read, whatever the umask."""
+"""Creates files and folders that only the user who runs this process can read, whatever the umask."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ OTHERS = 0o077  # all rights of the group and of everybody
 def make_folder(folder: Path, *names: str) -> None:
     """Create ``folder`` with access for its owner only, or remove other users' access to an existing one.
 
-    An existing folder is changed only if this user owns it and it is empty or holds one of ``names``: others may serve
-    other programs too. If it stays accessible, e.g. a Kubernetes volume owned by root, a warning is logged.
+    An existing folder is changed only if this user owns it and it is empty or contains a file named in ``names``; any
+    other folder may be used by other programs. If the folder stays accessible to others, a warning is logged.
     """
     try:
         folder.mkdir(FOLDER, parents=True)
@@ -38,7 +38,7 @@ def _is_ours(folder: Path, names: tuple[str, ...]) -> bool:
 
 
 def make_file(path: Path) -> None:
-    """Create the empty file ``path`` for its owner only, or remove other users' access to an existing one."""
+    """Create the empty file ``path`` for its owner only, or remove other users' rights on an existing file."""
     try:
         open(path, "xb", opener=_private).close()
     except FileExistsError:
@@ -46,7 +46,7 @@ def make_file(path: Path) -> None:
 
 
 def open_new(path: Path) -> IO[bytes]:
-    """Open ``path`` for writing, as a new file that only its owner can read."""
+    """Create the file ``path`` anew, with access for its owner only, and return it open for writing (binary)."""
     path.unlink(missing_ok=True)  # an existing one would keep its rights, and its readers
     return open(path, "xb", opener=_private)
 
@@ -58,7 +58,10 @@ def _private(name: str, flags: int) -> int:
 
 
 def tighten(path: Path, *, ours: bool = True) -> None:
-    """Remove all rights of other users on ``path``, and log it; only warn if not ``ours`` or if that fails."""
+    """Remove all rights of other users on the file or folder ``path``, and log the change.
+
+    Only log a warning if it is not ``ours`` (others may use it), belongs to another user, or cannot be changed.
+    """
     found = path.stat()
     mode = stat.S_IMODE(found.st_mode)
     if not mode & OTHERS:

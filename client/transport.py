@@ -1,4 +1,4 @@
-"""HTTP transport: retries, server-sent events, problem details as exceptions, folders as archives."""
+"""Sends HTTP requests: repeats failed ones, reads server-sent events, raises errors of the server, zips folders."""
 
 from __future__ import annotations
 
@@ -38,8 +38,8 @@ class WingfitError(Exception):
     Attributes:
         status: HTTP status, or None when no answer came.
         title: short name of the problem.
-        detail: the server's own explanation.
-        errors: for invalid input, the faulty places: ``{"where", "value", "message"}`` each.
+        detail: explanation, of the server or of the client.
+        errors: for invalid input, one dict for each fault: ``where`` it is, the ``value`` there, and a ``message``.
 
     """
 
@@ -57,7 +57,7 @@ class WingfitError(Exception):
 
 
 class ServerAwayError(WingfitError):
-    """No server answered at the address."""
+    """No server answered at the address ``base_url``, or the connection broke; ``cause``: the error of httpx."""
 
     def __init__(self, base_url: str, cause: Exception) -> None:
         self.base_url = base_url
@@ -68,12 +68,13 @@ class ServerAwayError(WingfitError):
 
 
 class Transport:
-    """Sends requests to one server.
+    """Sends requests to the server at ``base_url``; base class of the client.
 
-    ``retries`` is how often a call is repeated when the connection fails or the server answers 502, 503 or 504.
-    A POST that creates something carries an Idempotency-Key, so that repeating it never creates a second one.
-    ``simulating_s`` is the time limit (s) of answers that require a simulation.
-    ``api_key`` is by default that of the environment (``WINGFIT_API_KEY``).
+    ``retries``: how often a request is repeated if the connection fails or the server answers 502, 503 or 504, first
+    after ``retry_wait_s``, then each time after twice the wait. Only GET, DELETE and requests with an Idempotency-Key
+    (with which the server acts once) are repeated; others, only if no connection was made.
+    ``timeout_s``: time limit of an answer; ``simulating_s``: that of an answer that requires a simulation.
+    ``api_key``: by default that of the environment variable ``WINGFIT_API_KEY``.
     """
 
     def __init__(
@@ -126,7 +127,7 @@ class Transport:
         return self._repeat(lambda: self._http.request(method, path, headers=headers, **options), safe=safe)
 
     def _repeat(self, send: Callable[[], httpx.Response], *, safe: bool = True) -> httpx.Response:
-        """Call ``send``, again after temporary failures; if not ``safe``, only if the request reached no server."""
+        """Call ``send``, again after temporary failures; if not ``safe``, only if no connection was made."""
         for attempt in range(self.retries + 1):
             last = attempt == self.retries
             try:
@@ -152,7 +153,7 @@ class Transport:
 
     @contextlib.contextmanager
     def _stream(self, method: str, path: str, **options: Any) -> Iterator[httpx.Response]:
-        """Open a streamed answer; ServerAwayError if no server answers or the connection breaks during the block."""
+        """Yield a response to be read in pieces; ServerAwayError if no server answers or the connection breaks."""
         try:
             with self._http.stream(method, path, **options) as response:
                 if response.is_error:
@@ -164,9 +165,10 @@ class Transport:
     def _file(
         self, path: str, target: Path, name: str, on_bytes: OnBytes | None, *, private: bool = False, **options: Any
     ) -> Path:
-        """Download ``path`` completely to the file ``target``, or into that folder under the server's name for it.
+        """Download the URL path ``path`` to the file ``target``, and return the path of the file.
 
-        Other users cannot read a ``private`` file.
+        If ``target`` is a folder, the file gets the name that the server gives, or ``name``. The file appears only when
+        it is complete. Other users cannot read a ``private`` file. ``on_bytes(received, total)`` reports the progress.
         """
         with self._stream("GET", path, **options) as response:
             if target.is_dir():
@@ -195,7 +197,7 @@ class Transport:
 
 
 def _refuse_not_finite(body: Any, where: str = "") -> None:
-    """WingfitError for infinity and NaN, which JSON does not have."""
+    """Raise WingfitError if ``body``, the value at ``where`` in the JSON of a request, is or holds infinity or NaN."""
     if isinstance(body, dict):
         for name, value in body.items():
             _refuse_not_finite(value, f"{where}.{name}" if where else str(name))
@@ -204,7 +206,7 @@ def _refuse_not_finite(body: Any, where: str = "") -> None:
 
 
 def _attachment_name(response: httpx.Response, fallback: str) -> str:
-    """File name from Content-Disposition, without any folder that it may name."""
+    """Return the file name in the header Content-Disposition, without folders; ``fallback`` if there is none."""
     disposition = response.headers.get("content-disposition", "")
     _, found, rest = disposition.partition('filename="')
     name = Path(rest.partition('"')[0].replace("\\", "/")).name if found else ""
@@ -212,14 +214,14 @@ def _attachment_name(response: httpx.Response, fallback: str) -> str:
 
 
 class CountedFile(io.FileIO):
-    """A file that reports how much of it has been read."""
+    """A file opened for reading that calls ``on_bytes(read so far, size of the file)`` after each read."""
 
     def __init__(self, path: Path, on_bytes: OnBytes | None) -> None:
         super().__init__(path)
         self._on_bytes, self._total = on_bytes, path.stat().st_size
 
     def read(self, size: int | None = -1, /) -> bytes:
-        """Read ``size`` bytes (all if negative), and report how much of the file has been read."""
+        """Read and return up to ``size`` bytes (all if negative or None), and report the progress."""
         block = super().read(-1 if size is None else size) or b""
         if self._on_bytes:
             self._on_bytes(self.tell(), self._total)
@@ -227,7 +229,7 @@ class CountedFile(io.FileIO):
 
 
 def parse_events(lines: Iterator[str]) -> Iterator[a.Event]:
-    """Yield server-sent events from the lines of a stream; an incomplete event at its end is dropped."""
+    """Yield the server-sent events in the ``lines`` of a stream; an incomplete event at the end is dropped."""
     fields: dict[str, str] = {}
     for line in lines:
         if line:
@@ -244,7 +246,7 @@ def parse_events(lines: Iterator[str]) -> Iterator[a.Event]:
 
 
 def zip_folder(folder: Path, target: Path) -> Path:
-    """Zip ``folder`` without hidden files into ``target`` and return that; same files give the same bytes."""
+    """Zip a dataset's ``folder`` without hidden files into ``target``, which is returned; same files, same bytes."""
     files = sorted(p for p in folder.rglob("*") if p.is_file() and not _hidden(p.relative_to(folder)))
     if not any(p.relative_to(folder).as_posix() == "dataset.yaml" for p in files):
         raise WingfitError("not a dataset", f"{folder} holds no dataset.yaml; give the folder that holds it")
@@ -261,7 +263,7 @@ def _hidden(path: Path) -> bool:
 
 
 def _checked(response: httpx.Response) -> httpx.Response:
-    """Return the response, or raise the server's problem details as an exception."""
+    """Return ``response``, or raise a WingfitError with the server's explanation if it reports an error."""
     if not response.is_error:
         return response
     try:
@@ -279,7 +281,7 @@ def _checked(response: httpx.Response) -> httpx.Response:
 
 
 def is_passing(error: WingfitError) -> bool:
-    """Whether the error is temporary, so that the same call may succeed if it is repeated."""
+    """Return whether ``error`` is temporary, so that the same request may succeed if it is repeated."""
     return isinstance(error, ServerAwayError) or error.status in (502, 503, 504)
 
 
@@ -300,19 +302,19 @@ def _reason(cause: Exception) -> str:
 
 
 def _described(error: dict[str, Any]) -> str:
-    """One entry of a problem's ``errors`` as text: where, what is wrong, and the value."""
+    """Return one entry of :attr:`WingfitError.errors` as text: where it is, what is wrong, and the value."""
     where = f"{error['where']}: " if error.get("where") else ""
     value = error.get("value")
     return f"{where}{error.get('message', '')}" + ("" if value is None else f" (given: {value!r})")
 
 
 def given(**values: Any) -> dict[str, Any]:
-    """The keyword arguments that are not None, as a dict."""
+    """Return the keyword arguments that are not None, as a dict."""
     return {key: value for key, value in values.items() if value is not None}
 
 
 def part(identifier: str) -> str:
-    """``identifier`` percent-encoded as one segment of a URL path, whatever characters it contains."""
+    """Return ``identifier`` percent-encoded as one segment of a URL path; raise WingfitError if it is empty."""
     if not identifier:
         raise WingfitError("no id given", "list the ids with 'wingfit runs list' or 'wingfit datasets list'")
     return quote(identifier, safe="").replace(".", "%2E")

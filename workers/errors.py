@@ -1,4 +1,4 @@
-"""Errors of the evaluators, as opposed to errors of the model."""
+"""Errors of the evaluators; errors of the simulated model are raised as they are."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ class EvaluatorClosedError(RuntimeError):
 
 
 class EvaluationInterruptedError(RuntimeError):
-    """The caller interrupted the call. Simulations in progress run to their end; their results are dropped."""
+    """The caller interrupted a call of ``evaluate``; simulations that have begun run to their end, without a result."""
 
 
 class WorkerLostError(RuntimeError):
-    """A unit of work (some individuals against one recording) was given up: the processes evaluating it kept dying."""
+    """A unit of work (some individuals against one recording) was given up, because its processes kept dying."""

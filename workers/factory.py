@@ -1,4 +1,4 @@
-"""Creates evaluators by name."""
+"""Creates an evaluator of a given kind."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from wingfit.workers.running_evaluator import EvaluatorKind, RunningEvaluator
 
 
 def make_evaluator(kind: EvaluatorKind, workers: int | None = None, address: str | None = None) -> RunningEvaluator:
-    """Start an evaluator.
+    """Start an evaluator (see :mod:`wingfit.workers`) and return it.
 
-    ``workers`` is the number of worker processes, by default one per processor. ``address`` ("host:port" or "auto")
-    joins an existing Ray cluster and uses all its workers; without it, Ray starts on this machine.
+    ``workers``: number of worker processes, by default one per processor. ``address`` ("host:port" or "auto", only for
+    Ray): the existing cluster to join, of which all processors are used; if None, Ray starts on this machine.
     """
     if workers is not None and workers < 1:
         raise ValueError(f"workers is {workers}; it must be at least 1, or absent for one per processor")

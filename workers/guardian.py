@@ -1,9 +1,10 @@
 """Kills a Ray worker if one unit of its work exceeds the time limit, or if the worker process is suspended.
 
-A Ray worker is started by Ray, often on another machine, where its owner cannot watch it; a hung task would block its
-processor for ever. So each worker starts a small process that needs only the standard library. The worker sends it the
-start and time limit of each unit and a regular heartbeat. If the limit passes, or the heartbeat stops, it kills the
-worker; Ray reports the death, and the unit is repeated. The small process ends with the worker.
+A Ray worker is started by Ray, often on another machine, where the evaluator cannot watch it; a hung task would block
+its processor for ever. So each worker starts a small process that needs only the standard library. The worker sends to
+this process the time limit of each unit, the end of each unit, and a regular heartbeat. If the limit passes or the
+heartbeat stops, the small process kills the worker; Ray reports the death, and the evaluator repeats the unit. The
+small process ends with the worker.
 """
 
 from __future__ import annotations
@@ -49,7 +50,11 @@ while True:
 
 
 class Guardian:
-    """Starts the watching process and reports to it through a pipe when a unit of work starts and ends."""
+    """Starts the small process that watches this one, and sends to it the start and the end of each unit of work.
+
+    ``silence_s``: time without a heartbeat after which the small process kills this one; ``beat_s``: time between
+    heartbeats.
+    """
 
     def __init__(self, silence_s: float = SILENCE_SECONDS, beat_s: float = BEAT_SECONDS) -> None:
         self._silence, self._beat = silence_s, beat_s
@@ -59,7 +64,7 @@ class Guardian:
 
     @contextmanager
     def watching(self, limit_s: float) -> Iterator[None]:
-        """Kill this process if the block takes longer than ``limit_s``."""
+        """Have the small process kill this one if the with-block takes longer than ``limit_s`` (s)."""
         self._say(b"%f" % limit_s)
         try:
             yield
@@ -67,7 +72,7 @@ class Guardian:
             self._say(b"done")
 
     def _say(self, line: bytes) -> None:
-        """Send a line, restarting the small process if it has ended; without one the unit runs unwatched."""
+        """Send ``line`` to the small process, restarted if it has ended; if that fails, there is no time limit."""
         with self._lock:
             for _ in range(2):  # it may end between the check and the write
                 with suppress(OSError):

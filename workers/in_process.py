@@ -1,4 +1,4 @@
-"""Evaluation in the caller's own thread. The other evaluators must return bit-identical numbers."""
+"""Evaluates individuals in the thread of the caller; all other evaluators must return bit-identical numbers."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from wingfit.workers.watch import Standing
 
 
 class InProcessEvaluator(RunningEvaluator):
-    """Evaluates the units of a batch (some individuals against one recording each) one after the other."""
+    """Evaluates the units of work of a batch (some individuals against one recording each) one after the other."""
 
     kind: Literal["in_process"] = "in_process"
     workers = 1
 
     @property
     def standing(self) -> Standing:
-        """One worker: this process."""
+        """One living worker (this process), no lost ones."""
         return Standing(self.workers)
 
     def _misfits(self, problem: Problem, tasks: list[Task], residuals: bool, interrupted: Interrupted) -> list[Misfit]:
@@ -29,5 +29,5 @@ class InProcessEvaluator(RunningEvaluator):
         return done
 
     def close(self) -> None:
-        """Refuse further calls; a call in progress raises before its next unit."""
+        """Refuse further calls; a call in progress raises EvaluatorClosedError before its next unit."""
         self._closed = True

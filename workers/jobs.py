@@ -1,9 +1,10 @@
-r"""The life of a calibration job as a pure state machine: no clock, no database, no threads.
+r"""The states of a job (a calibration or a diagnosis), as a pure state machine: no clock, no database, no threads.
 
-``step`` takes a job and an event and returns the job as it is afterwards and what the caller must now do. The
-caller stores the returned job, then carries out the instructions in order. A request to pause or cancel a
-running job is kept as a *wish* until the runner reports its next generation, so no finished one is lost, and
-a wish survives a restart of the server because it is part of the stored job. Cancelling wins.
+``step`` takes a job and an event, and returns the job after the event and instructions for the caller. The caller
+stores the returned job, then carries out the instructions in order. A request to pause or cancel a running job is
+stored in the job as a *wish* until the runner (the thread that computes the job) reports its next generation. So no
+finished generation is lost, and the request survives a restart of the server. A cancellation replaces a pause, and
+cannot be withdrawn.
 
     None --submit--> QUEUED --start--> RUNNING --finish--> SUCCEEDED
                       ^  |              |   |----fail----> FAILED <--- restart, the third without progress
@@ -26,7 +27,7 @@ MOST_STARTS = 3
 
 
 class State(StrEnum):
-    """State of a job; the last three are final."""
+    """State of a job; SUCCEEDED, FAILED and CANCELLED are final."""
 
     QUEUED = "QUEUED"
     RUNNING = "RUNNING"
@@ -37,12 +38,12 @@ class State(StrEnum):
 
     @property
     def final(self) -> bool:
-        """Whether no event can change a job in this state."""
+        """Whether the job has ended, so that no event can change it."""
         return self in (State.SUCCEEDED, State.FAILED, State.CANCELLED)
 
 
 class Wish(StrEnum):
-    """Request of a user that the runner of the job has not acted on yet."""
+    """A user's request to pause or cancel a running job that has not taken effect yet; NONE if there is none."""
 
     NONE = "NONE"
     PAUSE = "PAUSE"
@@ -50,7 +51,7 @@ class Wish(StrEnum):
 
 
 class Instruction(StrEnum):
-    """What the caller of :func:`step` must do after it has stored the new job."""
+    """What the caller of :func:`step` must do after storing the returned job."""
 
     ENQUEUE = "ENQUEUE"  # put the job at the end of the queue
     DEQUEUE = "DEQUEUE"  # take the job out of the queue
@@ -72,9 +73,9 @@ class Start:
 
 @dataclass(frozen=True)
 class Generation:
-    """The runner finished one generation; ``progress`` is the fraction of the whole job, in [0, 1].
+    """The runner finished one generation (a diagnosis: one step); ``progress`` of the whole job lies in [0, 1].
 
-    ``lasting``: whether a restarted job can continue after this generation, instead of repeating it.
+    ``lasting``: whether a restarted job can continue after this generation; if not, the generation is repeated.
     """
 
     progress: float
@@ -119,9 +120,10 @@ class Leave:
 
 @dataclass(frozen=True)
 class Restart:
-    """The server started and found the job stored as RUNNING, although no process computes it: the server crashed.
+    """The server starts and finds the job stored as unfinished, though no process computes it.
 
-    A job that was started ``most_starts`` times without lasting progress fails, because it may cause the crashes.
+    A RUNNING job was interrupted by a crash; if it was started ``most_starts`` times since its last lasting generation,
+    it fails, because it may cause the crashes.
     """
 
     most_starts: int = MOST_STARTS
@@ -134,8 +136,9 @@ Event = Submit | Start | Generation | Pause | Resume | Cancel | Finish | Fail | 
 class Job:
     """A job as it is stored.
 
-    ``progress`` never decreases; ``error`` is set only in state FAILED; ``starts`` counts the starts since the last
-    lasting generation, including the present start and excluding those that ended by an orderly shutdown.
+    ``generations`` counts the finished ones; ``progress`` in [0, 1] never decreases; ``error`` is set only in state
+    FAILED; ``starts`` counts the starts since the last lasting generation, including the present start, and without
+    those that ended by an orderly shutdown.
     """
 
     state: State = State.QUEUED
@@ -150,7 +153,7 @@ Outcome = tuple[Job, tuple[Instruction, ...]]
 
 
 class IllegalTransition(ValueError):  # noqa: N818  it is a refusal more than an error, and named in the contract
-    """An event that the job's state does not allow; ``allowed`` holds the names of the allowed events."""
+    """The job's ``state`` does not allow the ``event``; ``allowed`` holds the names of the allowed events."""
 
     def __init__(self, job: Job | None, event: Event) -> None:
         self.state = job.state if job else None
@@ -164,12 +167,15 @@ class IllegalTransition(ValueError):  # noqa: N818  it is a refusal more than an
 
 
 def allowed(job: Job | None) -> tuple[str, ...]:
-    """Names of the events that ``step`` allows for ``job``, in a fixed order."""
+    """Return the names of the events that ``step`` allows for ``job`` (None: not submitted yet), in a fixed order."""
     return tuple(type(event).__name__.lower() for event in _ONE_OF_EACH if _outcome(job, event) is not None)
 
 
 def step(job: Job | None, event: Event) -> Outcome:
-    """The job after ``event``, and the instructions; IllegalTransition if the state does not allow the event."""
+    """Return ``job`` (None: not submitted yet) after ``event``, and the instructions for the caller.
+
+    IllegalTransition is raised if the job's state does not allow the event.
+    """
     outcome = _outcome(job, event)
     if outcome is None:
         raise IllegalTransition(job, event)
@@ -182,12 +188,12 @@ _ONE_OF_EACH: tuple[Event, ...] = (
 
 
 def _move(job: Job, state: State, *instructions: Instruction, error: str | None = None) -> Outcome:
-    """The job in ``state`` without a wish, which is now fulfilled or void, and the instructions for the caller."""
+    """Return ``job`` in its new ``state``, with its wish cleared, and ``instructions`` followed by PUBLISH."""
     return replace(job, state=state, wish=Wish.NONE, error=error), (*instructions, Instruction.PUBLISH)
 
 
 def _outcome(job: Job | None, event: Event) -> Outcome | None:
-    """The job after ``event``, and the instructions; None if the state does not allow the event."""
+    """Return ``job`` after ``event`` and the instructions, or None if the job's state does not allow the event."""
     if job is None:
         return (Job(), (Instruction.ENQUEUE, Instruction.PUBLISH)) if isinstance(event, Submit) else None
     match job.state, event:
@@ -237,7 +243,7 @@ def _while_running(job: Job, event: Event) -> Outcome | None:
 
 
 def _runner_lost(job: Job, event: Leave | Restart) -> Outcome:
-    """The state after the server of a running job shut down (Leave) or crashed (Restart), and the instructions."""
+    """Return a running job after its server shut down (Leave) or crashed (Restart), and the instructions."""
     if isinstance(event, Leave):
         return replace(job, starts=max(0, job.starts - 1)), ()
     if job.wish is not Wish.NONE:
@@ -260,11 +266,11 @@ ETA_LONGEST = 1e9  # s, thirty years: larger estimates are dropped
 
 
 def eta_seconds(history: Sequence[tuple[float, float]]) -> float | None:
-    """Remaining seconds, or None if they cannot be estimated.
+    """Return the estimated remaining time of a job in s, or None if it cannot be estimated.
 
-    ``history`` holds (elapsed s of running time, progress) of each generation, in order; (0, 0) is implied. The speed
-    is the slope of a line fitted by least squares with weights that decay into the past: one slow generation changes
-    the estimate little, a lasting change of speed is followed.
+    ``history`` holds (running time so far in s, progress in [0, 1]) after each generation, in order. The speed is the
+    slope of a line fitted by least squares, with weights that decrease exponentially into the past: one slow generation
+    changes the estimate little, a lasting change of speed soon changes it fully.
     """
     points = [(0.0, 0.0), *history]
     now, progress = points[-1]

@@ -1,8 +1,8 @@
-"""Whether the Ray node of this machine is alive in its cluster: ``python -m wingfit.workers.node_alive ray-head:6379``.
+"""Checks that the Ray node of this machine is alive: ``python -m wingfit.workers.node_alive ray-head:6379``.
 
-The exit status is 0 if the node is alive, else 1 with the reason. The head is queried, because the processes of a node
-may live although the node has lost its head, or the head has dropped the node. A call takes half a second of processor
-time to import Ray.
+The exit status is 0 if the node is alive, else 1 with the reason. The head (main process) of the cluster is queried,
+because the processes of a node may live although their connection to the head is lost, or the head has removed the
+node. A call takes half a second of processor time to import Ray.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ TIMEOUT_SECONDS = 5
 
 
 def main(words: list[str] | None = None) -> None:
-    """Check one node, by default that of this machine."""
+    """Check the node that the command-line arguments ``words`` name, by default that of this machine."""
     parser = argparse.ArgumentParser(prog="python -m wingfit.workers.node_alive", description=__doc__)
     parser.add_argument("head", help="address of the cluster's head, as host:port")
     reaching = "IP address of the node (default: the one from which this machine reaches the head)"
@@ -29,7 +29,10 @@ def main(words: list[str] | None = None) -> None:
 
 
 def check(host: str, port: int, node: str | None = None) -> None:
-    """SystemExit, with the reason, unless the head at ``host``:``port`` counts ``node`` among its living nodes."""
+    """Raise SystemExit with the reason unless the cluster's head at ``host``:``port`` lists ``node`` as alive.
+
+    ``node``: IP address of the node, by default that of this machine.
+    """
     try:
         with socket.create_connection((host, port), TIMEOUT_SECONDS) as connection:
             # IP addresses of the head and of this machine, as the two see each other.

@@ -1,9 +1,9 @@
-"""Evaluation in worker processes of this machine.
+"""Evaluates individuals in worker processes of this machine.
 
-A unit of work is some individuals against one recording. Each process is served by one thread over one pipe. If the
-process dies, that thread starts another and repeats the lost unit; the other processes are not affected. One more
-thread kills processes that are suspended or exceed the time limit of :class:`wingfit.workers.watch.Expectation`, so
-that they are replaced.
+A unit of work is some individuals against one recording. A thread of this process sends a unit to a worker process over
+a pipe, and waits for the answer. If the worker process dies, the thread starts another and repeats the lost unit; the
+other worker processes are not affected. One more thread kills worker processes that exceed the time limit of
+:class:`wingfit.workers.watch.Expectation` (also suspended ones), so that they are replaced.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ Answer = tuple[Literal["need problem", "begun", "done", "raised"], Any]
 
 
 class ProcessPoolEvaluator(RunningEvaluator):
-    """Simulates individuals in ``workers`` processes (default: one per processor), each a piece of the batch."""
+    """Evaluates the units of work of a batch in ``workers`` processes (default: one per processor) at the same time."""
 
     kind: Literal["processes"] = "processes"
 
@@ -55,12 +55,12 @@ class ProcessPoolEvaluator(RunningEvaluator):
 
     @property
     def workers(self) -> int:
-        """Number of processes."""
+        """Number of worker processes."""
         return len(self._pool)
 
     @property
     def standing(self) -> Standing:
-        """Number of living processes, and counts of lost ones."""
+        """Number of living worker processes, and counts of lost ones."""
         return self._tally.standing(sum(worker.alive for worker in self._pool))
 
     def _misfits(self, problem: Problem, tasks: list[Task], residuals: bool, interrupted: Interrupted) -> list[Misfit]:
@@ -77,7 +77,7 @@ class ProcessPoolEvaluator(RunningEvaluator):
                 future.cancel()
 
     def close(self) -> None:
-        """Stop the processes; calls in progress raise :class:`EvaluatorClosedError`."""
+        """Stop the worker processes; calls in progress raise :class:`EvaluatorClosedError`."""
         with self._lock:
             if self._closed:
                 return
@@ -140,9 +140,9 @@ def _result(future: Future[Misfit], interrupted: Interrupted) -> Misfit:
 
 
 class _Died(Exception):  # noqa: N818  internal
-    """The process at the other end of the pipe has ended.
+    """A worker process has ended before it returned a result.
 
-    ``begun``: whether it had started the unit; ``hung``: whether it was killed for exceeding the time limit.
+    ``begun``: whether it had begun the unit of work; ``hung``: whether it was killed for exceeding the time limit.
     """
 
     def __init__(self, *, begun: bool, hung: bool = False) -> None:
@@ -151,7 +151,10 @@ class _Died(Exception):  # noqa: N818  internal
 
 
 class _Worker:
-    """Handle of one worker process; used by one thread at a time, and by the thread that enforces time limits."""
+    """One worker process and the pipe to it; used by one thread at a time, and by the thread that enforces time limits.
+
+    The process may be replaced by another; ``last_exit`` describes the exit of the previous one.
+    """
 
     def __init__(self) -> None:
         self.last_exit = "exit code unknown"
@@ -165,7 +168,7 @@ class _Worker:
         self._connection: Connection | None = None
 
     def start(self) -> None:
-        """Start a process."""
+        """Start a worker process with a pipe to it."""
         context = multiprocessing.get_context("spawn")
         ours, theirs = context.Pipe()
         process = context.Process(target=_serve, args=(theirs,), name="wingfit-worker", daemon=True)
@@ -178,7 +181,7 @@ class _Worker:
 
     @property
     def pid(self) -> int | None:
-        """Process id."""
+        """Id of the process, None if there is none."""
         return self._process.pid if self._process else None
 
     @property
@@ -191,9 +194,10 @@ class _Worker:
             return False
 
     def run(self, problem: Problem, task: Task, residuals: bool, limit: float) -> tuple[Misfit, float]:
-        """Evaluate ``task`` within ``limit`` s of its start; return misfit and duration (s). _Died if the process dies.
+        """Evaluate ``task`` in the process, and return the misfit and the duration (s).
 
-        Raises the model's own exceptions.
+        ``residuals``: whether the misfit contains residuals. Raises _Died if the process dies or is killed at the time
+        ``limit`` (s), and exceptions of the model as they are.
         """
         self._expect(limit if self._proven else max(limit, START_SECONDS))
         try:
@@ -202,14 +206,14 @@ class _Worker:
             self._expect(None)
 
     def kill_if_overdue(self) -> None:
-        """Kill the process if its deadline has passed; the waiting thread gets _Died."""
+        """Kill the process if its deadline has passed; then :meth:`run`, which waits for it, raises _Died."""
         with self._watching:
             if self._deadline is not None and time.monotonic() > self._deadline:
                 self._deadline, self._hung = None, True
                 self.kill()
 
     def _expect(self, seconds: float | None) -> None:
-        """Set the deadline to ``seconds`` from now; None removes it."""
+        """Set the deadline of the process to ``seconds`` from now; None removes the deadline."""
         with self._watching:
             self._deadline = None if seconds is None else time.monotonic() + seconds
 
@@ -236,12 +240,12 @@ class _Worker:
         return misfit, float(seconds)
 
     def kill(self) -> None:
-        """Kill the process; a waiting thread gets _Died."""
+        """Kill the process; then :meth:`run`, if it waits for the process, raises _Died."""
         if self._process:
             self._process.kill()
 
     def release(self) -> None:
-        """Wait for a dead or dying process and free its pipe."""
+        """Kill the process if it still lives, wait for its end, and close the pipe."""
         if self._process is None or self._connection is None:
             return
         self._process.kill()
@@ -253,7 +257,7 @@ class _Worker:
 
 
 def _serve(connection: Connection) -> None:
-    """Main loop of a worker process: evaluate tasks until the owner is gone."""
+    """Run in a worker process: evaluate the tasks that arrive over ``connection`` until it is closed."""
     # Ctrl-C in a terminal reaches every process of the group; only the owner handles it.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     lower_priority()
@@ -283,7 +287,7 @@ def _attempt(connection: Connection, problems: Recent[Problem], key: str, task: 
 
 
 def _portable(error: Exception) -> Exception:
-    """``error``, or a RuntimeError with its text if it cannot be pickled."""
+    """Return ``error``, or a RuntimeError with the same text if ``error`` cannot be pickled."""
     try:
         pickle.loads(pickle.dumps(error))  # noqa: S301  our own bytes
     except Exception:

@@ -1,9 +1,9 @@
-"""The batches of one call on Ray: submitted as workers become free, and repeated if a worker is lost.
+"""Sends the tasks of one call to Ray in batches, as workers become free, and repeats a batch if its worker is lost.
 
-Nothing is ever cancelled: in Ray 2.60, cancelling a task at the moment it ends aborts this process. So no more batches
-are submitted than keep the workers busy, and those of an interrupted call are soon done. A hung worker ends itself
-(:mod:`wingfit.workers.guardian`). A batch whose worker or node is lost is repeated from here and not by Ray, which
-would not report it.
+Submitted batches are never cancelled: in Ray 2.60, cancelling a task at the moment it ends aborts this process. So only
+as many batches are submitted as keep the workers busy, and the batches of an interrupted call soon end. A hung worker
+is killed on its own machine (:mod:`wingfit.workers.guardian`). A batch whose worker or node (machine) is lost is
+repeated by this module and not by Ray, which would not report the loss.
 """
 
 from __future__ import annotations
@@ -40,10 +40,11 @@ class Batch:
 
     Attributes:
         numbers: indices of the tasks in the call.
-        blamed: number of workers lost while they evaluated it.
-        lost: number of workers and nodes lost with it.
-        due: time (s, monotonic clock) before which it must not be submitted.
-        limit: time limit (s) of one of its tasks in the last submission, at ``began``.
+        blamed: number of workers lost by a crash or for lack of memory, which the batch may have caused.
+        lost: number of all losses of a worker, a node or the stored problem while the batch was submitted.
+        due: time (s, monotonic clock) before which the batch must not be submitted again.
+        limit: time limit (s) of each of its tasks in the last submission.
+        began: time (s, monotonic clock) of the last submission.
     """
 
     numbers: tuple[int, ...]
@@ -55,10 +56,11 @@ class Batch:
 
 
 class Cluster(NamedTuple):
-    """Functions with which :class:`Batches` uses the cluster.
+    """Functions with which :class:`Batches` uses the Ray cluster.
 
-    ``submit(batch, limit)`` returns a reference to the result, ``forget`` reports that the cluster has lost the
-    problem, and ``check`` raises if the call is to end.
+    ``workers()`` returns the number of processors; ``submit(batch, limit)`` submits a batch whose tasks have the time
+    limit ``limit`` (s) and returns Ray's reference to the result; ``forget()`` is called if the cluster has lost the
+    stored problem; ``check()`` raises if the evaluator was closed or the call is interrupted.
     """
 
     workers: Callable[[], int]
@@ -68,7 +70,10 @@ class Cluster(NamedTuple):
 
 
 class Batches:
-    """Submits the ``count`` tasks of one call for ``problem`` and collects their results."""
+    """Submits the ``count`` tasks of one call of ``evaluate`` for ``problem`` in batches, and collects their results.
+
+    ``expectation`` gives time limits, and learns from the durations of tasks; ``tally`` counts lost workers.
+    """
 
     def __init__(self, problem: Problem, count: int, cluster: Cluster, expectation: Expectation, tally: Tally) -> None:
         self._problem, self._count, self._cluster = problem, count, cluster
@@ -81,7 +86,7 @@ class Batches:
         self._done: dict[int, Misfit] = {}
 
     def collect(self) -> list[Misfit]:
-        """Results of all tasks, in their order."""
+        """Evaluate all tasks, and return their misfits in the order of the tasks."""
         while self._waiting or self._pending:
             self._cluster.check()
             self._submit()
@@ -128,7 +133,7 @@ class Batches:
                 self._expectation.done(self._problem.key, seconds)
 
     def _lost(self, batch: Batch, error: Exception) -> None:
-        """Repeat the batch, after a wait if the cluster is in trouble; WorkerLostError after too many losses."""
+        """Queue a lost batch again, with a delay unless its worker crashed; WorkerLostError after too many losses."""
         self._cluster.check()
         now = time.monotonic()
         what = f"{len(batch.numbers)} units of {self._problem.key[:8]} over {len(self._problem.recordings)} recordings"
@@ -150,5 +155,5 @@ class Batches:
 
 
 def _hung(batch: Batch, error: Exception) -> bool:
-    """Whether the worker was probably killed for exceeding the time limit; Ray does not report who killed it."""
+    """Return whether the worker was probably killed at the time limit; Ray does not report who killed it."""
     return isinstance(error, ray_errors.WorkerCrashedError) and time.monotonic() - batch.began >= batch.limit

@@ -1,8 +1,8 @@
-"""Evaluation on Ray: on this machine, or on an existing cluster.
+"""Evaluates individuals with Ray, on this machine or on an existing cluster.
 
-Arrays from Ray's shared memory are read-only, a different type for compiled kernels, so a problem is sent as bytes. A
-call costs milliseconds, so units are sent in batches, a few per processor. Ray's default strategy sends whole
-generations to the node that had the last one, so batches are spread.
+Arrays in Ray's shared memory are read-only, another type for compiled kernels; so a problem is sent as pickled bytes.
+A call to Ray costs milliseconds, so units of work are sent in batches, a few per processor. Ray's default strategy
+sends all batches to the node that had the previous ones; so Ray is told to spread them over the nodes.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ STALE_SECONDS = 20.0
 
 
 class RayEvaluator(RunningEvaluator):
-    """Distributes a batch over the Ray cluster at ``address``, or without it over ``workers`` local processes."""
+    """Evaluates batches on the Ray cluster at ``address`` or, if that is None, in ``workers`` local processes."""
 
     kind: Literal["ray"] = "ray"
 
@@ -51,12 +51,12 @@ class RayEvaluator(RunningEvaluator):
 
     @property
     def workers(self) -> int:
-        """Processors of the cluster a few seconds ago; 0 if its head does not answer."""
+        """Number of processors of the cluster a few seconds ago; 0 if its head (main process) does not answer."""
         return self._workers if time.monotonic() - self._seen < STALE_SECONDS else 0
 
     @property
     def standing(self) -> Standing:
-        """Present number of processors, and counts of lost workers."""
+        """Number of processors of the cluster, and counts of lost workers."""
         return self._tally.standing(self.workers)
 
     def _misfits(self, problem: Problem, tasks: list[Task], residuals: bool, interrupted: Interrupted) -> list[Misfit]:
@@ -70,7 +70,7 @@ class RayEvaluator(RunningEvaluator):
             return Batches(problem, len(tasks), cluster, self._expectation, self._tally).collect()
 
     def close(self) -> None:
-        """Leave the cluster, and stop it if it was started here; calls in progress raise EvaluatorClosedError."""
+        """Leave the cluster; a Ray that was started here is stopped. Calls in progress raise EvaluatorClosedError."""
         with self._condition:
             if self._closed:
                 return
@@ -94,7 +94,7 @@ class RayEvaluator(RunningEvaluator):
                 self._condition.notify_all()
 
     def _look(self) -> None:
-        """Count the cluster's processors regularly; runs in its own thread, because a lost head blocks the query."""
+        """Count the cluster's processors every few seconds; in its own thread, as a lost head blocks the query."""
         while not self._over.wait(LOOK_SECONDS):
             # Without a head Ray raises various errors; the count becomes stale then.
             with suppress(Exception), self._call():
@@ -104,12 +104,12 @@ class RayEvaluator(RunningEvaluator):
                 self._workers, self._seen = count, time.monotonic()
 
     def _put(self, problem: Problem) -> Any:
-        """Store the problem in the cluster's memory unless it is there already; return the reference to it."""
+        """Store ``problem`` in the cluster's memory unless it is there already; return Ray's reference to it."""
         with self._condition:
             return self._references.use(problem.key, lambda: ray.put(pickle.dumps(problem, pickle.HIGHEST_PROTOCOL)))
 
     def _forget(self, problem: Problem) -> None:
-        """Discard the reference to a problem that the cluster's memory lost, so that the next call stores it again."""
+        """Discard the reference to ``problem``, which the cluster lost, so that :meth:`_put` stores it again."""
         with self._condition:
             self._references.pop(problem.key, None)
 
@@ -125,9 +125,10 @@ _guardian: list[Guardian] = []
 def _run_tasks(
     key: str, reference: list[Any], tasks: list[Task], limit: float, residuals: bool
 ) -> list[tuple[Misfit, float]]:
-    """Evaluate some tasks in a Ray worker, each within ``limit`` s; return misfit and duration (s) of each.
+    """Evaluate ``tasks`` in a Ray worker, each within ``limit`` s; return misfit and duration (s) of each.
 
-    ``reference`` is in a list, so that Ray does not fetch its object at every call.
+    ``key`` names the problem in this worker's cache; ``reference`` is a list with Ray's reference to its bytes, so that
+    Ray does not fetch these at every call. ``residuals``: whether misfits contain residuals.
     """
     if not _guardian:
         lower_priority()

@@ -1,11 +1,11 @@
-"""The connection of this process to Ray, and the start of a local Ray if there is no cluster to join.
+"""Connects this process to Ray: joins a cluster, or starts a local Ray.
 
 Facts about Ray 2.60 behind this module:
-- A local Ray ends with the *thread* that started it, and Ray ends a process that has been without its Ray for a minute.
-  So a thread of our own connects, and lives until the evaluator is closed. Outside the main thread, Ray also leaves the
-  signal handlers of the process unchanged.
-- Ray listens on all interfaces. So a local Ray requires a token too. It does so by default, but it would write the
-  token into a file that others can read, unless the environment has one.
+- A local Ray ends with the *thread* that started it, and Ray kills a process whose Ray ended a minute ago. So a thread
+  is made that connects and lives until the evaluator is closed. Outside the main thread, Ray also leaves the signal
+  handlers of the process unchanged.
+- Ray listens on all network interfaces. So a local Ray must require a token. It does so by default, but would write the
+  token into a file that others can read; so the token is given in the environment.
 - Ray's default folder stores cluster addresses that misdirect the next start. So the local Ray has its own folder.
 """
 
@@ -45,7 +45,10 @@ QUIET: dict[str, Any] = {"log_to_driver": False, "logging_level": logging.ERROR}
 
 
 class Connection:
-    """A connection to Ray, made by a thread that lives until :meth:`close`."""
+    """A connection to the Ray cluster at ``address`` or, if that is None, to a local Ray with ``workers`` processors.
+
+    The connection is made by a thread that lives until :meth:`close`.
+    """
 
     def __init__(self, workers: int | None, address: str | None) -> None:
         if ray.is_initialized():
@@ -61,7 +64,7 @@ class Connection:
         atexit.register(self.close)
 
     def close(self) -> None:
-        """Disconnect, and stop Ray if it was started here."""
+        """Disconnect from Ray, and stop it if it was started here."""
         atexit.unregister(self.close)
         self._leave.set()
         self._thread.join(STOP_SECONDS)
@@ -120,7 +123,7 @@ def _stop(folder: Path | None = None) -> None:
 
 
 def _own_folder() -> Path:
-    """Make a private folder, and remove those of killed processes."""
+    """Create a private folder for a local Ray; remove such folders of processes that have ended."""
     usual = Path(tempfile.gettempdir())
     base = usual if len(str(usual)) <= LONGEST_TEMP_PATH else Path("/tmp")  # noqa: S108  mkdtemp is private
     for old in base.glob(f"{FOLDER}*-*"):

@@ -1,4 +1,4 @@
-"""A dictionary of limited size that discards the least recently used entry."""
+"""A cache: a dictionary of limited size that discards the least recently used entry (LRU)."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class Recent(OrderedDict[str, T]):
         self._most = most
 
     def use(self, key: str, make: Callable[[], T]) -> T:
-        """Return the entry of ``key``, made by ``make`` if missing; a full cache drops the least recently used one."""
+        """Return the entry of ``key``, made by ``make()`` if missing; a full cache drops the least recently used."""
         entry = self[key] if key in self else make()
         self[key] = entry
         self.move_to_end(key)

@@ -1,4 +1,4 @@
-"""The base of all evaluators: cuts a batch into tasks, refuses calls once closed, and collects the results."""
+"""Base class of all evaluators: splits a batch into tasks, collects the results, refuses calls once closed."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Interrupted = Callable[[], bool]
 
 
 class RunningEvaluator(ABC):
-    """Base class: evaluates batches; a subclass runs their tasks in this process, in worker processes or on Ray."""
+    """Base class of evaluators; a subclass runs the tasks of a batch in this process, in worker processes or on Ray."""
 
     kind: EvaluatorKind
     _closed = False
@@ -32,14 +32,15 @@ class RunningEvaluator(ABC):
     @property
     @abstractmethod
     def standing(self) -> Standing:
-        """Number of living workers, and counts of lost ones."""
+        """Number of living workers, and counts of lost ones (died, hung)."""
 
     def evaluate(
         self, problem: Problem, values: npt.ArrayLike, *, residuals: bool = False, interrupted: Interrupted = never
     ) -> Evaluation:
-        """Misfits of ``values`` (individuals x genes) to every recording of the problem; several threads may call.
+        """Simulate the individuals ``values`` [B, F] (B individuals, F free genes), and return their misfits.
 
-        EvaluationInterruptedError is raised soon after ``interrupted`` returns True; tasks not yet started are dropped.
+        There is a misfit to every recording of ``problem``, with the residuals if ``residuals``. Several threads may
+        call. EvaluationInterruptedError is raised soon after ``interrupted()`` returns True; waiting tasks are dropped.
         """
         batch = as_batch(values)
         tasks = [Task.cut(batch, unit) for unit in units(problem, len(batch))]
@@ -47,14 +48,14 @@ class RunningEvaluator(ABC):
 
     @abstractmethod
     def close(self) -> None:
-        """Release processes and memory; further calls are errors."""
+        """Release processes and memory; further calls raise EvaluatorClosedError."""
 
     @abstractmethod
     def _misfits(self, problem: Problem, tasks: list[Task], residuals: bool, interrupted: Interrupted) -> list[Misfit]:
-        """The result of each task, in their order."""
+        """Evaluate ``tasks``, and return their misfits in the same order; see :meth:`evaluate` for the arguments."""
 
     def _check(self, interrupted: Interrupted = never) -> None:
-        """Raise if the evaluator was closed or the call is interrupted."""
+        """Raise an error if the evaluator was closed, or if ``interrupted()`` returns True."""
         if self._closed:
             raise EvaluatorClosedError(self.kind)
         if interrupted():

@@ -1,4 +1,4 @@
-"""Common code of worker processes: priority and threads, a cache of problems, and tasks that can be sent to them."""
+"""Functions for all worker processes: low priority, one computing thread each, and tasks that can be sent to them."""
 
 from __future__ import annotations
 
@@ -23,9 +23,10 @@ _environment = threading.Lock()
 
 @contextmanager
 def child_environment(**more: str) -> Iterator[None]:
-    """Set the environment for child processes: one computing thread each, because they share the processors.
+    """Set environment variables for the child processes that the with-block starts.
 
-    Numerical libraries read the setting when they are loaded. ``more`` are further variables.
+    They give each child one thread for numerical libraries (which read the variables when loaded), because the children
+    share the processors. ``more``: further variables.
     """
     settings = dict.fromkeys(THREAD_SETTINGS, "1") | more
     with _environment:
@@ -42,7 +43,7 @@ def child_environment(**more: str) -> Iterator[None]:
 
 
 def lower_priority() -> None:
-    """Raise the niceness of this thread, and of what it starts, to at least ``NICENESS``: the API has priority."""
+    """Lower the priority of this thread, and of all that it starts, below that of the server's API."""
     this = threading.get_native_id()
     with suppress(OSError):  # on systems that know no niceness of threads
         os.setpriority(os.PRIO_PROCESS, this, max(NICENESS, os.getpriority(os.PRIO_PROCESS, this)))
@@ -50,17 +51,20 @@ def lower_priority() -> None:
 
 @dataclass(frozen=True)
 class Task:
-    """A unit of work with ``values``, its rows (individuals x genes) of the batch; can be sent to another process."""
+    """A unit of work (some individuals against one recording) that can be sent to another process.
+
+    ``values`` [U, F] holds the free genes of the U individuals; ``unit`` refers to these rows, 0 to U.
+    """
 
     unit: Unit
     values: npt.NDArray[np.float64]
 
     @classmethod
     def cut(cls, batch: npt.NDArray[np.float64], unit: Unit) -> Task:
-        """The task that evaluates rows ``unit.start`` to ``unit.stop`` of ``batch`` (individuals x genes)."""
+        """Return the task that evaluates rows ``unit.start`` to ``unit.stop`` of ``batch`` [B, F] (B individuals)."""
         rows = batch[unit.start : unit.stop]
         return cls(Unit(0, len(rows), unit.recording), rows)
 
     def run(self, problem: Problem, *, residuals: bool) -> Misfit:
-        """Misfits of the task's individuals; a copy is evaluated, because arrays in shared memory may be read-only."""
+        """Return the misfits of the individuals; ``values`` are copied, as arrays in shared memory may be read-only."""
         return run_unit(problem, np.array(self.values), self.unit, residuals=residuals)

@@ -1,4 +1,4 @@
-"""Time limits of units of work, after which their worker counts as hung, and counts of lost workers."""
+"""Time limits of units of work, beyond which their worker counts as hung, and counts of lost workers."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ def never() -> bool:
 
 
 class Expectation:
-    """Derives time limits from median durations of units, by problem. Thread-safe.
+    """Derives time limits of units of work from the median duration of earlier units, by problem. Thread-safe.
 
-    The median is hardly affected by a unit in which kernels were compiled.
+    The median is hardly affected by a unit in which kernels were compiled. A problem is named by its ``key``.
     """
 
     def __init__(self) -> None:
@@ -39,9 +39,9 @@ class Expectation:
         self._seconds = Recent[deque[float]](PROBLEMS_REMEMBERED)
 
     def limit(self, key: str, attempt: int = 0) -> float:
-        """Time limit (s) of a unit of the problem ``key``, doubled with each ``attempt`` at the same unit.
+        """Return the time limit (s) of a unit of problem ``key``, doubled with each repeated ``attempt`` (0, 1, 2 ...).
 
-        The doubling lets a slow unit finish in the end; the number of attempts is limited elsewhere.
+        The doubling lets a slow unit finish in the end; callers limit the number of attempts.
         """
         with self._lock:
             usual = self._usual(key)
@@ -50,24 +50,24 @@ class Expectation:
         return float(max(least, SLACK_SECONDS + FACTOR * longest) * 2**attempt)
 
     def usual(self, key: str) -> float:
-        """Median duration (s) of a unit of the problem ``key``; 0 if unknown."""
+        """Return the median duration (s) of a unit of problem ``key``; 0 if unknown."""
         with self._lock:
             return self._usual(key)
 
     def _usual(self, key: str) -> float:
-        """Median duration (s) of the units of problem ``key``; 0 with fewer than ENOUGH units. Needs the lock."""
+        """Return the same as :meth:`usual`, 0 with fewer than ENOUGH finished units; the caller must hold the lock."""
         known = self._seconds.get(key, ())
         return median(known) if len(known) >= ENOUGH else 0.0
 
     def done(self, key: str, seconds: float) -> None:
-        """Record that a unit took ``seconds``."""
+        """Record that a unit of problem ``key`` took ``seconds``."""
         with self._lock:
             self._seconds.use(key, lambda: deque(maxlen=UNITS_REMEMBERED)).append(seconds)
 
 
 @dataclass(frozen=True)
 class Standing:
-    """Workers of an evaluator.
+    """Counts of the workers of an evaluator.
 
     Attributes:
         workers: number that live now.
@@ -90,11 +90,11 @@ class Tally:
         self._counts: Counter[str] = Counter()
 
     def replaced(self, loss: Literal["died", "hung"]) -> None:
-        """Count a worker that died or hung, and its replacement."""
+        """Count one worker that died or hung, and was replaced."""
         with self._lock:
             self._counts.update([loss, "restarts"])
 
     def standing(self, workers: int) -> Standing:
-        """The counts, with the number of living ``workers``."""
+        """Return the counts, together with the number of living ``workers``."""
         with self._lock:
             return Standing(workers, **self._counts)

@@ -1,1 +1,1 @@
-"""What all commands share: options, tables, numbers, progress, files."""
+"""Functions for all commands: options, tables, numbers, progress, files."""

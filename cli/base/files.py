@@ -1,4 +1,4 @@
-"""Files that commands read and write."""
+"""Reads and writes the files of the commands, with error messages for the user."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from wingfit.client.transport import WingfitError
 
 
 def check_file(path: Path | None, option: str, endings: tuple[str, ...] = ()) -> None:
-    """Refuse, before anything is computed, a file that cannot be written or whose name has none of ``endings``."""
+    """Raise a usage error of ``option`` if ``path`` (None: no file) cannot be written or has none of ``endings``."""
     if path is None:
         return
     if endings and path.suffix.lower() not in endings:
@@ -33,7 +33,10 @@ def check_file(path: Path | None, option: str, endings: tuple[str, ...] = ()) ->
 
 
 def new_file(about: str, *names: str) -> Any:
-    """A typer option ``names`` for a file to write, checked at once; its help ``about`` has the ending: FILE.csv."""
+    """Return a typer option for a file to write, which is checked before anything is computed.
+
+    ``about``: help text; the endings in it (FILE.csv) are those that are allowed. ``names``: names of the option.
+    """
 
     def checked(path: Path | None) -> Path | None:
         check_file(path, names[0], tuple(re.findall(r"FILE(\.\w+)", about)))
@@ -44,7 +47,7 @@ def new_file(about: str, *names: str) -> Any:
 
 @contextmanager
 def refused(message: str) -> Iterator[None]:
-    """Turn an error in the input (ValueError) into a WingfitError with ``message``."""
+    """Convert a ValueError (fault of the input) raised in the with-block into a WingfitError titled ``message``."""
     try:
         yield
     except ValueError as error:
@@ -52,7 +55,7 @@ def refused(message: str) -> Iterator[None]:
 
 
 def read_bytes(path: Path) -> bytes:
-    """The content of a file; WingfitError with the path and the reason if it cannot be read."""
+    """Return the content of a file; raise WingfitError with path and reason if it cannot be read."""
     try:
         return path.read_bytes()
     except OSError as error:
@@ -60,7 +63,7 @@ def read_bytes(path: Path) -> bytes:
 
 
 def write_text(path: Path, text: str, what: str) -> None:
-    """Write ``text`` as UTF-8 and report it as ``what``; WingfitError with the path and the reason where that fails."""
+    """Write ``text`` to ``path``, and print that ``what`` was written; raise WingfitError on failure."""
     try:
         path.write_text(text, encoding="utf-8", newline="")
     except OSError as error:
@@ -69,7 +72,7 @@ def write_text(path: Path, text: str, what: str) -> None:
 
 
 def write_csv(path: Path, header: Iterable[str], rows: Iterable[Iterable[object]], what: str) -> None:
-    """Write a table as CSV; otherwise as :func:`write_text`."""
+    """Write a table (``header``: names of the columns) as CSV to ``path``; messages and errors as in ``write_text``."""
     buffer = io.StringIO()
     writer = csv.writer(buffer)
     writer.writerow(header)

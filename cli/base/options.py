@@ -1,4 +1,4 @@
-"""Options that several commands share, and the reading of their values."""
+"""Options of several commands, and functions that read their values."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ DatasetOrPath = Annotated[
 
 
 def names(param: typer.CallbackParam, words: list[str] | None) -> list[str] | None:
-    """Names in the ``words`` of an option, each of which may hold several, separated by commas; None for no words.
+    """Return the names in the ``words`` given to an option; None if there are none. A callback of typer.
 
-    Hyphens count as underscores: clap-and-peel is understood.
+    One word may hold several names, separated by commas. Hyphens become underscores: clap-and-peel is clap_and_peel.
     """
     listed = [name.strip().replace("-", "_") for word in words or [] for name in word.split(",")]
     if "" in listed:
@@ -35,7 +35,7 @@ def names(param: typer.CallbackParam, words: list[str] | None) -> list[str] | No
 
 
 def settings(ctx: typer.Context, *others: str) -> dict[str, Any]:
-    """The options of a command that the user gave, except ``others``, as {field of the API request: value}."""
+    """Return the options that the user gave, except those named ``others``, as {field of the API request: value}."""
     return {name: value for name, value in ctx.params.items() if name not in others and value not in (None, [], ())}
 
 
@@ -76,14 +76,14 @@ PeelWidth = Annotated[
 
 
 def refuse(options: Mapping[str, object], why: str) -> None:
-    """Raise a usage error with the reason ``why`` if the user gave any of ``options`` ({name: value})."""
+    """Raise a usage error with the reason ``why`` if the user gave any of ``options`` ({name: value}; unset: None)."""
     for option, value in options.items():
         if value not in (None, [], False):
             raise typer.BadParameter(f"{why}; leave it out", param_hint=option)
 
 
 def read_condition(words: list[str]) -> dict[str, float]:
-    """Flow or flapping conditions from ``name=value`` words as {name: value}; the server checks the limits."""
+    """Convert words such as ``airspeed_m_s=6`` to {name: value}; usage error for a name not in CONDITION."""
     values = {}
     for word in words:
         name, _, value = word.partition("=")
@@ -94,7 +94,10 @@ def read_condition(words: list[str]) -> dict[str, float]:
 
 
 def read_genome(words: list[str], option: str = "--genome") -> dict[str, float]:
-    """Gene values from ``name=value`` words and JSON files; later ones override earlier ones."""
+    """Return {gene: value} from ``words``, each NAME=VALUE or the path of a JSON file; later words have priority.
+
+    ``option``: name of the option, for usage errors.
+    """
     values: dict[str, Any] = {}
     for word in words:
         name, equals, value = word.partition("=")
@@ -104,7 +107,10 @@ def read_genome(words: list[str], option: str = "--genome") -> dict[str, float]:
 
 
 def _read_genes(path: Path, option: str) -> dict[str, Any]:
-    """Read {name: value}, the output of 'runs genome --json', or the true genome that 'wingfit campaign' writes."""
+    """Return {gene: value} from a JSON file.
+
+    The file holds such a dict, the output of 'runs genome --json', or the true genome that 'wingfit campaign' writes.
+    """
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
@@ -121,7 +127,7 @@ def _read_genes(path: Path, option: str) -> dict[str, Any]:
 
 
 def _number(value: Any, message: str, option: str) -> float:
-    """``value`` as a number; where it is none, a usage error with ``message``."""
+    """Return ``value`` as a number; raise a usage error with ``message`` if it is none."""
     try:
         return float(value)
     except (TypeError, ValueError):

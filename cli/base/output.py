@@ -1,4 +1,4 @@
-"""How the commands print: tables, JSON, numbers with units, and progress."""
+"""Prints tables, JSON, numbers with units, and progress."""
 
 from __future__ import annotations
 
@@ -28,17 +28,20 @@ Columns = Mapping[str, str | Callable[[T], object]]  # heading: key of an item, 
 
 
 def out() -> Console:
-    """Console for results, on standard output."""
+    """Return the console for results, on standard output."""
     return Console(width=None if sys.stdout.isatty() else PIPE_WIDTH, highlight=False, soft_wrap=False)
 
 
 def err() -> Console:
-    """Console for progress and messages, on standard error: a pipe receives results only."""
+    """Return the console for progress and messages, on standard error, so that a pipe receives results only."""
     return Console(stderr=True, highlight=False, soft_wrap=True)
 
 
 def _shown(text: str, *, lines: bool = True) -> str:
-    """``text`` without control characters, which another user's name could use to manipulate the terminal."""
+    """Return ``text`` with control characters replaced, by which a dataset's name could manipulate the terminal.
+
+    ``lines``: keep line feeds and tabs.
+    """
     allowed = "\n\t" if lines else ""
     return "".join(one if one in allowed or not _is_control(one) else "\ufffd" for one in text)
 
@@ -48,12 +51,12 @@ def _is_control(character: str) -> bool:
 
 
 def say(text: str) -> None:
-    """Print one line of the result to standard output."""
+    """Print ``text``, part of the result, to standard output."""
     out().print(Text(_shown(text)), soft_wrap=True)
 
 
 def note(text: str) -> None:
-    """Print one line that does not belong to the result to standard error."""
+    """Print ``text``, a message that is not part of the result, to standard error."""
     err().print(Text(_shown(text)))
 
 
@@ -63,18 +66,18 @@ def print_json(value: Any) -> None:
 
 
 def emit(answer: Any, show: Callable[[Any], None], *, as_json: bool) -> None:
-    """Print an answer of the server: as JSON, or by ``show``."""
+    """Print an answer of the server as JSON or, by calling ``show``, as text."""
     print_json(answer) if as_json else show(answer)
 
 
 def remarks(lines: Iterable[str], label: str = "note") -> None:
-    """Print each remark once, to standard error."""
+    """Print each different remark in ``lines`` once, after ``label``, to standard error."""
     for line in dict.fromkeys(lines):
         note(f"{label}: {line}")
 
 
 def table(columns: Sequence[str], rows: Sequence[Sequence[object]], empty: str = "none") -> None:
-    """Print ``rows`` of cells under ``columns``; ``empty`` is printed where there are no rows.
+    """Print ``rows`` of cells under the headings ``columns``; if there are no rows, print ``empty``.
 
     A column whose heading starts with ``>`` is right-aligned. Cells: None is shown as a dash, a float with four digits.
     """
@@ -90,7 +93,7 @@ def table(columns: Sequence[str], rows: Sequence[Sequence[object]], empty: str =
 
 
 def records(items: Iterable[Any], columns: Columns[Any], empty: str = "none") -> None:
-    """Print a table with one row per item; ``columns`` maps each heading to a key of the item or a function of it."""
+    """Print a table with one row per item; ``columns`` maps a heading to a key or a function of the item."""
     cells = [itemgetter(column) if isinstance(column, str) else column for column in columns.values()]
     table([*columns], [[cell(item) for cell in cells] for item in items], empty)
 
@@ -102,7 +105,7 @@ def _cell(value: object) -> str:
 
 
 def interval(low: float | None, high: float | None, digits: int = 3) -> str:
-    """The text ``[low, high]``, or a description in words where an end is None."""
+    """Return "[low, high]", or e.g. "above 3" if an end is None (not bounded by the data)."""
     if low is None or high is None:
         ends = [f"{word} {number(end, digits)}" for word, end in (("above", low), ("below", high)) if end is not None]
         return ends[0] if ends else "not bounded by the data"
@@ -110,19 +113,19 @@ def interval(low: float | None, high: float | None, digits: int = 3) -> str:
 
 
 def percent(part: float | None) -> str:
-    """A fraction as a whole percentage, a dash where there is none."""
+    """Return the fraction ``part`` as a whole percentage, e.g. "12 %"; a dash for None."""
     return "–" if part is None else f"{100 * part:.0f} %"
 
 
 def size(count: int) -> str:
-    """A number of bytes as kB or MB."""
+    """Return a number of bytes as text in kB or MB."""
     return f"{count / 1e6:.1f} MB" if count >= 1e6 else f"{count / 1e3:.1f} kB"
 
 
 def number(value: float | None, digits: int = 4, unit: str = "") -> str:
-    """``value`` to ``digits`` significant digits, then ``unit``; a dash for None.
+    """Return ``value`` to ``digits`` significant digits, then ``unit``; a dash for None.
 
-    Numbers that would need an exponent are shown whole below a million.
+    A number from 10^``digits`` to a million is rounded to an integer instead, so that it needs no exponent.
     """
     if value is None:
         return "–"
@@ -133,17 +136,17 @@ def number(value: float | None, digits: int = 4, unit: str = "") -> str:
 
 
 def mm(value: float | None) -> str:
-    """A distance in mm with two decimals, a dash for None."""
+    """Return a distance (mm) with two decimals, without unit; a dash for None."""
     return "–" if value is None else f"{value:.2f}"
 
 
 def moment(text: str | None) -> str:
-    """A time as the API gives it (RFC 3339 text), shown to the second in UTC."""
+    """Return ``text``, a time of the API (RFC 3339), as e.g. "2025-01-31 12:00:00 UTC"; a dash for None."""
     return "–" if text is None else text[:19].replace("T", " ") + " UTC"
 
 
 def duration(seconds: float | None) -> str:
-    """``seconds`` as 0:07, 3:12 or 1:02:45."""
+    """Return ``seconds`` as 0:07, 3:12 or 1:02:45 (hours:minutes:seconds); a dash for None."""
     if seconds is None:
         return "–"
     minutes, rest = divmod(int(max(seconds, 0) + 0.5), 60)
@@ -153,10 +156,10 @@ def duration(seconds: float | None) -> str:
 
 @contextmanager
 def progress(title: str) -> Iterator[Report]:
-    """Show a bar with the time left on a terminal, a line every few seconds elsewhere.
+    """Show the progress of the with-block: a bar on a terminal, else a line every few seconds.
 
-    Yields ``report(fraction, eta_s=None, note="")``. Without ``eta_s`` the time left is extrapolated;
-    ``fraction=None`` means that the end is not known.
+    Yields a function ``report(fraction, eta_s=None, note="")`` that the block calls. ``fraction``: part done, None if
+    unknown; ``eta_s``: remaining time, by default extrapolated from the fraction.
     """
     console = err()
     started = time.monotonic()
@@ -188,7 +191,11 @@ def progress(title: str) -> Iterator[Report]:
 
 
 def _plain(title: str, console: Console, left: Callable[[float | None, float | None], str]) -> Report:
-    """Print the first report, then at most one every PLAIN_EVERY_S seconds, and the last."""
+    """Return a function ``report`` as :func:`progress` yields it, for an output that is no terminal.
+
+    It prints the first report, then at most one every PLAIN_EVERY_S seconds, and the last (fraction 1). ``left``
+    returns the remaining time as text.
+    """
     last = -PLAIN_EVERY_S
     done = False
 

@@ -1,4 +1,4 @@
-"""Forces, percentages and correlations rounded as on the web page (service/web/base/format.js)."""
+"""Rounds forces, percentages and correlations as the web page does (service/web/base/format.js)."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from dataclasses import dataclass
 
 SMALLEST, LARGEST = 1e-4, 1e6  # beyond, a power of ten is easier to read
 NEAREST_ONE = 0.99995  # rounds to 1 with four decimals
-ROUNDING = 1e-9  # of the correlation of a thing with itself
+ROUNDING = 1e-9  # error of the computed correlation of a series with itself
 
 
 def rounded(value: float | None, digits: int = 3) -> str:
-    """``value`` with significant digits, trailing zeros kept: 0.0500, 12.0, 385; a dash for None."""
+    """Return ``value`` with ``digits`` significant digits, trailing zeros kept: 0.0500, 12.0, 385; a dash for None."""
     if value is None:
         return "–"
     if value == 0:
@@ -24,7 +24,7 @@ def rounded(value: float | None, digits: int = 3) -> str:
 
 
 def correlation(value: float | None) -> str:
-    """A correlation with four decimals; only an exact 1 is shown as 1."""
+    """Return a correlation with four decimals; ">0.9999" instead of 1.0000 unless it is exactly 1; a dash for None."""
     if value is None:
         return "–"
     if NEAREST_ONE <= value < 1 - ROUNDING:
@@ -34,13 +34,13 @@ def correlation(value: float | None) -> str:
 
 @dataclass(frozen=True)
 class Unit:
-    """A unit in which the values of one table are shown."""
+    """A unit in which the values of one table are shown; ``per_si_unit`` is its number per SI unit (mN: 1000)."""
 
     name: str
     per_si_unit: float
 
     def show(self, value: float | None, digits: int = 3) -> str:
-        """``value`` (SI) in this unit, without its name; a dash for None."""
+        """Return ``value`` (SI unit) converted to this unit, as text without the unit's name; a dash for None."""
         return rounded(None if value is None else self.per_si_unit * value, digits)
 
 
@@ -48,7 +48,7 @@ UNITS = ((10.0, Unit("N", 1.0)), (1e-3, Unit("mN", 1e3)), (0.0, Unit("µN", 1e6)
 
 
 def force_unit(newtons: Iterable[float | None]) -> Unit:
-    """The unit that suits the largest of ``newtons``: mN from 1 mN to 10 N, and if there is no value."""
+    """Return the unit for the largest of ``newtons``: N from 10 N, mN from 1 mN and for no values, else µN."""
     largest = max((abs(value) for value in newtons if value), default=1.0)
     if not math.isfinite(largest):
         largest = 1.0
@@ -56,6 +56,6 @@ def force_unit(newtons: Iterable[float | None]) -> Unit:
 
 
 def with_unit(newtons: float, digits: int = 3) -> str:
-    """One force (N) with a fitting unit."""
+    """Return one force (N) as text in a suitable unit, e.g. "12.0 mN"."""
     unit = force_unit([newtons])
     return f"{unit.show(newtons, digits)} {unit.name}"

@@ -1,1 +1,1 @@
-"""Commands about forces: results of force runs, kinematics, free flight."""
+"""Commands about forces: results of runs on forces, kinematics of wings, forces in free flight."""

@@ -1,4 +1,4 @@
-"""``wingfit forces``: forces on a freely flying vehicle from its tracked markers. Needs no server."""
+"""``wingfit forces``: computes the forces on a vehicle in free flight from its tracked markers, without a server."""
 
 from __future__ import annotations
 

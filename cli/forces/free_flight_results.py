@@ -1,4 +1,4 @@
-"""Computation and output of ``wingfit forces``."""
+"""Computes, prints and writes the results of ``wingfit forces``."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ CUTOFF_PER_BEAT = 3.2
 
 
 def write(flight: FreeFlight, made: Recording, output: Path | None, details: Path | None) -> None:
-    """Write the recording, and forces, moments and motion with their standard deviations, as CSV."""
+    """Write CSV: the recording ``made`` to ``output``, all forces, moments and motion of ``flight`` to ``details``."""
     if output:
         channels = [f"{channel}_n" for channel in made.channels]
         write_text(output, write_table(channels, made.times, made.values), "forces")
@@ -38,14 +38,20 @@ def write(flight: FreeFlight, made: Recording, output: Path | None, details: Pat
 
 
 def entry(made: Recording, *, starts_at_beat: bool) -> None:
-    """Print the entry of the recording for dataset.yaml."""
+    """Print the entry for dataset.yaml that describes the recording ``made``.
+
+    ``starts_at_beat``: whether the start of a beat is known; if not, a note says how to give it.
+    """
     if not starts_at_beat:
         say("note: times are those of the tracks; give --beat-start-s, since a recording must start with a beat")
     say(write_yaml({"recordings": [describe_recording(made)]}).rstrip())
 
 
 def read_flight(tracks: Path, body: Path, mass_kg: float, low_pass: LowPass, inertia: str) -> FreeFlight:
-    """Forces from the tracks (CSV) of the markers in ``body`` (CSV); ``inertia``: "Ixx,Iyy,Izz,Ixz", kg m^2, or ""."""
+    """Compute forces and motion from two CSV files: marker ``tracks`` over time, and marker positions on the ``body``.
+
+    ``inertia``: "Ixx,Iyy,Izz,Ixz" in kg m^2 about the centre of mass, or "" for no moments.
+    """
     shape = _table(body, "marker")
     places = dict(zip(shape.labels, np.stack([shape.column(f"{a}_m") for a in AXES], axis=-1), strict=True))
     if CENTRE not in places:
@@ -84,7 +90,7 @@ def _inertia(text: str) -> npt.NDArray[np.float64]:
 
 
 def report(flight: FreeFlight) -> None:
-    """Print the forces with their standard deviations, the noise of the markers, and the motion."""
+    """Print the forces with their standard deviations, the noise of the markers, and the mean motion."""
     rows = []
     for k, axis in ((0, "x"), (2, "z")):
         force, deviation = flight.force[:, k], flight.force_deviation[:, k]
@@ -123,7 +129,7 @@ def _details(flight: FreeFlight) -> str:
 
 
 def write_plot(flight: FreeFlight, path: Path, title: str) -> None:
-    """Write one HTML file: the forces over time with two standard deviations."""
+    """Write an HTML page that plots the forces x and z over time, with a band of two standard deviations."""
     charts = []
     for axis in "xz":
         k = AXES.index(axis)

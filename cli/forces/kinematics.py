@@ -1,4 +1,4 @@
-"""``wingfit kinematics``: the motion of a wing from measured angles or tracked markers. Needs no server."""
+"""``wingfit kinematics``: computes the motion of a wing from measured angles or tracked markers, without a server."""
 
 from __future__ import annotations
 

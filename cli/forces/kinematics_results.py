@@ -1,4 +1,4 @@
-"""Computation and output of ``wingfit kinematics``."""
+"""Computes, prints and writes the results of ``wingfit kinematics``."""
 
 from __future__ import annotations
 
@@ -26,20 +26,23 @@ __all__ = ["wing_motion"]
 
 
 def read_data(file: Path, leading_edge: str, chord: str) -> Table:
-    """The table in ``file``, after a check that it has all columns."""
+    """Return the table in the CSV ``file``; raise an error if columns are missing.
+
+    ``leading_edge``, ``chord``: comma-separated names of markers, whose columns are then needed instead of angles.
+    """
     raw = read_bytes(file)
     _check_columns(header_of(raw, file.name), file.name, f"{leading_edge},{chord}" if leading_edge else "")
     return read_table(raw, file.name)
 
 
 def write_motion(motion: WingKinematics, path: Path) -> None:
-    """Write the ``motion:`` entry of dataset.yaml."""
+    """Write the ``motion:`` entry of dataset.yaml to ``path``."""
     write_text(path, write_yaml({"motion": to_data(motion.motion, MotionFile)}), "motion")
     note("put it under vehicle:, or under a recording, of dataset.yaml")
 
 
 def _check_columns(header: list[str], file: str, markers: str) -> None:
-    """Raise an error that names all missing columns, before any number is read."""
+    """Raise an error that names all columns missing in ``header``; ``markers``: comma-separated, "" for angles."""
     if len(header) < 2:
         return  # read_table reports the wrong separator or the empty file
     if not markers and "flap_angle_deg" not in header and any(name.endswith("_x_m") for name in header):
@@ -59,7 +62,12 @@ def read_angles(
     hinge_m: str,
     flap_hz: float | None,
 ) -> tuple[Angles, float | None]:
-    """Wing angles from a table of angles or markers, and the start of a beat if the times are t_star, else None."""
+    """Return the wing angles in ``data``, and the time (s) of the start of a beat: 0 for times t_star, else None.
+
+    ``leading_edge``, ``chord``: comma-separated markers from which the angles are computed; "": the table has angles.
+    ``wing``: e.g. "upper-right"; ``dihedral_deg``: angle of the closed wings above the horizontal, None if unknown;
+    ``hinge_m``: "Y,Z" of the flapping axis in body axes (m) or ""; ``flap_hz``: needed for times t_star.
+    """
     times, start = _times(data, flap_hz)
     if not leading_edge:
         flap, pitch = data.column("flap_angle_deg"), data.column("wing_pitch_deg")
@@ -73,7 +81,7 @@ def read_angles(
 
 
 def _small(flap: np.ndarray[Any, np.dtype[np.float64]]) -> tuple[str, ...]:
-    """A remark if the range of ``flap`` (deg) is so small that it may be in radians; else empty."""
+    """Return a remark if the range of the angle ``flap`` [N] (deg) is so small that it may be in radians; else ()."""
     seen = flap[np.isfinite(flap)]
     size = float(np.ptp(seen)) if len(seen) else np.inf
     if size >= SMALLEST_RANGE_DEG:
@@ -104,7 +112,7 @@ def _pair(text: str) -> tuple[float, float]:
 
 
 def report(motion: WingKinematics) -> None:
-    """Print the accuracy of the angles and of their derivatives, the flap frequency, and the start of a beat."""
+    """Print the errors of the angles and their derivatives, the flap frequency, the start of a beat, and Eq. 17."""
     rows = [row for name, fit in _fits(motion) for row in _quality(name, fit)]
     table(["over the beat", ">RMS deg", ">noise", ">truncation, at most", ">error / RMS"], rows)
     error = motion.frequency.error
@@ -142,7 +150,7 @@ def _quality(name: str, fit: PeriodicFit) -> list[list[str]]:
 
 
 def write_plot(motion: WingKinematics, path: Path, title: str) -> None:
-    """Write one HTML file: angles with their samples, rates and accelerations, with two standard errors."""
+    """Write an HTML page that plots angles, with samples, rates and accelerations, with two standard errors."""
     phase, charts = np.arange(361) / 360, []
     for d in range(3):
         for (name, fit), samples in zip(_fits(motion), (motion.angles.flap, motion.angles.pitch), strict=True):

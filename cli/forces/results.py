@@ -1,4 +1,4 @@
-"""Prints and writes results on forces: misfits, coefficients, agreement of the models, forces over the beat."""
+"""Prints and writes results on forces: misfits, coefficients, agreement with recordings, forces over the beat."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ PREFERENCE: tuple[f.Source, ...] = ("local", "joint", "global", "average", "nomi
 
 
 def force_result(answer: f.ForceResult) -> None:
-    """Print misfits, coefficients with their intervals, agreements, and the global model."""
+    """Print the result of a run on forces: misfits, coefficients, agreement with each recording, global model."""
     uses = [("fitted", answer["before_mn"], answer["after_mn"])]
     if answer["held_out"]:
         uses.append(("held out", answer["held_out_before_mn"], answer["held_out_after_mn"]))
@@ -40,7 +40,7 @@ def force_result(answer: f.ForceResult) -> None:
 
 
 def force_simulation(answer: f.ForceSimulation) -> None:
-    """Print how the forces of a given genome agree with a recording."""
+    """Print the agreement between modelled and recorded forces of a simulation with a given genome."""
     unit = force_unit(a[key] for a in answer["agreements"] for key in ("mean_recorded_n", "mean_modelled_n", "rmse_n"))
     columns: Columns[f.Agreement] = {
         f"recording {answer['recording']}: force": lambda one: QUANTITIES[one["quantity"]],
@@ -55,7 +55,7 @@ def force_simulation(answer: f.ForceSimulation) -> None:
 
 
 def force_beats(answer: f.Forces) -> None:
-    """Print the means of the recorded and modelled forces over the beat, and their RMS difference."""
+    """Print the mean of recorded and of modelled forces over the beat, and their RMS difference."""
     say(f"recording {answer['recording']}, coefficients: {answer['source']}")
     means = {}
     for name, recorded in answer["recorded_n"].items():
@@ -69,7 +69,7 @@ def force_beats(answer: f.Forces) -> None:
 
 
 def write_forces(answer: f.Forces, output: Path | None, plot: Path | None) -> None:
-    """Write the beat as CSV, and a page of plots."""
+    """Write forces over the beat to the CSV file ``output``, and plots to the HTML file ``plot``; None: not written."""
     if output:
         columns = {"phase": answer["phase"]}
         for kind in ("recorded_n", "standard_deviation_n", "modelled_n"):
@@ -83,7 +83,7 @@ def write_forces(answer: f.Forces, output: Path | None, plot: Path | None) -> No
 
 
 def charts(answer: f.Forces) -> list[Chart]:
-    """Two charts per force: the mean beat, with a band of one standard deviation between beats; the power spectrum."""
+    """Return two charts per force: the mean beat, with a band of one standard deviation between beats; the spectrum."""
     from wingfit.report.charts import Chart, Curve
 
     phase, frequency = answer["phase"], answer["frequency_hz"][1:]  # without 0 Hz: the mean was subtracted
@@ -118,7 +118,10 @@ def _coefficients(estimates: Sequence[f.Estimate]) -> None:
 
 
 def _agreements(answer: f.ForceResult) -> None:
-    """Print, for every model, the RMS difference of each force, and mean and correlation of the first force."""
+    """Print two tables with a row per recording and a column per source of the model's coefficients.
+
+    The first gives the RMS difference of each force, the second mean and correlation of the first force.
+    """
     there = {one["source"] for one in answer["agreements"]}
     shown = [source for source in PREFERENCE if source in there]
     heads = [f">{source}" for source in shown] + ([">global, left out"] if answer["leave_one_out"] else [])

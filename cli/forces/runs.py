@@ -1,4 +1,4 @@
-"""``wingfit runs forces`` and ``runs predict``: forces over the beat from a run; ``wingfit models``."""
+"""``wingfit runs forces``, ``runs predict``: print forces over the beat; ``wingfit models``: lists the models."""
 
 from __future__ import annotations
 
