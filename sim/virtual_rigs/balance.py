@@ -146,8 +146,7 @@ def blank_recording(condition: Condition, name: str = "blank", samples: int = 8)
 
 
 def true_beat(vehicle: Vehicle, trial: Trial) -> Array:
-    """Simulate forces [n, 2] along body x and z (N) over one beat of ``trial``, with its coefficients and fine steps.
-    """
+    """Simulate forces [n, 2] along body x and z (N) over one beat of ``trial``, with fine steps."""
     model = BladeElementWing(vehicle, elements=ELEMENTS, instants=INSTANTS)
     values = {gene.name: gene.nominal for gene in model.genes} | DRAG | trial.coefficients
     return np.asarray(model.beat([list(values.values())], blank_recording(trial.condition))[0])
