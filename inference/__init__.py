@@ -1,1 +1,1 @@
-"""Estimation that knows neither wings nor effects: derivatives, bounded least squares, score tests, noise models."""
+"""Estimation methods that do not depend on the simulator: derivatives, least squares, score tests, noise models."""

@@ -1,7 +1,7 @@
-"""Derivatives of simulated outputs by finite differences in the unit box, all neighbours in one batch.
+"""Derivatives of simulated outputs with respect to genes by finite differences, all simulated in one batch.
 
-Coordinates are the genes' unit coordinates (:meth:`wingfit.records.Gene.to_unit`): logarithmic for a log gene, the box
-[0, 1].
+Genes are scaled so that their bounds are 0 and 1 (:meth:`wingfit.records.Gene.to_unit`): logarithmically for a gene
+whose scale is "log".
 """
 
 from __future__ import annotations
@@ -15,25 +15,26 @@ from wingfit.records.array_types import Array, Bool, Float, Index, Int, Mask
 
 Outputs = Sequence[Array]
 Simulate = Callable[[Array], tuple[Outputs, Sequence[str | None]]]
-"""From unit coordinates [B, F] to outputs, arrays [B, ...], and why each individual failed (None where it did not)."""
+"""Simulates scaled genes [B, F] of B individuals: returns arrays [B, ...], and why each failed (None: it did not)."""
 
-# In unit coordinates; 1 % of a gene whose box is the thesis's. Simulated motions carry an error of some hundredths of a
-# millimetre that differs from one neighbour to the next; much smaller steps would measure it, larger ones the
-# curvature (docs/estimation.md has the figures).
+# Change of a gene scaled to 0..1: about 1 % of its value for the bounds of the thesis (a fifth to five times the
+# estimate). Simulated motions have errors of some hundredths of a millimetre, different at each point: much smaller
+# steps would measure these errors, larger steps the curvature (docs/estimation.md has the figures).
 STEP = 0.003
 
 
 @dataclass(frozen=True)
 class Differences:
-    """Outputs at a point and their derivatives with respect to K genes.
+    """Simulated outputs at a point, and their derivatives with respect to K scaled genes.
 
     Attributes:
-        outputs: at the point, each [...].
-        slopes: derivative of each output, [..., K]; zero for a gene that could not be differentiated, and where an
-            output is NaN at the point.
-        known: [K], False for a gene both of whose neighbours fail.
-        evaluations: individuals simulated.
-        reasons: why neighbours failed.
+        outputs: one array [...] for each output, at the point.
+        slopes: derivatives [..., K] of each output; zero for a gene that could not be differentiated, and where an
+        output is NaN at the point.
+        known: [K], False for a gene that could not be differentiated, because the simulations at all its neighbouring
+        points failed.
+        evaluations: number of individuals simulated.
+        reasons: messages of the simulations that failed at neighbouring points.
     """
 
     outputs: tuple[Array, ...]
@@ -52,11 +53,13 @@ def differences(
     step: float = STEP,
     sides: int = 2,
 ) -> Differences:
-    """Differentiate about ``unit`` [F] with respect to the genes ``columns`` [K], to one or two ``sides``.
+    """Differentiate outputs at the point ``unit`` [F] (genes scaled to 0..1) with respect to the genes ``columns`` [K].
 
-    A step that would leave the box ends at its edge, or is taken inwards where there is only one side. A neighbour that
-    fails is replaced by the point itself, so that differences may become one-sided. ``at`` are the outputs at the point
-    where they are known. ValueError where the point cannot be simulated.
+    ``columns`` are indices into ``unit``. With ``sides`` = 2, each gene is changed by ``step`` up and down (central
+    differences); with 1, only up, or down where the upper bound is closer than ``step``. A changed gene is clipped to
+    its bounds. Where one of the two simulations of a gene fails, the point itself takes its place, so that the
+    difference is one-sided. ``at``: outputs at the point if they are known already. ValueError if the point cannot be
+    simulated.
     """
     moves = step * np.eye(len(unit))[columns]
     moves[unit[columns] > 1.0 - step] *= -1.0
@@ -76,7 +79,12 @@ def differences(
 
 
 def _slopes(base: Array, neighbours: Array, failed: Mask, width: Array) -> Array:
-    """Slopes [..., K] of one output by K genes, from its values at the base point and at K or 2 K neighbours."""
+    """Derivatives [..., K] of one output with respect to K genes.
+
+    ``base`` [...]: the output at the point. ``neighbours`` [K or 2 K, ...]: the output with each gene changed up, then
+    down; ``failed`` marks those that could not be simulated. ``width`` [K]: distance between the two values of each
+    gene.
+    """
     values = np.where(failed.reshape(-1, *[1] * base.ndim), base, neighbours)
     down = values[len(width) :] if len(values) > len(width) else base
     change = np.where(np.isfinite(base), values[: len(width)] - down, 0.0)

@@ -1,8 +1,10 @@
-"""The damped Gauss-Newton step inside the unit box, tried with several dampings at once.
+"""Damped Gauss-Newton steps that stay within the bounds of the genes, tried with several dampings at once.
 
-The cost is 1/2 |r|^2 of whitened residuals r, linearised as r + S d. A step d minimises slope . d + d . C d / 2 with
-the curvature C = S^T S plus a damping, inside the box: an active-set bounded least-squares problem. Dampings in
-proportion to each gene's curvature (Marquardt 1963) and equal ones (Levenberg 1944) are both of this form.
+Genes are scaled so that their bounds are 0 and 1 (the unit box). The cost is |r|^2 / 2, with whitened residuals r
+(scaled to unit noise covariance). A step d changes them to about r + S d with the sensitivities S = dr / d(genes). The
+best step minimises slope . d + d . C d / 2 within the box: the slope is S^T r, the curvature C is S^T S plus a diagonal
+damping. This bounded linear least-squares problem is solved by an active-set method. Damping in proportion to the
+diagonal of S^T S is that of Marquardt (1963); equal damping of all genes is that of Levenberg (1944).
 """
 
 from __future__ import annotations
@@ -18,14 +20,20 @@ from wingfit.records.array_types import Array, Float
 
 @dataclass(frozen=True)
 class Quadratic:
-    """A cost near a point, slope . d + d . curvature d / 2, with ``curvature`` [F, F] and ``slope`` [F]."""
+    """Second-order model of a cost near a point: a step d [F] changes the cost by slope . d + d . curvature d / 2.
+
+    ``slope`` [F]: gradient with respect to F genes; ``curvature`` [F, F]: Gauss-Newton approximation of the Hessian.
+    """
 
     curvature: Float[Array, "F F"]
     slope: Float[Array, " F"]
 
     @classmethod
     def of(cls, whitened: Sequence[tuple[Array, Array]]) -> Quadratic:
-        """Half the sum of squares; ``whitened`` has (residual [N], sensitivities [N, F]) of each recording."""
+        """Build the model of half the sum of squares of whitened residuals.
+
+        ``whitened`` holds, for each recording, (residuals [N], their derivatives [N, F] with respect to F genes).
+        """
         return cls(
             np.asarray(sum(steep.T @ steep for _, steep in whitened), float),
             np.asarray(sum(steep.T @ white for white, steep in whitened), float),
@@ -34,24 +42,28 @@ class Quadratic:
     def step(
         self, unit: Float[Array, " F"], damping: Float[Array, " F"], slope: Float[Array, " F"] | None = None
     ) -> Float[Array, " F"]:
-        """Step [F] from ``unit`` [F] that minimises the cost inside the box, ``damping`` [F] added to the curvatures.
+        """Return the step [F] from the point ``unit`` [F] that minimises the modelled cost within the unit box.
 
-        ``slope`` [F] replaces the quadratic's own.
+        ``damping`` [F] is added to the diagonal of the curvature. ``slope`` [F]: gradient to use instead of
+        ``self.slope``.
         """
         factor = np.linalg.cholesky(self.curvature + np.diag(damping))
         aim = -np.linalg.solve(factor, self.slope if slope is None else slope)
         return np.asarray(scipy.optimize.lsq_linear(factor.T, aim, (-unit, 1.0 - unit), method="bvls").x)
 
     def decrease(self, steps: Float[Array, "S F"]) -> Float[Array, " S"]:
-        """Decrease [S] of the cost that the quadratic predicts for ``steps`` [S, F]."""
+        """Decrease [S] of the cost that the model predicts for each of S ``steps`` [S, F]."""
         return np.asarray(-(steps @ self.slope) - 0.5 * np.einsum("dp,pq,dq->d", steps, self.curvature, steps))
 
 
 @dataclass(frozen=True)
 class Trials:
-    """Points [S, F] reached with one damping each, with the predicted and the actual decrease of the cost.
+    """S trial points, each reached by a step with another damping, and the decrease of the cost at each of them.
 
-    ``decrease`` is -inf for a point that cannot be simulated.
+    Attributes:
+        units: [S, F] the trial points (F genes, scaled so that their bounds are 0 and 1).
+        predicted: [S] decrease of the cost that the second-order model predicted.
+        decrease: [S] decrease of the cost in simulations; -inf for a point that cannot be simulated.
     """
 
     units: Float[Array, "S F"]
@@ -60,19 +72,23 @@ class Trials:
 
     @classmethod
     def of(cls, units: Array, predicted: Array, before: float, after: Array, reasons: Sequence[str | None]) -> Trials:
-        """Trials at ``units`` [S, F] with costs ``before`` and ``after`` [S] the step; ``reasons`` say which failed."""
+        """Compare the cost ``before`` the step with the costs ``after`` [S] it at ``units`` [S, F].
+
+        ``predicted`` [S]: predicted decreases. ``reasons`` [S]: why a point could not be simulated, None where it
+        could.
+        """
         failed = np.array([reason is not None for reason in reasons], bool)
         return cls(units, predicted, before - np.where(failed, np.inf, after))
 
     def best(self, least_gain: float = 0.0) -> int | None:
-        """Index of the point with the largest decrease of the cost; None where no point qualifies.
+        """Index of the trial point with the largest decrease of the cost; None where no point qualifies.
 
-        Its decrease must exceed ``least_gain`` times the predicted one, and the predicted one must be positive: at a
-        bound, a step may be round-off alone.
+        A point qualifies if its predicted decrease is positive and its decrease exceeds ``least_gain`` times the
+        predicted one. At a bound, a step may consist of round-off only; the predicted decrease is then not positive.
         """
         good = (self.predicted > 0.0) & (self.decrease > least_gain * self.predicted)
         return int(np.argmax(np.where(good, self.decrease, -np.inf))) if good.any() else None
 
     def gain(self, k: int) -> float:
-        """Actual decrease of the cost at point ``k``, divided by the predicted one."""
+        """Decrease of the cost at trial point ``k``, divided by the predicted decrease."""
         return float(self.decrease[k] / self.predicted[k])

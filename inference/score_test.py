@@ -1,7 +1,8 @@
-"""Score tests: how much of a residual an addition to a model would explain, all nuisance genes being refitted.
+"""Score tests: how much of a residual an addition to a model would explain if all nuisance genes were refitted.
 
-The changes that the nuisance genes can make are projected out of the residual and of the changes by the addition (Rao
-1948; here with changes of finite size, because many effects have no slope where they are switched off).
+Nuisance genes are the other genes that are estimated at the same time. The changes of the residual that they can cause
+are projected out of the residual and of the changes that the addition causes (Rao 1948). The latter are changes of
+finite size here, because the derivative of many effects is zero where they are switched off.
 """
 
 from __future__ import annotations
@@ -13,25 +14,28 @@ import scipy
 
 from wingfit.records.array_types import Array, Float
 
-DEPENDENT = 1e-10  # of the largest direction of the nuisance genes; the rest is round-off
-RIDGE = 1e-9  # of the fields' own squares, so that fields that are alike can be solved for
-INVISIBLE = 1e-12  # of a field's length that the nuisance genes cannot make up for: less is round-off
+DEPENDENT = 1e-10  # singular values of the nuisance sensitivities below this part of the largest are round-off
+RIDGE = 1e-9  # added to the Gram matrix, relative to its diagonal: regular even if fields are almost parallel
+INVISIBLE = 1e-12  # part of a field that remains after projection, relative to its norm: less is round-off
 
 
 @dataclass(frozen=True)
 class Nuisance:
-    """The changes of whitened residuals [N] that the nuisance genes can make: their orthonormal basis [N, O]."""
+    """Changes of N whitened residuals that the nuisance genes can cause: an orthonormal ``basis`` [N, O] of them."""
 
     basis: Float[Array, "N O"]
 
     @classmethod
     def of(cls, slopes: Float[Array, "N F"]) -> Nuisance:
-        """The nuisance of F genes with the whitened sensitivities ``slopes`` [N, F]."""
+        """Compute the basis for F nuisance genes from ``slopes`` [N, F], the sensitivities of whitened residuals."""
         basis, power, _ = np.linalg.svd(slopes, full_matrices=False)
         return cls(basis[:, power > DEPENDENT * power.max(initial=0.0)])
 
     def rest(self, vectors: Float[Array, "*batch M"]) -> Float[Array, "*batch N"]:
-        """``vectors`` [..., M] minus their projection on the basis, [..., N]; entries from M <= N on count as zero."""
+        """Subtract from ``vectors`` [..., M] their projection on the basis; return the difference [..., N].
+
+        M may be smaller than N: missing entries at the end count as zero.
+        """
         size = vectors.shape[-1]
         inside = (vectors @ self.basis[:size]) @ self.basis.T
         inside[..., :size] -= vectors
@@ -39,7 +43,10 @@ class Nuisance:
 
 
 def explained(fields: Float[Array, "S N"], residual: Float[Array, " N"]) -> float:
-    """Decrease of the sum of squares of ``residual`` [N] when multiples of the ``fields`` [S, N] are fitted to it."""
+    """Decrease of the sum of squares of ``residual`` [N] when S multiples of ``fields`` [S, N] are fitted to it.
+
+    Each of the S fields is a change of the residual that an addition to the model causes.
+    """
     inner, score = fields @ fields.T, fields @ residual
     return float(score @ np.linalg.solve(inner + RIDGE * np.trace(inner) * np.eye(len(inner)) + 1e-300, score))
 
@@ -50,10 +57,12 @@ def amounts(
     limits: tuple[Float[Array, " S"], Float[Array, " S"]],
     smallest: float,
 ) -> Float[Array, " S"]:
-    """Multiples [S] of the ``fields`` [S, N] that bring ``residual`` [N] nearest to zero within ``limits``, [S] each.
+    """Multiples [S] of ``fields`` [S, N] whose sum with ``residual`` [N] has the least sum of squares, within limits.
 
-    A single field is clipped; several are scaled together, so that their proportion stays. A field not longer than
-    ``smallest`` gets zero.
+    Each field is a change of the residual that an addition to the model causes. ``limits``: smallest and largest
+    multiple of each field, [S] each, with 0 between them. A single multiple is clipped to its limits; several are
+    reduced by a common factor, which preserves their ratios. A field whose norm is at most ``smallest`` gets the
+    multiple zero.
     """
     length = np.linalg.norm(fields, axis=1)
     visible, found = length > smallest, np.zeros(len(fields))
@@ -72,11 +81,11 @@ def amounts(
 
 
 def remaining(fields: Float[Array, "S N"], residual: Float[Array, " N"], multiples: Float[Array, " S"]) -> float:
-    """Sum of squares of ``residual`` [N] plus ``multiples`` [S] of the ``fields`` [S, N]."""
+    """Sum of squares of ``residual`` [N] plus ``multiples`` [S] times ``fields`` [S, N]."""
     return float(np.sum((residual + multiples @ fields) ** 2))
 
 
 def spread(count: int, size: int) -> Float[Array, "count size"]:
-    """``count`` points [count, size] spread evenly over the unit box."""
+    """Return ``count`` points [count, size] of a Halton sequence, evenly distributed over [0, 1]^size."""
     points = scipy.stats.qmc.Halton(size, scramble=False).random(count + 1)
     return np.asarray(points[1:])  # the first of all is a corner

@@ -1,1 +1,1 @@
-"""Simulators: rig, genome, condition and effects -> simulated observation."""
+"""Simulators: they turn a rig, a genome, a condition and effects into a simulated recording."""

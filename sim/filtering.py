@@ -1,4 +1,7 @@
-"""Zero-phase low-pass of recordings and predictions alike (Armanini et al. 2016, section 3.4)."""
+"""Zero-phase low-pass filter for recordings and for predictions (Armanini et al. 2016, section 3.4).
+
+The filter is a Butterworth filter that runs forwards and backwards in time, so that it shifts no phase.
+"""
 
 from __future__ import annotations
 
@@ -12,17 +15,17 @@ from wingfit.records.array_types import Array, ArrayLike
 from wingfit.records.limits import UNEVEN_STEPS
 
 CUTOFF_HARMONIC = 3.2  # 40 Hz at 12.5 beats per second (Armanini et al. 2016): just above the third harmonic
-END_PERIODS = 2.0  # of the cutoff: length of the transient of the filter at either end
+END_PERIODS = 2.0  # length of the filter's transient at either end, in periods of the cut-off frequency
 MIN_BEATS_TO_TRIM = 4
 
 
 def default_cutoff(flap_frequency: float) -> float:
-    """Cutoff (Hz) just above the third harmonic."""
+    """Cut-off frequency (Hz) just above the third harmonic of ``flap_frequency`` (Hz)."""
     return CUTOFF_HARMONIC * flap_frequency
 
 
 def sampling_rate(recording: Recording) -> float:
-    """Samples per second; ValueError if the sampling is not even."""
+    """Samples per second of ``recording``; ValueError if the sampling intervals are not equal."""
     steps = np.diff(recording.times)
     mean = float(steps.mean())
     worst = float(np.abs(steps - mean).max())
@@ -36,10 +39,11 @@ def sampling_rate(recording: Recording) -> float:
 
 
 def low_passed(recording: Recording, low_pass: LowPass) -> Recording:
-    """``recording`` filtered forwards and backwards; ValueError for gaps, uneven steps, or a filtered recording.
+    """Return ``recording`` filtered by ``low_pass``.
 
-    Near both ends the filtered values have large errors. They are replaced by NaN, for END_PERIODS periods of the
-    cutoff but at most one beat, unless the recording has fewer than MIN_BEATS_TO_TRIM beats.
+    ValueError if values are missing, if sampling intervals are not equal, or if the recording is filtered already. Near
+    both ends the filtered values have large errors. They are replaced by NaN, for END_PERIODS periods of the cut-off
+    frequency but at most one beat, unless the recording has fewer than MIN_BEATS_TO_TRIM beats.
     """
     if recording.low_pass is not None:
         raise ValueError(
@@ -64,9 +68,10 @@ def low_passed(recording: Recording, low_pass: LowPass) -> Recording:
 
 
 def gain(low_pass: LowPass, rate: float, frequency: ArrayLike) -> Array:
-    """Gain (real: no phase) at ``frequency`` (Hz) of the filter as it works on samples taken at ``rate`` (Hz).
+    """Real gain (the filter shifts no phase) of ``low_pass`` at ``frequency`` (Hz) for samples taken at ``rate`` (Hz).
 
-    Above half the rate there is nothing to filter: a model's harmonics there would be aliases, and get none.
+    0 from half the rate on: samples cannot represent such frequencies, so that harmonics of a model there would appear
+    at wrong frequencies (aliases).
     """
     f = np.asarray(frequency, float)
     response = scipy.signal.sosfreqz(

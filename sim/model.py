@@ -1,4 +1,4 @@
-"""The interface of a simulated rig; calibration and diagnosis use nothing else of the simulators."""
+"""The interface of a simulated rig. Calibration and diagnosis use the simulators through this interface only."""
 
 from __future__ import annotations
 
@@ -14,7 +14,11 @@ from wingfit.records.array_types import ArrayLike
 
 
 class Solution(NamedTuple):
-    """How one individual was solved: steps of a beat, beats simulated, estimated largest error of a marker in m."""
+    """How the periodic beat of one individual was computed.
+
+    ``steps``: time steps per beat; ``beats``: beats simulated until the motion was periodic; ``error``: estimated
+    largest error of a marker, m (NaN if the number of steps was given).
+    """
 
     steps: int
     beats: int
@@ -23,10 +27,12 @@ class Solution(NamedTuple):
 
 @dataclass(frozen=True)
 class Observation:
-    """What a batch of B individuals would have been recorded as.
+    """Simulated recordings of a batch of B individuals.
 
-    ``channels`` has shape [B, T, C] in the layout of the recording; a failed individual's row is NaN and its entry in
-    ``reasons`` says why (None for a good one). ``solutions`` say how, where a model tells.
+    Attributes:
+        channels: [B, T, C] values at the T samples and C channels of the recording; NaN for an individual that failed.
+        reasons: [B] why an individual failed; None where it did not.
+        solutions: [B] how each was computed; empty for a model that does not report it.
     """
 
     channels: Array
@@ -35,11 +41,11 @@ class Observation:
 
 
 class Model(Protocol):
-    """A simulated rig."""
+    """A simulated rig with its genes: what a calibration or a diagnosis needs of it."""
 
     @property
     def genes(self) -> tuple[Gene, ...]:
-        """All genes of the model, in the order of the columns of a genome batch."""
+        """All genes of the model, in the order of the columns of a batch of genomes."""
         ...
 
     @property
@@ -48,12 +54,18 @@ class Model(Protocol):
         ...
 
     def observe(self, genomes: Array, recording: Recording) -> Observation:
-        """Simulate ``genomes`` [B, G] under the recording's condition, sampled and aligned like the recording."""
+        """Simulate ``genomes`` [B, G] under the recording's condition, at the recording's samples and channels.
+
+        Tracks are also aligned in phase with the recording; forces are filtered as the recording was.
+        """
         ...
 
 
 def genome_batch(genes: Sequence[Gene], genomes: ArrayLike) -> Array:
-    """Return ``genomes`` as a contiguous [B, G] float array; ValueError when the shape does not fit the genes."""
+    """Return ``genomes`` as a contiguous float array [B, G]; a single genome [G] becomes [1, G].
+
+    ValueError if G is not the number of ``genes``.
+    """
     batch = np.ascontiguousarray(np.atleast_2d(np.asarray(genomes, float)))
     if batch.ndim != 2 or batch.shape[1] != len(genes):
         raise ValueError(f"a genome batch needs shape [B, {len(genes)}], got {list(np.shape(genomes))}")

@@ -1,4 +1,4 @@
-"""Compile the kernels into the on-disk cache, to save the first run the time: ``python -m wingfit.sim.warm``."""
+"""Compile the numerical kernels into the on-disk cache before the first run: ``python -m wingfit.sim.warm``."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ WITH_STATES = ("circulation_lag", "dynamic_stall", "induced_inflow", "wake_captu
 
 
 def main() -> None:
-    """Simulate two beats of the coarsest wing, and a beat of the vehicle without and with effects that have states."""
+    """Simulate two beats of the coarsest wing, and one of the vehicle without and with effects that have states."""
     start = time.perf_counter()
     model = FlexibleWing(robird_wing(), "4", numerics=Numerics(steps=8, max_beats=2))
     model.beat([gene.nominal for gene in model.genes], blank_recording(model.wing, WIND_TUNNEL[0]))

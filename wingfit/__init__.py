@@ -2,12 +2,13 @@
 
 The names below are public and documented; everything else in the package may change without notice.
 
-- :class:`Client` speaks to a wingfit server (``wingfit serve``); :class:`WingfitError` is what it raises.
-- :func:`load_dataset` reads recordings: a folder, a zip of it, or NetCDF. DatasetError lists what is wrong with them.
+- :class:`Client` sends requests to a wingfit server (``wingfit serve``); it raises :class:`WingfitError`.
+- :func:`load_dataset` reads recordings from a folder, a zip file of a folder, or NetCDF. If they are not valid, it
+raises :class:`DatasetError`, which lists what is wrong.
 - :func:`calibrate` estimates the genes of a model in this process, without a server; :func:`diagnose` reports which
-  physics the model is missing.
+physics the model is missing.
 
-``import wingfit`` is light: what a name needs is imported when the name is first used.
+``import wingfit`` is fast: modules are imported when one of their names is first used.
 """
 
 from __future__ import annotations

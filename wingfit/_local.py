@@ -1,4 +1,4 @@
-"""Calibrations and diagnoses in this process, without a server."""
+"""Calibrations and diagnoses that run in this process, without a server."""
 
 from __future__ import annotations
 
@@ -25,14 +25,17 @@ def calibrate(
     workers: int = 1,
     on_progress: OnProgress | None = None,
 ) -> Result | ForceResult:
-    """Estimate the genes of the dataset's model, and judge the estimate on every recording, held-out ones too.
+    """Estimate the genes of the dataset's model, and compare the estimate with every recording, held-out ones included.
 
     Args:
         dataset: recordings and the description of their rig (:func:`wingfit.load_dataset`).
-        spec: what to calibrate and how; by default the settings of the sources for this kind of rig.
-        workers: processes that evaluate. Numbers do not depend on it. More than one starts processes, which import the
-            calling script again: call from below ``if __name__ == "__main__":``.
-        on_progress: is called after each generation with the part that is done, in [0, 1], and the stage's name.
+        spec: what to calibrate and how; None: the default settings for this kind of rig, those of the published
+            sources.
+        workers: number of processes that simulate; the results do not depend on it. More than one starts processes,
+            which
+        import the calling script again: call from below ``if __name__ == "__main__":``.
+        on_progress: called after each generation of the search with the completed fraction, in [0, 1], and the name of
+        the stage.
 
     Returns:
         A :class:`Result` for a wing (distances in m), a :class:`ForceResult` for a vehicle (forces in N).
@@ -59,13 +62,16 @@ def diagnose(
     workers: int = 1,
     on_progress: OnProgress | None = None,
 ) -> Finding:
-    """Find what the dataset's model lacks: where it differs from the recordings, which effect explains that, and proof.
+    """Report which physics the dataset's model is missing.
+
+    The finding says where model and recordings differ, which effect explains the difference, and whether the model with
+    this effect predicts the held-out recordings.
 
     Args:
-        dataset: recordings, some of them held out for the proof.
-        spec: which model, suspects and thresholds; by default all effects that apply to this kind of rig.
-        workers: as in :func:`calibrate`.
-        on_progress: is called with the part that is done, in [0, 1], and the name of the step.
+        dataset: recordings, some of them held out: these are never fitted and test the explanation.
+        spec: model, suspects (effects to consider) and thresholds; None: all effects that apply to this kind of rig.
+        workers: number of processes that simulate, as in :func:`calibrate`.
+        on_progress: called with the completed fraction, in [0, 1], and the name of the step.
 
     Raises:
         ValueError: the spec does not fit the dataset, or the dataset cannot be diagnosed; the message says why.

@@ -1,12 +1,14 @@
-"""A recording as the Fourier coefficients of its beat, and their noise, known from the scatter between beats.
+"""A recording as Fourier coefficients of its beat, with the noise of these coefficients from differences between beats.
 
-A model's motion is periodic, so all that it predicts of a recording lies in the harmonics of the beat; all that lies
-between the harmonics is noise (or a fault that is not periodic). Each channel is reduced to its mean, the harmonics up
-to H, and three slow trends in which drifts and wrong rates show: of the mean, and of the first harmonic in phase and in
-quadrature. The noise at a harmonic is read off the spectrum between the harmonics, whatever its colour.
+The motion of a model is periodic, so all its predictions lie in the harmonics of the beat; whatever lies between the
+harmonics is noise (or a fault that is not periodic). Each channel is reduced to its mean, the harmonics up to H, and
+three slow trends in which drifts and wrong rates are visible: a linear change of the mean, and of the first harmonic in
+phase and in quadrature. The noise at a harmonic is estimated from the spectrum between the harmonics, whatever its
+colour.
 
-Frames under a strobe follow each other in the order of the *apparent* beat, and noise is correlated in that order; the
-spectrum is taken over apparent phase. A camera that is much faster than the wing is the case without aliasing.
+Under a strobe, consecutive frames show nearly the same phase of different beats, so that the wing seems to flap slowly:
+the *apparent* beat. Noise is correlated from frame to frame, therefore spectra are computed over the apparent phase.
+For a camera much faster than the wing, apparent and true beat are the same.
 """
 
 from __future__ import annotations
@@ -22,29 +24,30 @@ from wingfit.records import Recording
 from wingfit.records.array_types import Array, Bool, Float, Index, Int, Mask
 from wingfit.records.blas_threads import one_blas_thread
 
-HARMONICS = 8  # of tracks: a wing of membrane and foam follows no faster
+HARMONICS = 8  # of tracks: a wing of membrane and foam does not move faster
 HARMONICS_OF_FORCES = 10
-PASSED = 1.6  # cut-off frequencies of a low-pass above which nothing remains of a force
+PASSED = 1.6  # frequency, in cut-off frequencies of a low-pass, above which nothing of a force remains
 TRENDS = 3
-SPARE = 1.5  # samples per coefficient, at least; a channel with fewer is not used
-INFLATED = 5.0  # largest ratio of a coefficient's variance to that if it were fitted alone: more means long gaps
+SPARE = 1.5  # least number of samples per coefficient; a channel with fewer is not used
+INFLATED = 5.0  # largest ratio of a coefficient's variance to its variance if fitted alone: more means long gaps
 
 
 @dataclass(frozen=True)
 class HarmonicFit:
-    """The linear map from samples [T, C] of a recording to coefficients [C, P], and the noise of these.
+    """Linear map from the samples [T, C] of a recording to P Fourier coefficients per channel, and their noise.
 
     Attributes:
-        order: [P] harmonic of each coefficient.
-        trend: [P], True for slow trends.
-        weight: [P] mean square over the samples of a coefficient of one.
-        inverse: [C, P, T], least squares over the valid samples; zero where a sample is not valid.
+        order: [P] harmonic of each coefficient; 0 for the mean.
+        trend: [P], True for coefficients of slow trends.
+        weight: [P] mean square over the samples of the basis function of each coefficient.
+        inverse: [C, P, T] least-squares map from samples to coefficients; zero for samples that are not used.
         used: [C], False for a channel with too few samples.
-        variance: [C, P] of the coefficients' noise.
-        noise: [C] standard deviation of a sample's noise.
+        variance: [C, P] of the noise of the coefficients.
+        noise: [C] standard deviation of the noise of one sample.
         lag1: correlation of the noise of successive samples, median of the channels.
-        between_beats: whether the noise was estimated from the scatter between beats; else from what no harmonic
-            explains.
+        between_beats: True if the noise was estimated from differences between beats; False, for a recording of less
+            than
+        two beats, if it was estimated from the part of the spectrum above the fitted harmonics.
         coefficients: [C, P] of the recording itself.
     """
 
@@ -60,7 +63,7 @@ class HarmonicFit:
     coefficients: Float[Array, "C P"]
 
     def of(self, residuals: Float[Array, "*B T C"]) -> Float[Array, "*B C P"]:
-        """Harmonic coefficients [..., C, P] of ``residuals`` [..., T, C] (NaN: not recorded), zero if not used."""
+        """Fourier coefficients [..., C, P] of ``residuals`` [..., T, C] (NaN: not recorded); zero if not used."""
         filled = np.where(np.isfinite(residuals), residuals, 0.0)
         channels = np.moveaxis(filled, -1, 0).reshape(len(self.inverse), -1, filled.shape[-2])
         found = np.einsum("cbt,cpt->bcp", channels, self.inverse, optimize=True)
@@ -68,10 +71,10 @@ class HarmonicFit:
 
 
 def harmonic_fit(recording: Recording, compared: Mask | None = None) -> HarmonicFit:
-    """Reduce ``recording`` to the harmonic coefficients of its beat and their noise.
+    """Reduce ``recording`` to the Fourier coefficients of its beat and estimate their noise.
 
-    ``compared`` [T, C] selects samples (None: all that were recorded). ValueError if no channel has enough samples, if
-    no channel moves, or if all samples have the same phase.
+    ``compared`` [T, C]: True for samples to use; None: all that were recorded. ValueError if no channel has enough
+    samples, if no channel moves, or if all samples have the same phase.
     """
     scatter = _Scatter.of(recording, compared)
     inner, valid = scatter.inner, scatter.valid
@@ -93,11 +96,11 @@ def harmonic_fit(recording: Recording, compared: Mask | None = None) -> Harmonic
 
 @one_blas_thread
 def noise_distance(recordings: tuple[Recording, ...]) -> float | None:
-    """Mean distance (m) between recorded and true place of a marker by tracking noise; None where it is not known.
+    """Estimate the mean distance (m) between the recorded and the true positions of markers that tracking noise causes.
 
-    Noise is what does not repeat with the beat. A fit of the mean beat removes more of slow noise than of white noise;
-    the scatter is corrected for that. The mean length of a normal vector is 2 sqrt(2 / pi) R_G of its variances, with
-    Carlson's symmetric elliptic integral R_G.
+    Noise is the part of the positions that differs from beat to beat; the part of it that the fitted mean beat absorbs
+    is added again. Returns None if no recording has usable samples. The mean length of a normally distributed vector is
+    2 sqrt(2 / pi) R_G of its three variances, with Carlson's symmetric elliptic integral R_G.
     """
     total, count = 0.0, 0
     for recording in recordings:
@@ -112,22 +115,27 @@ def noise_distance(recordings: tuple[Recording, ...]) -> float | None:
 
 
 def whole_markers(recording: Recording) -> Mask:
-    """True [T, C] where all of x, y and z of a marker were recorded."""
+    """True [T, C] (C: x, y, z of each marker in turn) where all three coordinates of the marker were recorded."""
     return np.repeat(np.isfinite(recording.positions).all(axis=2), 3, axis=1)
 
 
 @dataclass(frozen=True)
 class _Scatter:
-    """The part of a recording that does not repeat with the beat.
+    """The part of a recording that differs from beat to beat: recorded values minus the fitted mean beat.
+
+    T samples, C channels, P basis functions (mean, harmonics, trends), H harmonics.
 
     Attributes:
-        values: [T, C] recorded minus mean beat, zero where not valid.
-        valid: [T, C] samples of channels that move and have enough of them.
-        basis: [T, P] mean, harmonics and trends, with their ``order`` [P]; ``trend`` [P] marks the trends.
-        beats: whole beats, apparent ones under a strobe.
-        inner: [C, P, P], (A^T A)^-1 of each channel's fit.
-        density: of the noise at each harmonic, relative to the scale [C] of each channel.
-        variance: [C] of a sample's noise.
+        values: [T, C] recorded values minus mean beat, zero where not valid.
+        valid: [T, C], True for the samples used: of channels that move and have enough samples.
+        basis: [T, P] basis functions at the samples.
+        order: [P] harmonic of each basis function; 0 for the mean.
+        trend: [P], True for basis functions that are slow trends.
+        beats: number of whole beats, apparent ones under a strobe.
+        inner: [C, P, P], (A^T A)^-1 of the least-squares fit of each channel, A its valid rows of the basis.
+        density: relative spectral density of the noise at harmonics 0 .. H, [H + 1], and the scale [C] of each channel
+        (a variance) by which it is multiplied.
+        variance: [C] of the noise of one sample.
     """
 
     values: Array
@@ -142,7 +150,11 @@ class _Scatter:
 
     @classmethod
     def of(cls, recording: Recording, compared: Mask | None) -> _Scatter:
-        """ValueError where the recording has no beat of samples, or no channel with enough of them."""
+        """Subtract the mean beat from ``recording`` and estimate the noise from the rest.
+
+        ``compared`` [T, C]: True for samples to use; None: all recorded ones. ValueError if the samples determine no
+        harmonic of the beat, or if no channel moves or has enough samples.
+        """
         advance, number = _apparent(recording)
         harmonics, beats = _harmonics(recording, advance), int(advance * (number[-1] + 1) + 0.05)
         basis, order, trend = _basis(recording, harmonics, beats)
@@ -154,16 +166,16 @@ class _Scatter:
             raise ValueError(_too_few(recording.name, basis.shape[1], valid))
         valid = valid & used
         recorded = np.where(valid, recording.values, 0.0)
-        # Trends stay in the scatter: noise that they take up would be missed.
+        # Trends are not subtracted: they would absorb some of the noise.
         values = scatter_about(basis[:, ~trend], recorded, valid)
         density = density_at_harmonics(values, valid, advance, number, harmonics, beats)
-        taken = density[1] * density[0][order[~trend]].sum()  # by the fit of the mean beat
+        taken = density[1] * density[0][order[~trend]].sum()  # power of the noise that the fit of the mean beat absorbs
         variance = ((values**2).sum(axis=0) + taken) / np.maximum(valid.sum(axis=0), 1)
         return cls(values, valid, basis, order, trend, beats, inner, density, variance)
 
 
 def _check_moves(recording: Recording, seen: Mask) -> None:
-    """ValueError where every channel holds one and the same value throughout."""
+    """ValueError if every channel has the same value in all of its samples; ``seen`` [T, C]: samples to use."""
     least, most = (
         end(np.where(seen, recording.values, none), axis=0) for end, none in ((np.min, np.inf), (np.max, -np.inf))
     )
@@ -175,13 +187,13 @@ def _check_moves(recording: Recording, seen: Mask) -> None:
 
 
 def still_markers(recording: Recording) -> tuple[str, ...]:
-    """Names of markers with one constant position: they were not tracked, and are not used."""
+    """Names of markers whose recorded position never changes: they were not tracked, and are not used."""
     still = _still(recording)
     return tuple(name for k, name in enumerate(recording.markers) if still[3 * k])
 
 
 def _still(recording: Recording) -> Mask:
-    """Channels [C] of markers none of whose coordinates ever changes."""
+    """True [C] for the channels of markers whose recorded position never changes; all False for forces."""
     if recording.kind != "tracks":
         return np.zeros(recording.values.shape[1], bool)
     places, known = recording.positions, np.isfinite(recording.positions)
@@ -190,9 +202,10 @@ def _still(recording: Recording) -> Mask:
 
 
 def _apparent(recording: Recording) -> tuple[float, Index]:
-    """Apparent advance of the phase from sample to sample (beats, at most 0.5), and the number [T] of each sample.
+    """Return the advance of the apparent beat per sample (beats, 0 to 0.5), and the index [T] of each sample.
 
-    A strobe slightly slower than the wing makes the beat appear to advance slowly.
+    The index counts median sampling intervals from the first sample. A strobe slightly slower than the wing makes the
+    beat appear to advance slowly. ValueError if there are fewer than two samples or their times do not increase.
     """
     times = recording.times
     step = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
@@ -206,7 +219,10 @@ def _apparent(recording: Recording) -> tuple[float, Index]:
 
 
 def _harmonics(recording: Recording, advance: float) -> int:
-    """Number of harmonics of the beat to fit; ValueError where the samples determine none."""
+    """Number of harmonics of the beat to fit; ValueError if the samples do not determine any.
+
+    ``advance``: apparent advance of the beat per sample, in beats.
+    """
     most = HARMONICS
     if recording.kind == "forces":
         most = HARMONICS_OF_FORCES
@@ -228,13 +244,17 @@ def _basis(recording: Recording, harmonics: int, beats: int) -> tuple[Array, Ind
     psi = 2 * np.pi * recording.condition.flap_frequency * recording.times
     k = np.arange(1, harmonics + 1)
     slow = np.linspace(-1.0, 1.0, len(psi)) if len(psi) > 1 else np.zeros(1)
-    trends = [slow, slow * np.cos(psi), slow * np.sin(psi)] if beats >= 2 else []  # within a beat they look like it
+    trends = [slow, slow * np.cos(psi), slow * np.sin(psi)] if beats >= 2 else []  # within one beat, trends resemble it
     order = np.concatenate([[0], k, k, [0, 1, 1][: len(trends)]]).astype(np.int64)
     return np.column_stack([fourier_basis(psi, harmonics), *trends]), order, np.arange(len(order)) > 2 * harmonics
 
 
 def _inner(basis: Array, valid: Mask) -> tuple[Array, Mask]:
-    """(A^T A)^-1 [C, P, P] over the valid samples of each channel, and which channels determine all coefficients."""
+    """Return (A^T A)^-1 [C, P, P] of the least-squares fit of each channel, and True [C] where a channel can be used.
+
+    A: the rows of ``basis`` [T, P] that are ``valid`` [T, C] for the channel. A channel is used if it has enough
+    samples, without long gaps in the beat.
+    """
     inner, used = np.zeros((valid.shape[1], basis.shape[1], basis.shape[1])), np.zeros(valid.shape[1], bool)
     masks, group = np.unique(valid, axis=1, return_inverse=True)
     for k, mask in enumerate(masks.T):

@@ -1,4 +1,4 @@
-"""The mean beat: a Fourier series in the phase of the beat, fitted to all beats of a recording."""
+"""The mean beat of a recording: a Fourier series in the phase of the beat, fitted to all beats of the recording."""
 
 from __future__ import annotations
 
@@ -8,7 +8,10 @@ from wingfit.records.array_types import Array, Bool, Float, Mask
 
 
 def fourier_basis(psi: Float[Array, " T"], harmonics: int) -> Float[Array, "T P"]:
-    """Columns 1, cos k psi, sin k psi for k = 1 .. H at phases [T]: [T, 1 + 2 H]."""
+    """Return 1, then cos k psi, then sin k psi (k = 1 .. H) at the phases ``psi`` [T] (rad) as columns [T, 1 + 2 H].
+
+    H is ``harmonics``.
+    """
     angles = psi[:, None] * np.arange(1, harmonics + 1)
     return np.hstack([np.ones((len(psi), 1)), np.cos(angles), np.sin(angles)])
 
@@ -16,9 +19,10 @@ def fourier_basis(psi: Float[Array, " T"], harmonics: int) -> Float[Array, "T P"
 def scatter_about(
     basis: Float[Array, "T P"], values: Float[Array, "T C"], valid: Bool[Mask, "T C"]
 ) -> Float[Array, "T C"]:
-    """``values`` [T, C] minus their least-squares fit by ``basis`` [T, P] over the ``valid`` samples, zero elsewhere.
+    """Subtract from ``values`` [T, C] (T samples, C channels) their least-squares fit by the columns of a basis.
 
-    A channel with fewer valid samples than columns has no scatter.
+    ``basis`` [T, P]. Only ``valid`` samples are fitted; the result [T, C] is zero at the others. It is also zero (to
+    round-off) for a channel with at most P valid samples, which the fit reproduces exactly.
     """
     out = np.zeros_like(values)
     masks, group = np.unique(valid, axis=1, return_inverse=True)

@@ -1,7 +1,7 @@
-"""The spectral density of measurement noise at the harmonics of the beat, from the lines between them.
+"""Spectral density of measurement noise at the harmonics of the beat, estimated from the spectral lines between them.
 
-A line of density s means that a cosine fitted there to N samples has the variance 2 s / N, as of white noise of
-variance s.
+Frequencies are multiples of the flap frequency ("lines"). A density s at a line means that the amplitude of a cosine
+fitted there to N samples has the variance 2 s / N, as in white noise of variance s.
 """
 
 from __future__ import annotations
@@ -11,12 +11,12 @@ import scipy
 
 from wingfit.records.array_types import Array, Bool, Float, Index, Int, Mask
 
-POOLED = 10.0  # lines that the mean scale of all channels counts for in the scale of one
-LOCAL = 0.6  # harmonics to either side over which the noise's spectrum is averaged
+POOLED = 10.0  # weight, in lines, of the mean scale of all channels in the scale of one channel
+LOCAL = 0.6  # multiples of the flap frequency to either side of a harmonic over which lines are averaged
 LOWEST = 3  # lines to which the power law of slow noise is fitted
 STEEPEST = -2.0  # exponent of the power law: a random walk
 MEAN_LINE = 0.35  # effective frequency, in spectral lines, at which 1/f noise enters the estimate of the mean
-FLAT = 0.002  # of the largest density: no density is taken to be lower
+FLAT = 0.002  # smallest density, relative to the largest
 
 
 def density_at_harmonics(
@@ -27,10 +27,12 @@ def density_at_harmonics(
     harmonics: int,
     beats: int,
 ) -> tuple[Float[Array, " H1"], Float[Array, " C"]]:
-    """Density of the noise at harmonics 0 .. H, relative to the scale [C] of each channel (a variance), and that scale.
+    """Return the density [H + 1] of the noise at harmonics 0 .. H, and the scale [C] of each channel (a variance).
 
-    ``scatter`` [T, C] is what does not repeat with the beat, zero where not ``valid``; ``advance`` the apparent advance
-    of the beat per sample; ``number`` [T] the place of each sample in the regular sequence.
+    The density is common to all channels; that of one channel is the product with its scale. ``scatter`` [T, C]: part
+    of the recording that differs from beat to beat, zero where not ``valid``. ``advance``: apparent advance of the beat
+    per sample, beats. ``number`` [T]: index of each sample in the regular sequence of samples. ``harmonics``: H.
+    ``beats``: whole (apparent) beats recorded.
     """
     if beats >= 2:
         parts = np.arange(1, beats) / beats
@@ -57,15 +59,16 @@ def density_at_harmonics(
         density = _first_order(lines, mean, advance, harmonics)
     if beats >= 2:
         steep = max(float(density[0]), _at_rest(lines, mean, beats))
-        # Between noise that levels off below the lines and noise that does not.
+        # Geometric mean of noise that is constant below the lowest line and noise that follows the power law.
         density[0] = np.sqrt(density[0] * steep)
     return np.maximum(density, FLAT * density.max()), scale
 
 
 def _at_rest(lines: Array, mean: Array, beats: int) -> float:
-    """Density of the noise in the mean of a recording, by the power law of the lowest lines.
+    """Density of the noise in the mean of a recording, extrapolated from the lowest lines by a power law.
 
-    Noise such as 1/f has most of its power below the first line between harmonics, where it moves the mean.
+    Most of the power of noise such as 1/f lies below the lowest line between harmonics, where it shifts the mean.
+    ``lines`` [L] in multiples of the flap frequency, ``mean`` [L]: density at each, averaged over the channels.
     """
     low = np.argsort(lines)[: max(LOWEST, beats - 1)]
     slope = np.polyfit(np.log(lines[low]), np.log(np.maximum(mean[low], 1e-300)), 1)[0]
@@ -80,7 +83,11 @@ def _near(lines: Array, mean: Array, k: int) -> float:
 
 
 def _first_order(lines: Array, mean: Array, advance: float, harmonics: int) -> Array:
-    """Density at the harmonics of first-order autoregressive noise beside white noise, by Whittle's likelihood."""
+    """Density [H + 1] at harmonics 0 .. H of first-order autoregressive plus white noise, fitted to the lines.
+
+    Whittle's likelihood is maximised. ``lines`` [L]: frequencies in multiples of the flap frequency; ``mean`` [L]:
+    density at each; ``advance``: apparent advance of the beat per sample, beats.
+    """
 
     def model(x: Array, at: Array) -> Array:
         lag1, coloured, white = 0.98 / (1 + np.exp(-x[0])), np.exp(x[1]), np.exp(x[2])
@@ -100,7 +107,10 @@ def _first_order(lines: Array, mean: Array, advance: float, harmonics: int) -> A
 
 
 def lag1_autocorrelation(scatter: Float[Array, "T C"], valid: Bool[Mask, "T C"]) -> float:
-    """Correlation of successive samples of ``scatter`` [T, C], zero where not ``valid``; the median of the channels."""
+    """Correlation of successive samples of ``scatter`` [T, C] (zero where not ``valid``): the median of the channels.
+
+    0 if no channel has two successive valid samples.
+    """
     both = valid[1:] & valid[:-1]
     product = np.where(both, scatter[1:] * scatter[:-1], 0.0).sum(axis=0) / np.maximum(both.sum(axis=0), 1)
     own = (scatter**2).sum(axis=0) / np.maximum(valid.sum(axis=0), 1)

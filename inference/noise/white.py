@@ -1,4 +1,7 @@
-"""Noise that is independent from sample to sample: its covariance R, from residuals (Armanini et al. 2016, Eq. 22)."""
+"""Noise that is independent from sample to sample: estimate of its covariance R from residuals.
+
+R follows Armanini et al. (2016, Eq. 22).
+"""
 
 from __future__ import annotations
 
@@ -9,27 +12,33 @@ import numpy as np
 from wingfit.records import Recording
 from wingfit.records.array_types import Array, Float
 
-FLOOR = 1e-6  # of the largest recorded value: residuals are taken to be at least this large, so that R stays regular
+FLOOR = 1e-6  # smallest standard deviation relative to the largest recorded value, so that R is not singular
 POOLED = 5.0  # samples: weight of the mean variance of a recording in the variance of each track
 
 
 @dataclass(frozen=True)
 class Noise:
-    """Noise covariance R [C, C] of one recording (m^2 or N^2), and the matrix [C, C] W that whitens residuals: v W."""
+    """Noise of the C channels of one recording: covariance R and the matrix W that whitens residuals.
+
+    Attributes:
+        covariance: R [C, C], m^2 (tracks) or N^2 (forces).
+        whitening: W [C, C]; residuals v [C] of one sample become v W, whose covariance is the identity.
+        log_determinants: [C] one term for each channel; their sum is ln det R.
+    """
 
     covariance: Float[Array, "C C"]
     whitening: Float[Array, "C C"]
     log_determinants: Float[Array, " C"]
-    """[C] logarithms that add up to ln det R, one for each channel."""
 
     @classmethod
     def of(cls, record: Recording, residuals: Float[Array, "T C"]) -> Noise:
-        """Estimate R from the residuals [T, C] of ``record``.
+        """Estimate R from the residuals [T, C] of ``record`` (NaN: not compared).
 
-        Forces have the full covariance of the fitted axes, (1/N) sum of v v^T. Tracks have one variance for each
-        channel: of 120 channels seen for as many frames, with gaps, a full matrix would be singular; each variance is
-        shrunk a little towards their mean, so that a track of a few frames cannot be fitted exactly and dominate.
-        Channels that are not fitted get variance 1, which has no influence.
+        Forces have a full covariance, (1/N) sum of v v^T over N samples v. Tracks have one variance for each of the C
+        coordinates and no covariances: from as many frames as coordinates, with gaps, a full matrix would be singular.
+        Each variance is a weighted mean of that of the coordinate and of the mean over all (weight: POOLED samples), so
+        that a track of a few frames cannot be fitted exactly and dominate. Channels without residuals get variance 1,
+        which has no influence.
         """
         seen = np.isfinite(residuals)
         v, count = np.where(seen, residuals, 0.0), seen.sum(axis=0)
@@ -45,15 +54,15 @@ class Noise:
         return cls(matrix, whitening, 2.0 * np.log(np.diag(factor)))
 
     def whitened(self, residuals: Float[Array, "*B T C"]) -> Float[Array, "*B T C"]:
-        """Residuals [..., T, C] with unit covariance; zero where not compared."""
+        """Whiten residuals [..., T, C] to unit covariance; zero where they are NaN (not compared)."""
         return np.asarray(np.where(np.isfinite(residuals), residuals, 0.0) @ self.whitening)
 
     def cost(self, residuals: Float[Array, "T C"]) -> float:
-        """-ln likelihood of residuals [T, C], Eq. 22."""
+        """Negative log-likelihood of residuals [T, C] (NaN: not compared) under R (Armanini et al. 2016, Eq. 22)."""
         count, white = np.isfinite(residuals).sum(axis=0), self.whitened(residuals)
         return 0.5 * float((white**2).sum() + count @ (self.log_determinants + np.log(2 * np.pi)))
 
 
 def whitened_sensitivity(noise: Noise, sensitivity: Float[Array, "T C F"]) -> Float[Array, "T C F"]:
-    """Sensitivities of the whitened residuals, from ``sensitivity`` of the residuals by F genes."""
+    """Derivatives [T, C, F] of whitened residuals with respect to F genes; ``sensitivity``: those of the residuals."""
     return np.asarray(np.einsum("tcf,cd->tdf", sensitivity, noise.whitening, optimize=True))

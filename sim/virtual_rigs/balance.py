@@ -1,8 +1,8 @@
-"""A virtual wind-tunnel balance: force recordings of a DelFly-like vehicle whose coefficients are known.
+"""A simulated wind-tunnel balance: force recordings of a DelFly-like vehicle whose coefficients are known.
 
 Vehicle, conditions and coefficients are those of Armanini, Caetano, de Croon, de Visser and Mulder (2016), Tables 3-5
-and 8. Their measured forces are not public; these are predictions of their model with the errors of a real balance
-added.
+and 8. Their measured forces are not public; the recordings made here are predictions of their model, with the errors of
+a real balance added.
 """
 
 from __future__ import annotations
@@ -41,7 +41,10 @@ ELEMENTS, INSTANTS = 80, 1600  # finer than in a calibration
 
 @dataclass(frozen=True)
 class Trial:
-    """One condition of Table 4, the coefficients estimated for it (Table 8), and the vehicle's mass (kg)."""
+    """One test of Armanini et al. (2016): condition (Table 4), estimated coefficients (Table 8) and mass (kg).
+
+    ``coefficients``: values of the genes C_l, C_r and C_F.
+    """
 
     name: str
     condition: Condition
@@ -68,7 +71,7 @@ _TABLES = (
     (2.00, 31, 10.3, 2.02, 1.57, 0.67),
 )
 TRIALS = tuple(_trial(k + 1, row) for k, row in enumerate(_TABLES))
-HELD_OUT = ("test-3", "test-7")  # of the example: an interpolation and an extrapolation
+HELD_OUT = ("test-3", "test-7")  # recordings of the example: an interpolation and an extrapolation
 
 
 @dataclass(frozen=True)
@@ -76,23 +79,25 @@ class Balance:
     """How forces are recorded, and the errors of the balance. "The source" is Armanini et al. (2016).
 
     Attributes:
-        rate: samples per second, Hz; the source's (3.2.2).
-        every: only every so many samples are kept, after an anti-aliasing filter; 1 keeps all.
+        rate: samples per second, Hz; as in the source (3.2.2).
+        every: one sample of this many is stored, after an anti-aliasing filter; 1: all samples are stored.
         beats: whole beats in a recording; the source's tests lasted some tens.
         sensor: standard deviation of the white noise of a sample, N. The source's transducer resolves 0.149 gram-force.
-        resonance: natural frequency of the clamped body along x and z, Hz. A body of 17 g on a strut, bent by a
-            fuselage of carbon rod; above the harmonics that are looked at, or the forces could not be read at all.
+        resonance: natural frequencies of the clamped body along x and along z, Hz: a body of 17 g on a strut, bent by a
+        fuselage of carbon rod. They lie above the harmonics of interest; otherwise the balance could not measure these.
         damping: damping ratio of the resonance; clamped carbon structures have 1 to 3 %.
-        participation: part of the force that drives the resonance. Small, since the source clamps the body where the
-            forces act, to this end (3.2.2). At 40 Hz it makes the forces 1 % too large: a systematic error.
-        rattle: standard deviation of what motor, gears and the tunnel's 1 % turbulence excite in the resonance, N.
-        drift: standard deviation of the slow drift, N; small, since the zero is taken before each test.
+        participation: fraction of the force that excites the resonance. It is small, since the source clamps the body
+            where
+        the forces act, for this purpose (3.2.2). At 40 Hz it makes the forces 1 % too large: a systematic error.
+        rattle: standard deviation, N, of the vibration that motor, gears and the tunnel's 1 % turbulence excite in the
+        resonance.
+        drift: standard deviation of the slow drift, N; small, since the zero is measured before each test.
         drift_time: correlation time of the drift, s; a transducer warms up in seconds to minutes.
-        scatter: relative standard deviation of the force from beat to beat: the flow separates anew in each.
+        scatter: relative standard deviation of the force from beat to beat: in each beat the flow separates anew.
         timing: standard deviation of the instant at which a beat begins, beats: half a sample of 80 us. The phase comes
-            from a Hall sensor on the mechanism, read with the forces (3.2.2), beat by beat.
-        memory: correlation of the scatter from one beat to the next.
-        decimals: to which forces in N are rounded; below the noise.
+        from a Hall sensor on the mechanism, recorded with the forces (3.2.2) in every beat.
+        memory: correlation of the scatter of one beat with that of the next.
+        decimals: decimal places to which forces in N are rounded; the rounding is smaller than the noise.
     """
 
     rate: float = 12_500.0
@@ -115,9 +120,9 @@ EXAMPLE = Balance(every=10, beats=28, decimals=4)
 
 
 def delfly() -> Vehicle:
-    """The vehicle of Armanini et al. (2016, Table 3) with the wing motion of Table 5 and Eqs. 17, 20, 21.
+    """Return the vehicle of Armanini et al. (2016, Table 3) with the wing motion of Table 5 and Eqs. 17, 20, 21.
 
-    Root and tip chord as printed; the chord at half span is chosen so that a pair of wings has the area of Table 3,
+    Root and tip chord are as printed; the chord at half span is chosen so that a pair of wings has the area of Table 3,
     2.11 dm^2. ``root_pitch`` is pi/2 (chord along the body): with the printed 0, the lift at 2 m/s is a third of the
     weight.
     """
@@ -131,14 +136,17 @@ def delfly() -> Vehicle:
 
 
 def blank_recording(condition: Condition, name: str = "blank", samples: int = 8) -> Recording:
-    """A recording of x and z over one beat without data, for simulating under ``condition``."""
+    """Return a recording of forces along x and z over one beat whose values are all missing (NaN).
+
+    It describes what to simulate: the ``condition`` and the instants, ``samples`` equal steps.
+    """
     times = np.arange(samples) / (samples * condition.flap_frequency)
     values = np.full((samples, 2), np.nan)
     return Recording(name, "wind_tunnel", condition, times, (), values, forces=("x", "z"))
 
 
 def true_beat(vehicle: Vehicle, trial: Trial) -> Array:
-    """Forces [n, 2] along x and z (N) over one beat, from the finely resolved model with the test's coefficients."""
+    """Simulate forces [n, 2] along body x and z (N) over one beat of ``trial``, with fine steps."""
     model = BladeElementWing(vehicle, elements=ELEMENTS, instants=INSTANTS)
     values = {gene.name: gene.nominal for gene in model.genes} | DRAG | trial.coefficients
     return np.asarray(model.beat([list(values.values())], blank_recording(trial.condition))[0])
@@ -146,7 +154,10 @@ def true_beat(vehicle: Vehicle, trial: Trial) -> Array:
 
 @one_blas_thread
 def record(beat: Array, trial: Trial, balance: Balance, rng: np.random.Generator) -> Recording:
-    """Record the forces ``beat`` [n, 2], in N over one beat, on the balance."""
+    """Simulate a recording of the balance, errors included.
+
+    ``beat`` [n, 2]: true forces along x and z (N) at n equal steps of one beat.
+    """
     frequency = trial.condition.flap_frequency
     lead = round(LEAD_IN * balance.rate / frequency)
     samples = math.ceil(balance.beats * balance.rate / frequency)
@@ -166,7 +177,10 @@ def record(beat: Array, trial: Trial, balance: Balance, rng: np.random.Generator
 def campaign(
     seed: int = 1, balance: Balance | None = None, trials: Sequence[Trial] = TRIALS, held_out: tuple[str, ...] = ()
 ) -> Dataset:
-    """Record ``trials`` on the balance; the same seed gives the same noise."""
+    """Record ``trials`` on the simulated balance; the same ``seed`` gives the same noise.
+
+    ``balance``: its errors (None: the defaults of :class:`Balance`); ``held_out``: names of recordings to hold out.
+    """
     vehicle = delfly()
     recordings = tuple(
         record(true_beat(vehicle, trial), trial, balance or Balance(), np.random.default_rng([seed, 3, k]))
@@ -177,20 +191,27 @@ def campaign(
 
 
 def write_campaign(path: Path, seed: int = 1, balance: Balance = EXAMPLE) -> Path:
-    """Write the small campaign to ``path`` (folder, .zip or .nc); returns the path of the true coefficients."""
+    """Record all trials and write the dataset to ``path`` (folder, .zip or .nc), the true coefficients next to it.
+
+    Returns the path of the JSON file with the true coefficients.
+    """
     truth = {trial.name: DRAG | trial.coefficients for trial in TRIALS}
     dataset = campaign(seed, balance, held_out=HELD_OUT)
     return save_with_truth(dataset, {"seed": seed, "coefficients": truth}, path)
 
 
 def read_truth(path: Path) -> dict[str, dict[str, float]]:
-    """True coefficients by recording, which :func:`write_campaign` wrote next to a dataset."""
+    """Read the true coefficients, by name of recording and gene, from the file that :func:`write_campaign` wrote."""
     truth: dict[str, dict[str, float]] = json.loads(path.read_text(encoding="utf-8"))["coefficients"]
     return truth
 
 
 def _by_beat(at: Array, memory: float, rng: np.random.Generator) -> Array:
-    """Unit noise [T] at ``at`` [T] (beats): one autoregressive value a beat (lag-1 ``memory``), linear in between."""
+    """Random values [T] of unit variance, one a beat and linear in between, at the times ``at`` [T] in beats.
+
+    The values at the beats' middles are first-order autoregressive noise; ``memory`` is the correlation of successive
+    ones.
+    """
     first = math.floor(at[0]) - 1
     beats = math.ceil(at[-1]) - first + 2
     white = rng.standard_normal(beats)
@@ -199,7 +220,10 @@ def _by_beat(at: Array, memory: float, rng: np.random.Generator) -> Array:
 
 
 def _measured(force: Array, axis: int, balance: Balance, rng: np.random.Generator) -> Array:
-    """The measured force [T] along an axis, N: the true ``force`` with resonance, drift and white noise added."""
+    """Force [T] (N) that the balance measures along ``axis`` (0: x, 1: z): ``force`` [T] plus all errors.
+
+    The errors are the resonance, which the force and vibrations excite, slow drift, and white noise.
+    """
     b, a = _resonator(balance.resonance[axis], balance.damping, balance.rate)
     spring_force = scipy.signal.lfilter(b, a, force - force[0]) + force[0]  # at rest under the first force
     rattle = scipy.signal.lfilter(b, a, rng.standard_normal(len(force)))
@@ -212,14 +236,17 @@ def _measured(force: Array, axis: int, balance: Balance, rng: np.random.Generato
 
 
 def _resonator(frequency: float, damping: float, rate: float) -> tuple[Array, Array]:
-    """Coefficients (b, a) of the digital filter from the force on a damped oscillator to the force in its spring."""
+    """Coefficients (b, a) of the digital filter from the force on a damped oscillator to the force in its spring.
+
+    ``frequency``: natural frequency, Hz; ``damping``: damping ratio; ``rate``: samples per second.
+    """
     omega = 2 * math.pi * frequency
     b, a = scipy.signal.bilinear([omega**2], [1.0, 2 * damping * omega, omega**2], fs=rate)
     return np.asarray(b), np.asarray(a)
 
 
 def _decimation_filtered(forces: Array, every: int) -> Array:
-    """Zero-phase anti-aliasing filter of ``forces`` [T, C] for decimation by ``every``."""
+    """Filter ``forces`` [T, C] against aliasing, without phase shift, before one of ``every`` samples is selected."""
     if every == 1:
         return forces
     return np.asarray(scipy.signal.sosfiltfilt(scipy.signal.butter(6, 0.8 / every, output="sos"), forces, axis=0))

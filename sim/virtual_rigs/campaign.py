@@ -1,9 +1,9 @@
-"""The virtual rig: the experiment of the thesis (Appendix A) on a simulated wing, written as a dataset.
+"""The experiment of the thesis (Appendix A) on a simulated wing, written as a dataset.
 
-The cameras take stroboscopic frames at slightly more than a multiple of the flap frequency, so that each frame is from
-another phase; some markers are missing throughout, others for some frames; the noise is coloured by the tracker's
-Kalman filter. The trigger of the cameras is not part of the dataset, so the start of the beat must be determined from
-tracks.
+The cameras are stroboscopic: they take frames at slightly more than a multiple of the flap frequency, so that each
+frame shows another phase of the beat. Some markers are missing throughout, others in some frames; the noise is coloured
+by the tracker's Kalman filter. The instant at which the cameras are triggered is not part of the dataset, so the start
+of the beat must be determined from the tracks.
 """
 
 from __future__ import annotations
@@ -64,11 +64,11 @@ class Tracking:
     """Quality of the recorded tracks.
 
     Attributes:
-        noise: standard deviation along x, y, z, m (stereo depth is the worst).
+        noise: standard deviation along x, y, z, m (largest along z, the depth of the stereo cameras).
         memory: correlation of the noise from frame to frame.
         gap_rate: probability per frame that a gap of a marker starts.
-        gap_frames: mean length of such a gap.
-        beats: beats recorded, as they appear in the stroboscopic frames.
+        gap_frames: mean length of such a gap, frames.
+        beats: number of apparent beats recorded, those that the stroboscopic frames seem to show.
     """
 
     noise: tuple[float, float, float] = (4e-4, 4e-4, 6e-4)
@@ -79,12 +79,12 @@ class Tracking:
 
 
 def vacuum(pressure_mbar: float, lag: float, frequency: float) -> Condition:
-    """A condition in the vacuum chamber."""
+    """Condition in the vacuum chamber at 20 degrees C; ``lag`` of the rear rod in rad, ``frequency`` in Hz."""
     return Condition(frequency, lag, pressure_mbar * _MBAR, _ZERO_C + 20.0)
 
 
 def tunnel(lag: float, frequency: float, airspeed: float) -> Condition:
-    """A condition in the wind tunnel."""
+    """Condition in the wind tunnel; ``lag`` of the rear rod in rad, ``frequency`` in Hz, ``airspeed`` in m/s."""
     return Condition(frequency, lag, 1013.25 * _MBAR, _ZERO_C + 20.0, airspeed, _TUNNEL_INCIDENCE)
 
 
@@ -109,7 +109,10 @@ SMALL = (
 
 
 def robird_wing() -> Wing:
-    """A wing like the Robird's, driven by a four-bar linkage, with 49 markers denser to tip and trailing edge."""
+    """Return a wing like that of the Robird, driven by a four-bar linkage, with 49 markers.
+
+    The markers are closer to each other towards the tip and the trailing edge.
+    """
     stations = tuple(Station(*row) for row in _STATIONS)
     y, le, chord, thickness = (np.array(column) for column in zip(*_STATIONS, strict=True))
     u = (np.arange(7) + 0.5) / 7
@@ -139,20 +142,23 @@ def robird_wing() -> Wing:
 
 
 def true_genome(model: FlexibleWing, seed: int) -> Genome:
-    """A genome drawn log-uniformly between 0.55 and 1.8 times the estimates."""
+    """Draw a genome: each gene log-uniformly between 1 / 1.8 (0.55) and 1.8 times its estimate."""
     rng = np.random.default_rng([seed, 1])
     drawn = {gene.name: float(gene.nominal * 1.8 ** rng.uniform(-1.0, 1.0)) for gene in model.genes}
     return Genome.nominal(model.genes).replace(drawn)
 
 
 def read_truth(path: Path) -> Genome:
-    """The true genome that :func:`write_campaign` wrote next to a dataset."""
+    """Read the true genome from the file that :func:`write_campaign` wrote next to a dataset."""
     values: dict[str, float] = json.loads(path.read_text(encoding="utf-8"))["genome"]
     return Genome.nominal(FlexibleWing(robird_wing()).genes).replace(values)
 
 
 def blank_recording(wing: Wing, condition: Condition, name: str = "blank", frames: int = 8) -> Recording:
-    """A recording without data, for simulating under ``condition``."""
+    """Return a recording of all markers over one beat whose values are all missing (NaN).
+
+    It describes what to simulate: the ``condition`` and the instants, ``frames`` equal steps.
+    """
     times = np.arange(frames) / (frames * condition.flap_frequency)
     markers = tuple(m.name for m in wing.markers)
     rig: Rig = "wind_tunnel" if condition.airspeed > 0 else "vacuum_chamber"
@@ -171,7 +177,7 @@ def name_of(condition: Condition) -> str:
 def record(
     model: FlexibleWing, genome: Genome, condition: Condition, tracking: Tracking, rng: np.random.Generator
 ) -> Recording:
-    """Record tracks of the wing of ``genome`` under ``condition``."""
+    """Simulate the wing of ``genome`` under ``condition`` and return its recorded tracks, with noise and gaps."""
     blank = blank_recording(model.wing, condition)
     beat = model.beat(genome.values, blank)
     if beat.reason:
@@ -190,7 +196,10 @@ def record(
 
 
 def _sample(tracks: Array, beats: Array) -> Array:
-    """Periodic tracks [n, M, 3] at times in beats, [T, M, 3], by their full Fourier series."""
+    """Evaluate periodic ``tracks`` [n, M, 3], n equal steps of a beat, at the times ``beats`` [T]; returns [T, M, 3].
+
+    The full Fourier series of the tracks is used.
+    """
     n = len(tracks)
     series = np.fft.rfft(tracks, axis=0) / n
     series[1:] *= 2
@@ -199,7 +208,7 @@ def _sample(tracks: Array, beats: Array) -> Array:
 
 
 def _noise(shape: tuple[int, ...], tracking: Tracking, rng: np.random.Generator) -> Array:
-    """First-order autoregressive noise along the frames, some markers worse than others."""
+    """Noise [T, M, 3] (m), first-order autoregressive from frame to frame, larger for some markers than for others."""
     white = rng.standard_normal(shape)
     noise: Array = np.empty(shape)
     noise[0] = white[0]
@@ -210,7 +219,7 @@ def _noise(shape: tuple[int, ...], tracking: Tracking, rng: np.random.Generator)
 
 
 def _gaps(shape: tuple[int, ...], tracking: Tracking, rng: np.random.Generator) -> Mask:
-    """True where a marker is hidden: bursts of geometrically distributed length."""
+    """True [T, M] where a marker is not recorded: gaps whose lengths have a geometric distribution."""
     lost = np.zeros(shape, bool)
     for t, m in zip(*np.nonzero(rng.uniform(size=shape) < tracking.gap_rate), strict=True):
         lost[t : t + rng.geometric(1 / tracking.gap_frames), m] = True
@@ -225,7 +234,11 @@ def campaign(
     tracking: Tracking | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> tuple[Dataset, Genome]:
-    """Record a campaign; returns it with the true genome. ``small``: ten recordings, else all 72 of the thesis."""
+    """Simulate a campaign; return the dataset and the true genome.
+
+    ``division``: discretisation of the true wing. ``small``: ten recordings; otherwise the 72 of the thesis.
+    ``progress`` is called after each recording with the completed fraction.
+    """
     model = FlexibleWing(robird_wing(), division, numerics=REFERENCE)
     truth = true_genome(model, seed)
     plan, recordings, held_out = SMALL if small else FULL, [], []
@@ -248,6 +261,9 @@ def write_campaign(
     seed: int = 1,
     progress: Callable[[float], None] | None = None,
 ) -> Path:
-    """Write a campaign to ``path`` (folder, .zip or .nc); returns the path of the true genome next to it."""
+    """Simulate a campaign and write it to ``path`` (folder, .zip or .nc), the true genome next to it.
+
+    Returns the path of the JSON file with the true genome. The other arguments are those of :func:`campaign`.
+    """
     dataset, truth = campaign(division=division, small=small, seed=seed, progress=progress)
     return save_with_truth(dataset, {"division": division, "seed": seed, "genome": truth.as_dict()}, path)

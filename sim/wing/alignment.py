@@ -1,8 +1,9 @@
-"""The start of the beat: where the reference markers cross the horizontal on the upstroke (thesis IV-A), interpolated.
+"""The start of the beat: where the reference markers cross the height of the hinge on the upstroke (thesis IV-A).
 
-Tracks are compared at equal phase of the beat, so the crossing must be known to a fraction of a frame: at the tip, a
-phase error of 0.01 rad is millimetres. A Fourier series of a few harmonics is fitted to the heights of the reference
-markers and averaged; its crossing is the start of the beat, in recordings and in simulations alike.
+Tracks are compared at equal phase of the beat, so the crossing must be known to a fraction of a frame: a phase error of
+0.01 rad displaces the wing tip by millimetres. A Fourier series of a few harmonics is fitted to the heights of the
+reference markers and averaged over the markers. Its crossing is the start of the beat, in recordings and in simulations
+alike.
 """
 
 from __future__ import annotations
@@ -22,9 +23,9 @@ _CACHE = WeakKeyDictionary[Recording, dict[tuple[tuple[str, ...], float], float]
 
 
 def reference_columns(wing: Wing, recording: Recording) -> list[int]:
-    """Indices of those reference markers of the recording that have enough samples to determine the start of the beat.
+    """Indices, in ``recording.markers``, of the reference markers with enough samples to locate the start of a beat.
 
-    All reference markers for a recording without data. ValueError if there are none.
+    For a recording without data, of all reference markers. ValueError if there are none.
     """
     needed = 2 * (2 * REFERENCE_HARMONICS + 1) if recording.valid.any() else 0
     found = [
@@ -43,9 +44,9 @@ def reference_columns(wing: Wing, recording: Recording) -> list[int]:
 
 @one_blas_thread
 def recorded_crossing(wing: Wing, recording: Recording) -> float:
-    """Phase 2 pi f t (rad) at which the recorded reference crosses the hinge height on the upstroke.
+    """Phase 2 pi f t (rad) at which the reference markers of ``recording`` cross the hinge height on the upstroke.
 
-    0 for a recording without data, which is made to simulate a condition.
+    0 for a recording without data, which only describes what to simulate. ValueError if they never cross.
     """
     known, key = _CACHE.setdefault(recording, {}), (wing.reference_markers, wing.hinge.z)
     if key not in known:
@@ -75,9 +76,9 @@ def _crossing(wing: Wing, recording: Recording) -> float:
 
 
 def upstroke_crossing(series: Complex, level: float) -> Array:
-    """Phase (rad) at which Re sum_k series[:, k] exp(i k psi) rises through ``level``; NaN where it does not.
+    """Phases psi [B] (rad) at which Re sum_k series[:, k] exp(i k psi) rises through ``level``; NaN where it does not.
 
-    ``series`` has shape [B, K + 1]. Newton's method from the crossing of the first harmonic alone.
+    ``series`` [B, K + 1]. Newton's method is used, starting at the crossing of mean and first harmonic alone.
     """
     k = np.arange(series.shape[1])
     first = np.abs(series[:, 1])

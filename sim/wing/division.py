@@ -16,7 +16,11 @@ class Division:
 
     @classmethod
     def parse(cls, text: str) -> Division:
-        """Read a preset ("4", "11", "24"), "STRIPSxCHORDWISE" ("6x4") or a list ("3,3,3,2")."""
+        """Read a discretisation from text; ValueError if it is not valid.
+
+        ``text`` is a preset ("4", "11", "24"), strips x bodies along the chord ("6x4"), or the number of bodies of each
+        strip from the root ("3,3,3,2").
+        """
         if text in PRESETS:
             return cls(PRESETS[text])
         try:
@@ -45,5 +49,5 @@ class Division:
         return sum(self.bodies)
 
     def index(self, strip: int, chordwise: int) -> int:
-        """Index of a body: strips from the root, within a strip from the leading edge."""
+        """Index of body ``chordwise`` (0 at the leading edge) of ``strip`` (0 at the root) among all bodies."""
         return sum(self.bodies[:strip]) + chordwise

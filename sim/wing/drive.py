@@ -1,4 +1,4 @@
-"""Flap angle of the driving rods over the beat, with its derivatives."""
+"""Flap angle of the two driving rods over the beat, with its derivatives."""
 
 from __future__ import annotations
 
@@ -16,29 +16,32 @@ _HARMONICS = 40
 
 @dataclass
 class RodDrive:
-    """Flap angles of the front and the rear rod for W individuals, as series of the drive phase.
+    """Flap angles of the front and the rear rod for W individuals, as Fourier series of the drive phase psi.
 
-    ``series`` [K + 1, 2, W]: angle = Re sum_k series_k exp(i k psi), with the lag of the rear rod included.
+    ``series`` [K + 1, 2, W] (harmonics, rods, individuals): angle = Re sum_k series_k exp(i k psi) in rad, where the
+    series of the rear rod includes its lag.
     """
 
     series: Complex
 
     @classmethod
     def of(cls, drive: Drive, lag: float, lanes: int) -> RodDrive:
-        """The drive of a wing whose rear rod lags by ``lag`` (rad); the same for all ``lanes``."""
+        """Make the angles for ``lanes`` individuals, all with the same ``drive`` and ``lag`` (rad) of the rear rod."""
         series = drive.series if isinstance(drive, FourierDrive) else _four_bar_series(drive)
         both = np.stack([series, series * np.exp(-1j * lag * np.arange(len(series)))], axis=1)
         return cls(np.repeat(both[:, :, None], lanes, axis=2))
 
     def lengthened(self, harmonics: int) -> None:
-        """Extend the series with zeros to at least ``harmonics`` harmonics."""
+        """Extend the series in place, by zeros, to at least ``harmonics`` harmonics."""
         added = max(harmonics + 1 - len(self.series), 0)
         self.series = np.concatenate([self.series, np.zeros((added, *self.series.shape[1:]))])
 
     def angles(self, psi: Array) -> Array:
-        """[..., 2, 5, W]: angle (rad) and its first four derivatives by the drive phase ``psi`` [...] (rad).
+        """Return the angles [..., 2, 5, W] at the drive phases ``psi`` [...] (rad).
 
-        Each distinct series is evaluated once and separately, so that results do not depend on the other individuals.
+        The last axes are the rod (front, rear), the order of the derivative by the phase (0 to 4; angle in rad), and
+        the individual. Each distinct series is evaluated separately, so that results do not depend on the other
+        individuals.
         """
         phases = np.asarray(psi, float).tobytes()
         lanes = [self.series[:, :, w].tobytes() for w in range(self.series.shape[2])]
@@ -48,7 +51,10 @@ class RodDrive:
 
 @lru_cache(maxsize=64)
 def _angles(phases: bytes, both: bytes) -> Array:
-    """Angle and its first four derivatives by phase [T, 2, 5] of both rods; arguments are bytes, to be cached."""
+    """Angle and its first four derivatives by phase [T, 2, 5] of front and rear rod at T phases.
+
+    ``phases``: bytes of the phases [T] (rad), ``both``: bytes of the series [K + 1, 2]; bytes can be keys of the cache.
+    """
     series = np.frombuffer(both, np.complex128).reshape(-1, 2)
     turn = _turns(phases, len(series))
     order = (1j * np.arange(len(series))) ** np.arange(5)[:, None]
@@ -62,12 +68,15 @@ def _angles(phases: bytes, both: bytes) -> Array:
 
 @lru_cache(maxsize=4)
 def _turns(phases: bytes, terms: int) -> Complex:
-    """exp(i k psi) [T, terms], k = 0, 1, ..., at the phases psi (rad) whose bytes are ``phases``."""
+    """exp(i k psi) [T, terms], k = 0, 1, ..., at T phases psi (rad), given as the bytes of their array."""
     return np.asarray(np.exp(1j * np.arange(terms) * np.frombuffer(phases)[:, None]))
 
 
 def flap_angle(drive: Drive, psi: ArrayLike) -> Array:
-    """[..., 4]: angle (rad) and its first three derivatives by the drive phase ``psi`` (rad)."""
+    """Angle of the front rod (rad) and its first three derivatives by the drive phase, [..., 4].
+
+    ``psi`` [...]: drive phases, rad.
+    """
     series = RodDrive.of(drive, 0.0, 1).series[:, 0, 0]
     order = 1j * np.arange(len(series))
     wave = series * np.exp(order * np.asarray(psi, float)[..., None])
@@ -75,10 +84,11 @@ def flap_angle(drive: Drive, psi: ArrayLike) -> Array:
 
 
 def four_bar_angle(linkage: FourBarDrive, psi: ArrayLike) -> Array:
-    """Rocker angle (rad, with the linkage's offset) for crank angle ``psi``.
+    """Rocker angle (rad, the offset of the linkage included) at crank angles ``psi`` (rad).
 
-    The crank turns about the origin, the rocker about (ground, 0); the rocker's tip is an intersection of the
-    circles of the coupler about the crank pin and of the rocker about its pivot, that of the open linkage.
+    The crank turns about the origin, the rocker about (ground, 0). The tip of the rocker is where the circle of the
+    coupler about the crank pin meets that of the rocker about its pivot; of the two intersections, that of the open
+    linkage. ValueError if the linkage cannot turn a full revolution.
     """
     phase = np.asarray(psi, float)
     px, py = linkage.crank * np.cos(phase), linkage.crank * np.sin(phase)
@@ -96,7 +106,10 @@ def four_bar_angle(linkage: FourBarDrive, psi: ArrayLike) -> Array:
 
 @lru_cache(maxsize=64)
 def _four_bar_series(linkage: FourBarDrive) -> Complex:
-    """Series [K + 1] of the rocker angle, exact to round-off for usual linkages, where they decrease fast."""
+    """Fourier series [K + 1] of the rocker angle over the crank angle: angle = Re sum_k series_k exp(i k psi), rad.
+
+    It is exact to round-off for usual linkages, whose coefficients decrease fast.
+    """
     psi = 2 * np.pi * np.arange(_SAMPLES) / _SAMPLES
     series = np.fft.rfft(four_bar_angle(linkage, psi))[: _HARMONICS + 1] / _SAMPLES
     series[0] = series[0].real

@@ -1,4 +1,4 @@
-"""The flexible wing as a model: from genomes to marker tracks, sampled and aligned like a recording."""
+"""The flexible wing as a model: from genomes to marker tracks, with the instants and the phase of a recording."""
 
 from __future__ import annotations
 
@@ -48,13 +48,17 @@ _HARMONICS = 30  # of the periodic tracks; higher ones are below the integrator'
 
 @dataclass(frozen=True)
 class FlexibleWing:
-    """Multi-body wing driven by two rods (thesis III) for markers seen by cameras.
+    """Wing of rigid bodies and springs, driven by two rods (thesis III), whose markers are recorded by cameras.
 
-    ``division`` is the discretisation, as text for :meth:`wingfit.sim.wing.division.Division.parse`; genes are bounded
-    by ``bounds_factor`` around the wing's estimates. ``effects`` are names of
-    :data:`wingfit.sim.effects.registry.EFFECTS`; their genes are appended, then those of ``probe``, a known load.
-    ``near`` are values of the wing's own genes: the periodic motion of that genome is the warm start for all
-    individuals.
+    Attributes:
+        wing: description of the wing.
+        division: discretisation, as text for :meth:`wingfit.sim.wing.division.Division.parse`.
+        bounds_factor: ratio of each gene's upper bound to the wing's estimate, and of the estimate to the lower bound.
+        numerics: settings of the solver.
+        effects: names of :data:`wingfit.sim.effects.registry.EFFECTS`; their genes follow the wing's own.
+        probe: a known load, whose genes come last; None: no load.
+        near: values of the wing's own genes. The periodic motion of this genome is the warm start of all individuals.
+        Empty: every simulation starts from rest.
     """
 
     wing: Wing
@@ -74,26 +78,26 @@ class FlexibleWing:
 
     @cached_property
     def genes(self) -> tuple[Gene, ...]:
-        """Structural genes (thesis Eq. 18), aerodynamic genes (Eq. 19), then those of the effects."""
+        """Structural genes (thesis Eq. 18), aerodynamic genes (Eq. 19), then those of the effects and the probe."""
         own = wing_genes(self.wing.estimates, self.bounds_factor)
         return (*own, *(gene for effect in self.chosen for gene in effect.genes(self.wing)))
 
     @cached_property
     def chosen(self) -> tuple[Effect, ...]:
-        """The effects in the order in which they act, that of the probe included."""
+        """The effects in the order in which they act, followed by those of the probe."""
         known = self.probe.effects() if self.probe else ()
         return (*chosen(self.effects, self.wing), *known)
 
     def with_effects(self, *names: str) -> FlexibleWing:
-        """The same wing with more effects; their genes are appended, switched off."""
+        """Return the same wing with more effects, which are switched off; their genes are appended."""
         return self._share_structure(replace(self, effects=(*self.effects, *names)))
 
     def beside(self, genome: ArrayLike) -> FlexibleWing:
-        """The same wing, whose simulations start at the periodic motion of ``genome`` [G] without effects."""
+        """Return the same wing, whose simulations start from the periodic motion of ``genome`` [G] without effects."""
         return self._share_structure(replace(self, near=tuple(np.asarray(genome, float)[:_OWN_GENES].tolist())))
 
     def _share_structure(self, other: FlexibleWing) -> FlexibleWing:
-        """Return ``other``, of the same wing and division, after giving it the structures built for this one."""
+        """Return ``other``, a model of the same wing and division, after giving it this model's structures."""
         for name in ("structure", "_structure_in_air"):
             if name in self.__dict__:
                 other.__dict__[name] = self.__dict__[name]
@@ -101,21 +105,24 @@ class FlexibleWing:
 
     @property
     def searched(self) -> tuple[str, ...]:
-        """Names of the genes that a calibration estimates: all."""
+        """Names of the genes that a calibration estimates: all genes."""
         return tuple(gene.name for gene in self.genes)
 
     @cached_property
     def structure(self) -> Structure:
-        """Bodies and connectors."""
+        """The bodies and connectors of the discretised wing."""
         return build(self.wing, Division.parse(self.division))
 
     @cached_property
     def _structure_in_air(self) -> Structure:
-        """As :attr:`structure`, with matrix blocks between all bodies of a strip, which added mass couples."""
+        """The structure, with matrix blocks between all bodies of a strip, which added mass couples."""
         return build(self.wing, Division.parse(self.division), whole_strips=True)
 
     def subject(self, effects: tuple[Effect, ...], condition: Condition) -> Subject:
-        """What the solver needs for a simulation with these effects on: structure, condition and scene of genomes."""
+        """Return what the solver needs to simulate the wing with ``effects`` on, under ``condition``.
+
+        That is the structure, the condition, and a function that makes the kernels' inputs from up to LANES genomes.
+        """
         moves_air = any(effect.port == "inertia" and effect.family == "aerodynamics" for effect in effects)
         structure = self._structure_in_air if moves_air else self.structure
 
@@ -130,21 +137,25 @@ class FlexibleWing:
         return Subject(structure, condition, scene)
 
     def switched_on(self, genome: Array) -> tuple[Effect, ...]:
-        """The effects on the wing itself, not on the observation, that are on in ``genome`` [G]."""
+        """The effects that are on in ``genome`` [G] and act on the wing itself, not on its observation by cameras."""
         return tuple(e for e in self.chosen if e.wing and e.on(self.genes, genome[None])[0])
 
     @one_blas_thread
     def beats(self, genomes: ArrayLike, recording: Recording, *, with_motion: bool = False) -> tuple[Beat, ...]:
         """One periodic beat of each of ``genomes`` [B, G] under the recording's condition, with loads and energies.
 
-        Individuals with the same effects on are simulated together; effects that are off are omitted. Individuals that
-        differ only in effects of the observation share one beat.
+        With ``with_motion``, the motion of all bodies is included. Individuals with the same effects on are simulated
+        together; effects that are off are omitted. Individuals that differ only in effects of the observation share one
+        beat.
         """
         beats, wing = self._beats(genome_batch(self.genes, genomes), recording, with_motion)
         return tuple(beats[k] for k in wing)
 
     def _beats(self, batch: Array, recording: Recording, with_motion: bool) -> tuple[list[Beat], Index]:
-        """A beat of each distinct wing, and for each individual [B] of ``batch`` the index of its beat."""
+        """Simulate a beat of each distinct wing in ``batch`` [B, G].
+
+        Returns the beats, and the index [B] of each individual's beat among them.
+        """
         first, wing = _distinct(self._acting(batch, [effect for effect in self.chosen if effect.wing]))
         wings, found = batch[first], dict[int, Beat]()
         for effects, rows in by_active([effect for effect in self.chosen if effect.wing], self.genes, wings):
@@ -164,7 +175,7 @@ class FlexibleWing:
         return self._plain_key, condition, genome[:_OWN_GENES].tobytes()
 
     def _start_near(self, condition: Condition) -> Course | None:
-        """The periodic solution of the genome ``near`` under ``condition``, as warm start; None if it fails."""
+        """Periodic solution of the genome ``near`` under ``condition``, used as warm start; None if it fails."""
         wing, key = self._plain_wing, (self._plain_key, condition)
         if key not in _STARTS:
             found = settled_course(wing.subject((), condition), np.array(self.near), self.numerics)
@@ -180,7 +191,10 @@ class FlexibleWing:
         return pickle.dumps(self._plain_wing, 5)
 
     def _acting(self, batch: Array, effects: Sequence[Effect]) -> Array:
-        """``batch`` [B, G] with zeros for the genes of effects that are off or are not in ``effects``."""
+        """Copy of ``batch`` [B, G] with zeros for genes of effects that do not act on an individual.
+
+        These are effects that are off in the individual's genome, and all that are not listed in ``effects``.
+        """
         plain = np.zeros_like(batch)
         plain[:, :_OWN_GENES] = batch[:, :_OWN_GENES]
         place = {gene.name: k for k, gene in enumerate(self.genes)}
@@ -191,16 +205,17 @@ class FlexibleWing:
         return plain
 
     def beat(self, genome: ArrayLike, recording: Recording, *, with_motion: bool = False) -> Beat:
-        """As :meth:`beats`, for a single genome [G]."""
+        """Simulate a beat of a single ``genome`` [G]; see :meth:`beats`."""
         (found,) = self.beats(np.asarray(genome, float)[None], recording, with_motion=with_motion)
         return found
 
     @one_blas_thread
     def observe(self, genomes: ArrayLike, recording: Recording) -> Observation:
-        """Tracks [B, T, C] of ``genomes`` [B, G] at the recording's frames.
+        """Simulated marker positions [B, T, C] of ``genomes`` [B, G] at the recording's frames, C as in the recording.
 
-        Beats are aligned by the upstroke crossing. Tracking noise makes a small error of that phase, which is then
-        fitted, since the trigger of the cameras is unknown (docs/decisions/0001).
+        Simulated and recorded beats are aligned where the reference markers cross the hinge height on the upstroke.
+        Tracking noise makes a small error of this phase, which is then fitted, since the trigger of the cameras is
+        unknown (docs/decisions/0001).
         """
         whole = genome_batch(self.genes, genomes)
         first, same = _distinct(self._acting(whole, self.chosen))
@@ -224,9 +239,11 @@ class FlexibleWing:
     def _observed(
         self, batch: Array, recording: Recording, beats: Sequence[Beat], wing: Index
     ) -> tuple[Complex, Array, Array]:
-        """Observation of the beats by the cameras: series [B, K + 1, C], instants [B, T] (s), added errors [B, T, C].
+        """Apply the effects of cameras and tracking to the ``beats``.
 
-        ``wing`` [B]: index of each individual's beat in ``beats``.
+        ``wing`` [B]: index of each individual's beat in ``beats``. Returns Fourier series [B, K + 1, C] of the recorded
+        coordinates over the beat (m), the instants [B, T] of the frames (s), and errors [B, T, C] to add after sampling
+        (m).
         """
         names = [marker.name for marker in self.wing.markers]
         columns = [names.index(name) for name in recording.markers]
@@ -246,33 +263,34 @@ class FlexibleWing:
 
 
 def _distinct(rows: Array) -> tuple[Index, Index]:
-    """Indices of the distinct rows, and for every row the position of its equal among them; compared bit for bit."""
+    """Indices of the distinct ``rows``, and for every row the position of its equal among these (bit for bit)."""
     first = dict[bytes, int]()
     kinds = [first.setdefault(row.tobytes(), len(first)) for row in rows]
     return np.unique(kinds, return_index=True)[1], np.array(kinds, np.intp)
 
 
 def _remember(known: OrderedDict[Key, Value], key: Key, value: Value, most: int) -> None:
-    """Store ``value``, and remove the oldest values beyond ``most``."""
+    """Store ``value`` under ``key`` in ``known``, and remove the oldest entries beyond ``most``."""
     known[key] = value
     while len(known) > most:
         known.popitem(last=False)
 
 
 def _on_grid(tracks: Array) -> Array:
-    """Periodic tracks [n, M, 3] at _GRID equal steps, from their first _HARMONICS harmonics."""
+    """Resample periodic ``tracks`` [n, M, 3] at _GRID equal steps, from their first _HARMONICS harmonics."""
     series = _series(tracks.reshape(len(tracks), -1))
     series[1:] *= 0.5
     return np.asarray(np.fft.irfft(series * _GRID, _GRID, axis=0)).reshape(_GRID, *tracks.shape[1:])
 
 
 def _aligned_values(series: Complex, since: Array, own: Array, recorded: Array) -> Array:
-    """Values [B, T, C] of ``series`` [B, K + 1, C] at phases ``since`` [B, T] plus ``own`` [B] plus a fit (rad).
+    """Values [B, T, C] of the Fourier ``series`` [B, K + 1, C] of B individuals at the frames of a recording.
 
-    A common phase shift of each individual is fitted to ``recorded`` [T, C] by two Gauss-Newton steps; noise makes a
-    shift of about a thousandth of a radian. It is limited to MAX_SHIFT, so that a larger one remains visible as misfit.
-
-    The shift is applied to the series, so that the sines and cosines of the frames can be shared by individuals.
+    The phase (rad) at a frame is ``since`` [B, T], since the recorded crossing, plus ``own`` [B], the simulated
+    crossing, plus a common shift of each individual. Two Gauss-Newton steps fit the shift to ``recorded`` [T, C]; noise
+    makes a shift of about a thousandth of a radian. Each step is limited to MAX_SHIFT, so that a larger shift remains
+    visible as misfit. The series is shifted, not the frames, so that individuals can share the sines and cosines of the
+    frames.
     """
     weight = np.isfinite(recorded).astype(float)
     target = np.where(np.isfinite(recorded), recorded, 0.0)
@@ -286,9 +304,10 @@ def _aligned_values(series: Complex, since: Array, own: Array, recorded: Array) 
 
 
 def _fitted(waves: Array, series: Complex, target: Array, weight: Array) -> Array:
-    """Values [T, C] of one ``series`` [K + 1, C], shifted in phase to fit ``target`` [T, C] with ``weight`` [T, C].
+    """Values [T, C] of one ``series`` [K + 1, C], shifted in phase to fit ``target`` [T, C] by weighted least squares.
 
-    ``waves`` [T, 2 (K + 1)]: cosines, then sines, of the frames' phases.
+    ``weight`` [T, C]: 1 where recorded, 0 elsewhere. ``waves`` [T, 2 (K + 1)]: cosines, then sines, of k times the
+    phase of each frame, k = 0 .. K.
     """
     order = 1j * np.arange(len(series))[:, None]
     for _ in range(2):
@@ -300,17 +319,23 @@ def _fitted(waves: Array, series: Complex, target: Array, weight: Array) -> Arra
 
 
 def _turned(series: Complex, phase: float) -> Complex:
-    """The ``series`` [K + 1, C] shifted ahead by ``phase`` (rad)."""
+    """Fourier ``series`` [K + 1, C] of the same functions, advanced in phase by ``phase`` (rad)."""
     return np.asarray(series * np.exp(1j * np.arange(len(series)) * phase)[:, None])
 
 
 def _parts(series: Complex) -> Array:
-    """Coefficients [2 (K + 1), C] of cosines, then sines: Re s exp(i x) = Re s cos x - Im s sin x."""
+    """Real coefficients [2 (K + 1), C] of ``series`` [K + 1, C]: of cosines, then of sines.
+
+    Re s exp(i x) = Re s cos x - Im s sin x.
+    """
     return np.concatenate([series.real, -series.imag])
 
 
 def _series(samples: Array) -> Complex:
-    """Fourier series [_HARMONICS + 1, C] of periodic samples [n, C]: value(psi) = Re sum_k series_k exp(i k psi)."""
+    """Fourier series [_HARMONICS + 1, C] of periodic ``samples`` [n, C] over a beat.
+
+    value(psi) = Re sum_k series_k exp(i k psi) at the drive phase psi.
+    """
     n = len(samples)
     used = min(_HARMONICS, (n - 1) // 2) + 1
     series = np.zeros((_HARMONICS + 1, samples.shape[1]), np.complex128)

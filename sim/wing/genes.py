@@ -1,4 +1,4 @@
-"""The genes of the flexible wing (thesis Eqs. 18 and 19) and the inputs of the kernel that follow from them."""
+"""The genes of the flexible wing (thesis Eqs. 18 and 19), and the inputs of the kernels that are computed from them."""
 
 from __future__ import annotations
 
@@ -48,12 +48,16 @@ AERODYNAMIC = (*(row[0] for row in _AERODYNAMICS), *_WEIGHTS)
 
 
 def group(name: str) -> Group:
-    """Whether a gene belongs to the structure or to the aerodynamics."""
+    """Tell whether the gene called ``name`` belongs to the structure or to the aerodynamics."""
     return "structure" if name in STRUCTURAL else "aerodynamics"
 
 
 def wing_genes(estimates: Mapping[str, float], factor: float = FACTOR) -> tuple[Gene, ...]:
-    """All genes, bounded by ``factor`` around the estimates; EstimateError for an unknown or implausible estimate."""
+    """All genes of the wing, each bounded by its nominal value divided and multiplied by ``factor``.
+
+    ``estimates``: nominal values by name, which replace defaults. EstimateError if a name is unknown or a value
+    implausible (wrong by a factor of UNIT_SLIP).
+    """
     rows = [*_STRUCTURE, *_AERODYNAMICS]
     for prefix, what in (("L", "lift"), ("ID", "induced drag")):
         for k, share in enumerate(_SHARES, 1):
@@ -76,9 +80,9 @@ def wing_genes(estimates: Mapping[str, float], factor: float = FACTOR) -> tuple[
 
 
 def lanes(structure: Structure, genes: tuple[Gene, ...], genomes: Array) -> Lanes:
-    """Inputs of the kernels for up to LANES genomes [B, G]: stiffness, damping, air coefficients; no effects.
+    """Inputs of the kernels for up to LANES ``genomes`` [B, G]: stiffness, damping, air coefficients; no effects.
 
-    Spare lanes repeat the last genome.
+    Kernels always compute LANES individuals; unused lanes repeat the last genome.
     """
     column = {gene.name: k for k, gene in enumerate(genes)}
     padded = genomes[np.minimum(np.arange(LANES), len(genomes) - 1)]
@@ -108,10 +112,10 @@ def lanes(structure: Structure, genes: tuple[Gene, ...], genomes: Array) -> Lane
 
 
 def _distribute(structure: Structure, quarters: Array) -> tuple[Array, Array]:
-    """Share [N, W] of the strip's force on each body, and its point of action along the chord [N, W] in the body frame.
+    """Share [N, W] of the strip's force that acts on each of N bodies, and its x [N, W] in the body's frame, m.
 
-    The genes ``quarters`` are the shares of four quarters of the chord. A body bears the part of each quarter that it
-    covers, at the middle of that part.
+    ``quarters`` [4, W]: share of the force on each quarter of the chord, for W individuals. A body carries the part of
+    each quarter that it covers, at the middle of that part.
     """
     share, moment = np.zeros((len(structure.panels), LANES)), np.zeros((len(structure.panels), LANES))
     for body, quarter, width, x in structure.stretches:

@@ -1,7 +1,7 @@
 """Load recovery: loads, powers and energies of one wing from the motion of its bodies over one beat.
 
-The forces are computed by the integrator's own compiled functions. Their lanes, elsewhere eight individuals, hold here
-eight instants of one individual.
+The forces are computed by the compiled functions of the integrator. Their vectors, which hold eight individuals
+elsewhere, hold eight instants of one individual here.
 """
 
 from __future__ import annotations
@@ -29,9 +29,11 @@ RODS = ("front rod", "rear rod")
 
 
 def from_motion(scene: WingScene, motion: State, crossing: float = 0.0) -> Outputs:
-    """Outputs of ``motion`` (R [n, N+2, 9], p [n, N+2, 3], V [n, N+2, 6], z [n, Z]) of the individual in ``scene``.
+    """Compute the outputs of one individual from its ``motion`` over a beat, at n equal steps.
 
-    All lanes of the scene must be that individual with its effects, since lanes are used for instants.
+    ``motion``: rotations R [n, N + 2, 9], positions p [n, N + 2, 3] and twists V [n, N + 2, 6] of N bodies and two
+    rods, and the effects' states z [n, Z]. All lanes of ``scene`` must be this individual with its effects, since lanes
+    are used for instants. ``crossing``: drive phase (beats) at which the recorded beat starts.
     """
     structure, n = scene.structure, len(motion.V)
     sums = _Sums(structure, n)
@@ -55,7 +57,7 @@ def from_motion(scene: WingScene, motion: State, crossing: float = 0.0) -> Outpu
 
 
 class _Sums:
-    """Results of all instants (first axis n), as :class:`Outputs` has them, filled group by group."""
+    """Arrays for the results at all instants (first axis n), filled group by group; see :class:`Outputs`."""
 
     def __init__(self, structure: Structure, n: int) -> None:
         bodies, connectors, strips = len(structure.bodies), len(structure.connectors), len(structure.division.bodies)
@@ -69,14 +71,17 @@ class _Sums:
 
 
 class _Parts(NamedTuple):
-    """Inputs of the kernels for the wing: ``wiring``, the condition ``here`` and the ``lanes``."""
+    """Inputs of the kernels: ``wiring`` of the wing, the condition ``here``, and ``lanes`` of the individual."""
 
     wiring: Wiring
     here: Setting
     lanes: Lanes
 
     def alone(self, c: int) -> tuple[_Parts, Index]:
-        """The wing with connector ``c`` and its laws only, and the indices of its states."""
+        """Inputs for a massless wing whose only connector is ``c``, with the effects on this connector.
+
+        Also returned: the indices of these effects' states.
+        """
         w, group, none = self.wiring, self.lanes, np.zeros(0, np.int64)
         one, count = slice(c, c + 1), len(w.first)
         wiring = w._replace(
@@ -101,7 +106,10 @@ class _Parts(NamedTuple):
 
 
 def _groups(motion: State) -> Iterator[tuple[Index, State]]:
-    """Groups of LANES instants: their indices, and their state with the instant as last axis, spare lanes filled."""
+    """Split the motion into groups of LANES instants; yield the indices of each group and its state.
+
+    The last axis of the state is the instant. In the last group, unused lanes repeat the last instant.
+    """
     n = len(motion.V)
     for start in range(0, n, LANES):
         rows = np.arange(start, min(start + LANES, n))
@@ -115,7 +123,10 @@ def _put(work: Work, state: State) -> None:
 
 
 def _connector(parts: _Parts, c: int, groups: list[tuple[Index, State]], sums: _Sums) -> None:
-    """Set the loads of connector ``c`` in ``sums``: the integrator's forces of a wing that has no other connector."""
+    """Set the loads of connector ``c`` in ``sums``: the integrator's forces on a wing that has no other connector.
+
+    ``groups`` as from :func:`_groups`.
+    """
     alone, own = parts.alone(c)
     work, w, twist = new_work(*alone), alone.wiring, np.zeros((1, 6, LANES))
     first = int(w.first[0])
@@ -134,7 +145,10 @@ def _connector(parts: _Parts, c: int, groups: list[tuple[Index, State]], sums: _
 
 
 def _air_and_energies(parts: _Parts, groups: list[tuple[Index, State]], sums: _Sums) -> None:
-    """Set air loads and energies in ``sums``: flow of the whole wing, forces strip by strip, effects at points."""
+    """Set air loads, loads of effects at points of the wing, kinetic and gravitational energy in ``sums``.
+
+    The flow is computed for the whole wing at once, the forces strip by strip. ``groups`` as from :func:`_groups`.
+    """
     w, here, group = parts
     work, n, solid = new_work(*parts), len(w.mass), group._replace(pairs=group.pairs[: group.weighing])
     kinetic, height = np.zeros(LANES), np.zeros(LANES)
@@ -166,9 +180,10 @@ def _air_and_energies(parts: _Parts, groups: list[tuple[Index, State]], sums: _S
 
 
 def _added_mass_loads(parts: _Parts, scene: WingScene, motion: State, sums: _Sums) -> None:
-    """Add the reaction -N q' of the added mass (`sim.kernels.masses`), with q' from the Fourier series of the beat.
+    """Add to ``sums`` the load -N q' of the air's added mass N on the wing (:mod:`wingfit.sim.kernels.masses`).
 
-    It is inertia in the integrator, but a load of the air on the wing.
+    The integrator treats it as inertia. q' is the time derivative, by a Fourier series of the beat, of the bodies'
+    velocity through the air along and about their axes in ``_NORMAL_MOTION``.
     """
     group, structure = parts.lanes, scene.structure
     if len(group.pairs) == group.weighing:
@@ -192,7 +207,10 @@ def _added_mass_loads(parts: _Parts, scene: WingScene, motion: State, sums: _Sum
 
 
 def _motor(parts: _Parts, motion: State, sums: _Sums, rod: int) -> Motor:
-    """Motor loads: the rods have no mass, so the motor balances the connectors, about the true axis of the hinge."""
+    """Motion and load of the motor of driving rod ``rod`` (0 front, 1 rear), about the hinge axis with its effects.
+
+    The rods have no mass, so that the motor's torque balances the connectors.
+    """
     hinge, row = parts.lanes.hinge[:, 0], len(parts.wiring.mass) + rod
     axis, off = hinge[:3], hinge[3:6]
     R, rate = motion.R[:, row].reshape(-1, 3, 3), motion.V[:, row, :3] @ axis
@@ -204,7 +222,10 @@ def _motor(parts: _Parts, motion: State, sums: _Sums, rod: int) -> Motor:
 
 
 def body_names(structure: Structure) -> list[str]:
-    """Names ``strip.body``, strips from the root, bodies from the leading edge; then those of the two driving rods."""
+    """Names ``strip.body`` of the bodies, both counted from 1, then of the driving rods.
+
+    Strips are counted from the root, bodies of a strip from the leading edge.
+    """
     counts = structure.division.bodies
     return [f"{s}.{k}" for s, count in enumerate(counts, 1) for k in range(1, count + 1)] + list(RODS)
 
@@ -230,7 +251,7 @@ def _strips(structure: Structure, sums: _Sums) -> tuple[Strip, ...]:
 
 
 def _sections(structure: Structure, motion: State, sums: _Sums) -> tuple[Section, ...]:
-    """Loads at the root and at every boundary between strips."""
+    """Loads through the root and through every boundary between strips, from ``sums``."""
     w, starts = structure.wiring, structure.wiring.strip_start
     edges = structure.planform.strips(structure.division)
     R = motion.R.reshape(*motion.R.shape[:2], 3, 3)
@@ -254,6 +275,6 @@ def _sections(structure: Structure, motion: State, sums: _Sums) -> tuple[Section
 
 
 def _nearest_rotation(mean: Array) -> Array:
-    """Rotations [n, 3, 3] nearest to mean rotation matrices: the orthogonal factor of their polar decomposition."""
+    """Rotations [n, 3, 3] nearest to ``mean`` [n, 3, 3]: the orthogonal factors of its polar decomposition."""
     U, _, Vt = np.linalg.svd(mean)
     return np.asarray(U @ Vt)

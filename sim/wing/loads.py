@@ -24,9 +24,11 @@ CLOSING = 0.01  # largest error of the energy balance, relative to the energy su
 
 @one_blas_thread
 def simulate_outputs(model: FlexibleWing, genome: Sequence[float], recording: Recording) -> Outputs:
-    """Simulate ``genome`` [G] under the recording's condition; ValueError with the reason if that fails.
+    """Simulate ``genome`` [G] under the recording's condition and return its loads.
 
-    The number of steps is raised until the energy balance of the beat closes to CLOSING, unless it was given.
+    The number of steps per beat is increased until the error of the beat's energy balance is at most CLOSING, relative
+    to the energy supplied, unless the number is given in ``model.numerics``. ValueError with the reason if the
+    simulation fails.
     """
     beat = _fine(model).beat(genome, recording, with_motion=True)
     if beat.reason is not None:  # perhaps with the accuracy that tracks need
@@ -55,7 +57,7 @@ def _outputs(model: FlexibleWing, genome: Sequence[float], recording: Recording,
 
 
 def _fine(model: FlexibleWing) -> FlexibleWing:
-    """The model with an accuracy of at least LOAD_ACCURACY, unless the number of steps is given.
+    """Return the model with an accuracy of at least LOAD_ACCURACY, unless its number of steps is given.
 
     Loads are small displacements times large stiffnesses, and losses are small compared to the energy exchanged in a
     beat: both need a higher accuracy than tracks.
@@ -67,9 +69,10 @@ def _fine(model: FlexibleWing) -> FlexibleWing:
 
 
 def crossing(model: FlexibleWing, recording: Recording, tracks: Array) -> float:
-    """Drive phase (beats) at which simulated ``tracks`` [n, M, 3] cross the mid-stroke upwards; 0 if they never do.
+    """Drive phase (beats) at which simulated ``tracks`` [n, M, 3] rise through the hinge height; 0 if they never do.
 
-    The same reference markers are used as for the recording, so that both phases agree; without data all of them.
+    The height is the mean of the reference markers that are used for ``recording``, so that both phases agree; of all
+    reference markers if the recording has too few data.
     """
     names = [marker.name for marker in model.wing.markers]
     try:

@@ -1,4 +1,7 @@
-"""Geometry and mass properties of the wing and of its panels."""
+"""Geometry and mass properties of the wing and of its panels, the pieces that are simulated as rigid bodies.
+
+In the wing frame, x points aft along the chord, y along the span from root to tip, z normal to the wing.
+"""
 
 from __future__ import annotations
 
@@ -30,7 +33,11 @@ class Panel:
 
 @dataclass(frozen=True)
 class Body:
-    """Rigid body: mass (kg), centre of mass (m, wing frame), inertia about it (kg m^2), planform area and centroid."""
+    """Mass properties of one rigid body, in the wing frame at rest.
+
+    ``mass`` (kg), ``centre`` of mass [3] (m), ``inertia`` [3, 3] about it (kg m^2), ``area`` of its planform (m^2) and
+    the ``centroid`` [3] of that area (m).
+    """
 
     mass: float
     centre: Array
@@ -40,7 +47,7 @@ class Body:
 
 
 class Planform:
-    """Interpolated leading edge, chord and thickness of a wing."""
+    """Leading edge, chord and thickness of a wing, interpolated linearly between the sections where they are given."""
 
     def __init__(self, wing: Wing) -> None:
         self.wing = wing
@@ -50,27 +57,30 @@ class Planform:
         self._thickness = np.array([s.thickness for s in wing.stations])
 
     def leading_edge(self, y: ArrayLike) -> Array:
-        """x of the leading edge at span position y, m."""
+        """x (m) of the leading edge at span position ``y`` (m)."""
         return np.asarray(np.interp(np.asarray(y, float), self._y, self._le))
 
     def chord(self, y: ArrayLike) -> Array:
-        """Chord at span position y, m."""
+        """Chord (m) at span position ``y`` (m)."""
         return np.asarray(np.interp(np.asarray(y, float), self._y, self._chord))
 
     def thickness(self, y: ArrayLike) -> Array:
-        """Thickness at span position y, m."""
+        """Thickness (m) at span position ``y`` (m)."""
         return np.asarray(np.interp(np.asarray(y, float), self._y, self._thickness))
 
     def x(self, fraction: float, y: float) -> float:
-        """x at a fraction of the chord, m."""
+        """x (m) at a ``fraction`` of the chord behind the leading edge, at span position ``y`` (m)."""
         return float(self.leading_edge(y) + fraction * self.chord(y))
 
     def fraction(self, x: ArrayLike, y: ArrayLike) -> Array:
-        """Fraction of the chord at points (``x``, ``y``), clipped to [0, 1]."""
+        """Fraction of the chord (0 leading edge, 1 trailing edge) at points ``x``, ``y`` (m), clipped to [0, 1]."""
         return np.asarray(np.clip((np.asarray(x, float) - self.leading_edge(y)) / self.chord(y), 0.0, 1.0))
 
     def panels(self, division: Division) -> list[Panel]:
-        """Panels in the order of the bodies: strips of equal width, bodies of equal chord."""
+        """Divide the planform into panels, in the order of the bodies: root to tip, then leading to trailing edge.
+
+        Strips along the span have equal widths; panels of a strip have equal chords.
+        """
         edges = np.linspace(self._y[0], self._y[-1], len(division.bodies) + 1)
         return [
             Panel(float(edges[i]), float(edges[i + 1]), k / n, (k + 1) / n)
@@ -79,12 +89,15 @@ class Planform:
         ]
 
     def strips(self, division: Division) -> Array:
-        """Span positions (m) of the strips' edges [S + 1], root first."""
+        """Span positions [S + 1] (m) of the edges of the S strips, from root to tip."""
         return np.linspace(self._y[0], self._y[-1], len(division.bodies) + 1)
 
 
 def carriers(panels: Sequence[Panel], y: Array, fraction: Array) -> Index:
-    """Indices of the panels at ``y`` [N] (m) and fractions of the chord [N]; edges belong to the next panel."""
+    """Indices [N] of the ``panels`` that contain N points; on an edge between panels, of the outer or rear one.
+
+    ``y`` [N]: span positions of the points, m; ``fraction`` [N]: their fractions of the chord.
+    """
     edges = np.unique([panel.y0 for panel in panels])
     strip = np.clip(np.searchsorted(edges, y, side="right") - 1, 0, len(edges) - 1)
     first = np.searchsorted([panel.y0 for panel in panels], edges)
@@ -94,7 +107,11 @@ def carriers(panels: Sequence[Panel], y: Array, fraction: Array) -> Index:
 
 @one_blas_thread
 def bodies(planform: Planform, panels: list[Panel]) -> list[Body]:
-    """Mass properties of every panel: foam and skin are integrated, rods have their straw, markers are points."""
+    """Compute the mass properties of every panel.
+
+    Foam and skin are integrated over the panel; rods (with the glue of their straws) and markers are added as point
+    masses.
+    """
     lumps: list[list[tuple[float, Array]]] = [[] for _ in panels]
     for rod in planform.wing.rods:
         linear = rod.density * round_area(rod.diameter) + rod.glue_linear_density
@@ -110,7 +127,7 @@ def bodies(planform: Planform, panels: list[Panel]) -> list[Body]:
 
 
 def wing_mass(wing: Wing) -> float:
-    """Mass of a wing, kg, with its rods and markers."""
+    """Mass of a wing (kg), rods and markers included."""
     planform = Planform(wing)
     return sum(body.mass for body in bodies(planform, planform.panels(Division((4, 4, 4, 4)))))
 
@@ -143,6 +160,6 @@ def _body(planform: Planform, panel: Panel, lumps: list[tuple[float, Array]]) ->
 
 
 def marker_carriers(planform: Planform, panels: list[Panel], markers: tuple[Marker, ...]) -> Index:
-    """Indices [M] of the bodies that carry the ``markers``."""
+    """Indices [M] of the bodies on which the M ``markers`` lie."""
     x, y, _ = np.array([marker.position for marker in markers]).T
     return carriers(panels, y, planform.fraction(x, y))

@@ -1,4 +1,4 @@
-"""Responses of a flexible wing to known loads, and its motion where they act; used to estimate missing loads."""
+"""Responses of a flexible wing to known loads, and its motion where they act, from which missing loads are estimated."""
 
 from __future__ import annotations
 
@@ -16,28 +16,28 @@ from wingfit.sim.wing.flexible_wing import FlexibleWing
 from wingfit.sim.wing.loads import crossing
 from wingfit.sim.wing.structure import Structure
 
-MOVES = 2e-3  # spans: intended largest displacement of a marker by a load
-TOLERANCE = 4.0  # ratio to that, either way, up to which a displacement is accepted
-CLOSE = 2e-3  # of that displacement: distance to the periodic motion
+MOVES = 2e-3  # intended largest displacement of a marker by a load, in spans
+TOLERANCE = 4.0  # factor by which a displacement may be larger or smaller than intended
+CLOSE = 2e-3  # accepted distance to the periodic motion, relative to the intended displacement
 _MOST_BEATS = 60
-_INITIAL_LOAD = 0.5  # weights of the wing
+_INITIAL_LOAD = 0.5  # initial force of a load, in weights of the wing
 _GRAVITY = 9.81
 
 
 @dataclass(frozen=True)
 class StationMotion:
-    """Motion of the wing at J stations of the span at N instants of a beat, from its start.
+    """Motion of the wing at J stations along the span and N instants of a beat, from the start of the beat.
 
     Attributes:
         stations: [J] fractions of the span.
         phase: [N] beats from the start of the beat, as in recordings.
-        velocity: [J, N] of the wing through the air along its normal (upward), m/s.
+        velocity: [J, N] of the wing through the air along its normal (positive upward), m/s.
         forward: [J, N] of the wing through the air along its chord, from trailing to leading edge, m/s.
         acceleration: [J, N] along the normal, m/s^2.
         deflection: [J, N] along the normal, relative to a rigid wing on the rods, m.
-        pitch_rate: [J, N] nose up, rad/s.
+        pitch_rate: [J, N] positive nose up, rad/s.
         chord: [J] m.
-        mass: [J] of the wing per metre of span, kg/m.
+        mass: [J] mass of the wing per metre of span, kg/m.
         density: of the air, kg/m^3.
         airspeed: m/s.
         flap_frequency: Hz.
@@ -59,10 +59,11 @@ class StationMotion:
 
 @dataclass(frozen=True)
 class Probed:
-    """``responses`` [T, C, P] of a recording's channels to P unit loads, m per N/m, N or deg (:class:`Probe`).
+    """Responses of a recording to the loads of a probe, and the motion of the wing without them.
 
-    They are NaN where a simulation fails. ``crossing``: drive phase (beats) at which the recorded beat starts;
-    ``motion`` at the stations of the probe.
+    ``responses`` [T, C, P]: change of the C channels (m) per unit of each of P loads, which is N/m, N or deg (see
+    :class:`wingfit.sim.effects.probe.Probe`); NaN where a simulation failed. ``crossing``: drive phase (beats) at which
+    the recorded beat starts. ``motion``: at the stations of the probe.
     """
 
     responses: Array
@@ -71,10 +72,12 @@ class Probed:
 
 
 def probed(model: FlexibleWing, genome: ArrayLike, recording: Recording, probe: Probe, instants: int = 72) -> Probed:
-    """Responses and motion about ``genome`` [G]; ValueError with the reason if that cannot be simulated.
+    """Simulate the responses to each load of ``probe``, one at a time, and the motion of the wing without them.
 
-    One-sided differences, with the same steps as for the wing without loads, so that the integrator's errors cancel. A
-    load that moves the wing far more or less than MOVES is scaled and simulated again.
+    ``genome`` [G]: the wing; ``instants``: number of instants of the motion. The responses are one-sided differences;
+    wings with and without load are simulated with the same steps, so that the integrator's errors cancel. A load that
+    moves the wing far more or less than MOVES is scaled and simulated again. ValueError with the reason if the wing
+    without loads cannot be simulated.
     """
     base = genome_batch(model.genes, genome)
     near = model.beside(base[0])
@@ -103,10 +106,10 @@ def probed(model: FlexibleWing, genome: ArrayLike, recording: Recording, probe: 
 
 
 def _sizes(model: FlexibleWing, probe: Probe) -> Array:
-    """Initial sizes [P] of the probe's loads: forces at its stations (N/m), moments (N), rotations of the rods (deg).
+    """Initial sizes of loads: a force (N/m) and a moment (N) for each station, an angle (deg) for each rod.
 
-    Moments and rotations are there if the probe has any. Forces are larger near the root, where their lever is small;
-    moments are those of a force times the chord.
+    Forces come first, then moments and angles if the probe has them. Forces are larger near the root, where their lever
+    arm is small; moments are the smallest force times the mean chord.
     """
     weight = sum(body.mass for body in model.structure.bodies) * _GRAVITY
     forces = _INITIAL_LOAD * weight / model.wing.span / np.maximum(np.array(probe.stations), 0.1)
@@ -120,7 +123,10 @@ def _sizes(model: FlexibleWing, probe: Probe) -> Array:
 def _changes(
     model: FlexibleWing, genome: Array, recording: Recording, which: Index, sizes: Array
 ) -> tuple[Array, tuple[str | None, ...]]:
-    """Changes [B, T, C] of the channels by loads ``which`` [B] of ``sizes`` [B], and reasons of failures or None."""
+    """Changes [B, T, C] of the recorded channels by B loads, and why each simulation failed (None: it did not).
+
+    ``which`` [B]: index of the load among the genes of the probe; ``sizes`` [B]: its size.
+    """
     batch = np.zeros((len(which) + 1, len(model.genes)))
     batch[:, : len(genome)] = genome
     batch[np.arange(1, len(batch)), len(genome) + which] = sizes
@@ -133,9 +139,10 @@ def _changes(
 def station_motion(
     model: FlexibleWing, recording: Recording, motion: State, start: float, stations: Array, instants: int
 ) -> StationMotion:
-    """The motion of a beat at ``stations`` and at equal steps from drive phase ``start`` (beats) on.
+    """Motion of the wing at ``stations`` [J] (fractions of the span) over a beat of the given ``motion`` of all bodies.
 
-    The motion is interpolated linearly between the middles of the strips, and extrapolated beyond the last.
+    It is computed at ``instants`` equal steps from drive phase ``start`` (beats). The motion is interpolated linearly
+    between the middles of the strips, and extrapolated beyond the first and the last.
     """
     structure, condition = model.structure, recording.condition
     a, frequency = condition.angle_of_attack, condition.flap_frequency
@@ -160,7 +167,11 @@ def station_motion(
 
 
 def _strips(structure: Structure, motion: State) -> tuple[Array, Array, Array, Array, Array]:
-    """Position, normal, chord direction [n, S, 3], pitch rate [n, S] and position on a rigid wing [n, S, 3]."""
+    """Means over each of S strips at n instants of a beat.
+
+    Returns position, unit normal and unit chord vector (aft), [n, S, 3] each, pitch rate [n, S] (rad/s), and the
+    position [n, S, 3] that the strip would have on a rigid wing on the rods.
+    """
     w, count = structure.wiring, len(structure.bodies)
     starts = w.strip_start[:-1]
     R = motion.R.reshape(*motion.R.shape[:2], 3, 3)
@@ -183,7 +194,7 @@ def _strips(structure: Structure, motion: State) -> tuple[Array, Array, Array, A
 
 
 def _between(middles: Array, stations: Array) -> Array:
-    """Weights [J, S] that interpolate from the strips' ``middles`` [S] to ``stations`` [J] (both fractions of span)."""
+    """Weights [J, S] for linear interpolation from the ``middles`` [S] of strips to ``stations`` [J], fractions of span."""
     inner = np.clip(np.searchsorted(middles, stations) - 1, 0, len(middles) - 2)
     part = (stations - middles[inner]) / (middles[inner + 1] - middles[inner])
     weights = np.zeros((len(stations), len(middles)))
@@ -193,16 +204,16 @@ def _between(middles: Array, stations: Array) -> Array:
 
 
 def _derivative(series: Array, frequency: float) -> Array:
-    """Time derivative of periodic values [n, ...] over a beat."""
+    """Time derivative of periodic values [n, ...] at n equal steps of a beat; ``frequency`` of the beat in Hz."""
     n = len(series)
     order = 2j * np.pi * frequency * np.arange(n // 2 + 1)
-    order[n // 2 :] *= n % 2  # the highest of an even number has no derivative
+    order[n // 2 :] *= n % 2  # the highest harmonic of an even number of samples has no derivative
     spectrum = np.fft.rfft(series, axis=0) * order.reshape(-1, *[1] * (series.ndim - 1))
     return np.asarray(np.fft.irfft(spectrum, n, axis=0))
 
 
 def _resampled(values: Array, start: float, instants: int) -> Array:
-    """Periodic values [..., n] at ``instants`` equal steps from ``start`` (beats) on."""
+    """Resample periodic ``values`` [..., n] at ``instants`` equal steps over a beat from phase ``start`` (beats)."""
     n = values.shape[-1]
     kept = min(n, instants) // 2
     series = np.fft.rfft(values)[..., :kept] / n

@@ -1,4 +1,4 @@
-"""Bodies, connectors and sparsity pattern of a wing for a discretisation: all that does not depend on genes."""
+"""Bodies, connectors and sparsity pattern of a discretised wing: everything that does not depend on genes."""
 
 from __future__ import annotations
 
@@ -21,17 +21,24 @@ from wingfit.sim.wing.sections import Rectangle, round_area, round_second_moment
 YOUNG, SHEAR = 0, 1
 SPANWISE_MODULUS = (YOUNG, SHEAR, YOUNG, SHEAR, YOUNG, SHEAR)
 CHORDWISE_MODULUS = (SHEAR, YOUNG, YOUNG, YOUNG, SHEAR, SHEAR)
-QUARTERS = 4  # number of parts of the chord with their own shares of lift and induced drag
+QUARTERS = 4  # parts of the chord, each with a gene for its share of the lift and one for that of induced drag
 _DRIVEN_GAP = 0.02  # m, largest distance between the root and the start of a driven rod
 
 
 @dataclass(frozen=True)
 class Connector:
-    """Spring and damper between bodies at ``point`` (m, wing frame); ``first`` is -1 or -2 for a driving rod.
+    """Spring and damper between two bodies, or between a driving rod and a body.
 
-    ``foam`` [6] and ``rods`` [S, 6] are second moments (m^4) and areas (m^2) divided by the distance between the
-    bodies' centroids; times the modulus named by ``modulus`` they are stiffnesses (thesis Eqs. 15-16 over a length).
-    ``parts`` [S] are consecutive fractions of that distance, from its inner end, each with its own ``rods``.
+    Stiffness = modulus times (second moment or area) / (distance between the bodies' centroids), thesis Eqs. 15-16. The
+    six entries of a stiffness are rotations about x, y, z, then translations along x, y, z.
+
+    Attributes:
+        first, second: indices of the bodies; ``first`` is -1 for the front driving rod and -2 for the rear one.
+        point: [3] position at rest, wing frame, m.
+        foam: [6] second moments (m^4) and areas (m^2) of the foam, divided by the distance.
+        parts: [S] lengths of S parts of the distance, as fractions of it, from its inner end: rods end between parts.
+        rods: [S, 6] as ``foam``, of the rods in each part.
+        modulus: for each of the six, whether Young's (0) or the shear modulus (1) of the foam applies.
     """
 
     first: int
@@ -44,10 +51,12 @@ class Connector:
 
 
 def spring_constants(connectors: tuple[Connector, ...], foam: Array, rod: Array) -> Array:
-    """Stiffness [C, 6, W] in N m/rad and N/m, from Young's and the shear modulus [2, W] of foam and of rods (Pa).
+    """Stiffness [C, 6, W] in N m/rad and N/m of C ``connectors`` for W individuals.
 
-    Thesis Eqs. 15-16 for each part of the distance. The parts are in series: their compliances add. A mean stiffness
-    would overestimate a rod that ends between the bodies and converge with the first order only (docs/beams.md).
+    ``foam``, ``rod`` [2, W]: Young's and shear modulus of each material, Pa. Thesis Eqs. 15-16 give the stiffness of
+    each part of the distance that a connector spans. The parts are in series, so that their compliances add. A mean
+    stiffness instead would overestimate a rod that ends between the bodies, and converge with the first order only
+    (docs/beams.md).
     """
     beside = np.array([c.foam for c in connectors])[:, :, None] * foam[np.array([c.modulus for c in connectors])]
     modulus = np.repeat(rod, 3, axis=0)
@@ -62,9 +71,13 @@ def spring_constants(connectors: tuple[Connector, ...], foam: Array, rod: Array)
 
 @dataclass(frozen=True)
 class Structure:
-    """A discretised wing: its parts, and the inputs ``wiring`` of the kernels that follow from them.
+    """A discretised wing.
 
-    ``position``: number of the block of the solver's matrix for a pair (row, column) of bodies.
+    Attributes:
+        panels, bodies: geometry and mass properties of the rigid bodies, in the same order.
+        connectors: springs and dampers between them.
+        wiring: the same as inputs of the kernels.
+        position: index of the block in the solver's matrix for a pair (row, column) of bodies.
     """
 
     wing: Wing
@@ -78,9 +91,10 @@ class Structure:
 
     @cached_property
     def stretches(self) -> tuple[tuple[int, int, float, float], ...]:
-        """Overlaps of bodies with quarters of the chord, to distribute the air's forces, which are given by quarters.
+        """Overlaps of bodies with quarters of the chord; they distribute air forces, which are given for each quarter.
 
-        Each entry: body, quarter, overlap as a fraction of the chord, and x (m) of its middle in the body's frame.
+        Each entry: index of the body, of the quarter (0 at the leading edge), overlap as a fraction of the chord, and x
+        (m) of the middle of the overlap in the body's frame.
         """
         edges = np.linspace(0, 1, QUARTERS + 1).tolist()
         return tuple(
@@ -92,9 +106,9 @@ class Structure:
 
 
 def build(wing: Wing, division: Division, *, whole_strips: bool = False) -> Structure:
-    """Discretise ``wing``; ValueError if a driven rod does not reach the root.
+    """Discretise ``wing`` into the bodies of ``division``; ValueError if a driven rod does not reach the root.
 
-    With ``whole_strips`` the matrix has blocks for all pairs of bodies of a strip, which added mass couples.
+    With ``whole_strips`` the solver's matrix has blocks for all pairs of bodies of a strip, which added mass couples.
     """
     planform = Planform(wing)
     panels = planform.panels(division)
@@ -109,16 +123,17 @@ def build(wing: Wing, division: Division, *, whole_strips: bool = False) -> Stru
 
 
 def _twisting(planform: Planform, y: float) -> float:
-    """Torsion constant per width (m^3) of the whole chord at ``y``, independent of its discretisation."""
+    """Torsion constant of the whole chord at span position ``y`` (m), per width (m^3), whatever its discretisation."""
     chord = float(planform.chord(y))
     return Rectangle(chord, float(planform.thickness(y))).torsion / chord
 
 
 def _spanwise_share(count: int) -> float:
-    """Share of the torsion constant of spanwise connectors for ``count`` bodies along the chord.
+    """Fraction of the torsion constant that spanwise connectors have, for ``count`` bodies along the chord.
 
-    Half of the torque of a section is due to shear along it, half due to shear across it. Chordwise connectors bear the
-    second half, but exist at only (count - 1) / count of the chord; spanwise ones bear the remainder, and all for 1.
+    Half of the torque of a section is due to shear along it, half to shear across it. Chordwise connectors carry the
+    second half, but exist at only (count - 1) / count of the chord. Spanwise ones carry the rest: the whole torque if
+    count is 1.
     """
     return 0.5 * (1 + 1 / count)
 
@@ -131,13 +146,17 @@ def _rigidities(section: Rectangle, torsion: float, along_span: bool) -> Array:
 
 
 def _rod_rigidities(diameter: float) -> Array:
-    """I_r about x, y, z, then A_r along x, y, z [6], of thesis Eqs. 15-16; 0 about and along the span: rods slide."""
+    """I_r about x, y, z (m^4), then A_r along x, y, z (m^2), [6], of thesis Eqs. 15-16 for a rod of ``diameter`` (m).
+
+    I_r is the second moment and A_r the area of the round section. About and along the span they are replaced by 0,
+    since rods can turn and slide in their straws.
+    """
     second, A = round_second_moment(diameter), round_area(diameter)
     return np.array([second, 0.0, second, A, 0.0, A])
 
 
 def _x_of(rod: Rod, y: float) -> float:
-    """x of the rod's line at ``y``, m."""
+    """x (m) of the rod at span position ``y`` (m)."""
     return rod.x_root + (y - rod.y_root) / (rod.y_tip - rod.y_root) * (rod.x_tip - rod.x_root)
 
 
@@ -147,7 +166,10 @@ def _piece(planform: Planform, rod: Rod, y: float, count: int) -> int:
 
 
 def _rod_parts(planform: Planform, through: list[Rod], y0: float, y1: float) -> tuple[Array, Array]:
-    """``Connector.parts`` and ``.rods`` of rods between y0 and y1; the same number of parts for every connector."""
+    """``parts`` and ``rods`` of a :class:`Connector` for the rods ``through`` it, between span positions y0 and y1 (m).
+
+    Parts end wherever any rod of the wing ends, so that every connector has the same number of parts.
+    """
     ends = [end for rod in planform.wing.rods for end in (rod.y_root, rod.y_tip)]
     ends_between = np.sort(np.clip([y0, *ends, y1], y0, y1))
     middle = 0.5 * (ends_between[1:] + ends_between[:-1])
@@ -160,10 +182,11 @@ def _rod_parts(planform: Planform, through: list[Rod], y0: float, y1: float) -> 
 def _through(
     planform: Planform, division: Division, strip: int, y0: float, y1: float
 ) -> dict[tuple[int, int], list[Rod]]:
-    """Rods between the centroids y0, y1 of a strip and the next, by the pair of bodies that contain them.
+    """Rods between the centroids y0 of ``strip`` and y1 of the next strip (m), by the pair of bodies that they connect.
 
-    A rod that passes from one piece of the chord to another remains connected. One that ends or begins in between is
-    assigned to opposite pieces.
+    The pair consists of the bodies that contain the rod at y0 and at y1: they remain connected where a rod passes from
+    one piece of the chord to another. A rod that ends or begins in between is assigned to bodies at the same fraction
+    of the chord.
     """
     found: dict[tuple[int, int], list[Rod]] = {}
     for rod in planform.wing.rods:
@@ -201,7 +224,10 @@ def _along_span(planform: Planform, division: Division, parts: list[Body]) -> li
 
 
 def _facing(inner: int, outer: int) -> list[tuple[int, int, float, float]]:
-    """Overlaps of ``inner`` with ``outer`` equal pieces of the chord: index in each, first and last chord fraction."""
+    """Overlaps of ``inner`` with ``outer`` equal pieces of the chord, on the two sides of an edge between strips.
+
+    Each entry: index of the inner and of the outer piece, chord fractions at which the overlap starts and ends.
+    """
     both = [
         (i, j, max(i / inner, j / outer), min((i + 1) / inner, (j + 1) / outer))
         for i in range(inner)
@@ -227,9 +253,10 @@ def _along_chord(planform: Planform, division: Division, panels: list[Panel], pa
 
 
 def _at_root(planform: Planform, division: Division, parts: list[Body]) -> list[Connector]:
-    """Connectors of the driven rods at the root; the foam of a body is shared among the driven rods in it.
+    """Connectors between the driving rods and the bodies at the root.
 
-    A driven rod continues into its drive, so it is extended to the root if it starts outboard.
+    Driven rods in the same body share its foam equally. A driven rod that starts outboard of the root is extended to
+    it, since it continues into its drive. ValueError if it starts too far outboard.
     """
     wing, count = planform.wing, division.bodies[0]
     y, y1 = wing.stations[0].y, float(parts[0].centroid[1])
@@ -298,7 +325,10 @@ def _wiring(
 
 
 def _geometry(planform: Planform, division: Division, area: Array) -> Array:
-    """Area, mean chord, width and span fraction [S, GEOMETRY] of the strips of ``area`` [S], m^2."""
+    """Area (m^2), mean chord (m), width (m) and span fraction of the middle of each strip, [S, 4].
+
+    ``area`` [S]: areas of the strips, m^2.
+    """
     edges = planform.strips(division)
     width = np.diff(edges)
     station = (0.5 * (edges[1:] + edges[:-1]) - edges[0]) / (edges[-1] - edges[0])
