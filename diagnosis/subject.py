@@ -120,10 +120,7 @@ class Subject(Protocol):
         ...
 
     def probe_responses(self, genome: Array, recording: Recording, probe: Probe) -> Probed | None:
-        """Simulate how the channels of ``recording`` respond to the unit loads of ``probe``.
-
-        The nominal model with ``genome`` [G] is used; None for a rig that cannot be probed.
-        """
+        """Return responses of the nominal model with ``genome`` [G] to unit loads; None if it cannot be probed."""
         ...
 
     def candidate_conditions(self) -> tuple[Condition, ...]:

@@ -23,10 +23,7 @@ SAME_FIT_DISTANCE = 0.05  # of a box: fits of the same suspects that are this ne
 
 @dataclass(frozen=True)
 class StartPoint:
-    """A start of a fit: the nominal model with the suspects of ``trials`` added.
-
-    ``unit`` [E]: the E genes of these suspects in unit coordinates (bounds at 0 and 1).
-    """
+    """The nominal model with the suspects of ``trials``; ``unit`` [E]: their E genes, bounds at 0 and 1."""
 
     trials: tuple[Trial, ...]
     unit: Float[Array, " E"]
@@ -154,10 +151,7 @@ class _CompetingFit:
 
 
 def _from_estimates(context: FitContext, initial: Fit, start: StartPoint) -> Iterator[Fit]:
-    """Return the steps of a fit of the nominal model with the suspects of ``start``, from the genes of ``initial``.
-
-    InitialSimulationError, when the first is taken, where the start cannot be simulated.
-    """
+    """Return the steps of a fit from ``initial`` and ``start``; InitialSimulationError if these cannot be simulated."""
     suspects = [trial.suspect for trial in start.trials]
     model = context.subject.extended([suspect.name for suspect in suspects])
     free = (*initial.problem.free, *(gene.name for suspect in suspects for gene in suspect.genes))

@@ -181,20 +181,14 @@ def fit_to_convergence(context: FitContext, refit: Refit) -> Refit:
 
 
 def strongest_trials(data: WhitenedData, found: Sequence[list[Trial]], limit: int) -> list[Trial]:
-    """Return the best trial of each suspect that is worth a refit (`Policy.worth_refit`), strongest first.
-
-    ``found``: trials of each suspect, best first; at most ``limit`` are returned.
-    """
+    """Return up to ``limit`` trials, strongest first: the best of each suspect worth a refit (`Policy.worth_refit`)."""
     policy = data.policy
     best = sorted((trials[0] for trials in found if trials), key=lambda trial: -trial.gain)
     return [trial for trial in best[:limit] if trial.gain >= policy.worth_refit * best[0].gain and trial.gain > 0.0]
 
 
 def partner_trials(data: WhitenedData, base: Refit, found: Sequence[list[Trial]]) -> list[Trial]:
-    """Return trials of second effects that would explain most of the residual of ``base``, strongest first.
-
-    ``found``: trials of each suspect.
-    """
+    """Return the trials in ``found`` of second effects that would explain most of the residual of ``base``."""
     nuisance = Nuisance(data, base.fit)
     residual = nuisance.residual
     least_gain = data.policy.partner_gain * (float(residual @ residual) - len(residual))
@@ -216,10 +210,7 @@ def contribution(context: FitContext, refit: Refit, trials: Sequence[Trial] = ()
 def substitute_trials(
     context: FitContext, refit: Refit, trial: Trial, found: Sequence[list[Trial]], limit: int
 ) -> list[Trial]:
-    """Return trials of other suspects that can reproduce most of the contribution of ``trial`` to ``refit``.
-
-    ``found``: trials of each suspect; at most ``limit`` are returned, best first.
-    """
+    """Return up to ``limit`` trials of other suspects that can reproduce most of what ``trial`` adds to ``refit``."""
     change = contribution(context, refit, [trial])
     if change is None:
         return []

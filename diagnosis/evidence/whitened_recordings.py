@@ -87,10 +87,7 @@ class WhitenedData:
         return np.asarray(np.sqrt(self.variance + np.concatenate(allowed)))
 
     def coefficients_of(self, residuals: Sequence[Float[Array, "*B _ _"]]) -> Float[Array, "*B D"]:
-        """Return the coefficients [..., D] of ``residuals``, an array [..., T, C] for each recording.
-
-        T samples, C channels; NaN where not recorded.
-        """
+        """Return the coefficients [..., D] of ``residuals``: for each recording [..., T, C], C channels at T times."""
         found = [fit.of(one)[..., fit.used, :] for fit, one in zip(self.beat_fits, residuals, strict=True)]
         return np.concatenate([one.reshape(*one.shape[:-2], -1) for one in found], axis=-1)
 
@@ -130,10 +127,7 @@ class WhitenedData:
         return np.asarray(np.maximum(((coefficients / self.scale) ** 2).sum(axis=-1) - len(self.scale), 0.0))
 
     def excess(self, coefficients: Float[Array, " D"]) -> float:
-        """Return the mean square of a residual minus that of the noise, m^2 or N^2; noise may make it negative.
-
-        ``coefficients`` [D]: of the residual.
-        """
+        """Return the mean square of ``coefficients`` [D] of a residual minus that of the noise; it may be negative."""
         return float(self.weight @ (coefficients**2 - self.variance))
 
     def excess_by_recording(self, coefficients: Float[Array, " D"]) -> Float[Array, " R"]:
