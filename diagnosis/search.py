@@ -206,7 +206,7 @@ def _fit_at_finer(finer: FitContext, refit: Refit) -> Refit | None:
 
 
 def _follow(finer: FitContext, refit: Refit, best: Refit) -> Refit | None:
-    """Fit ``refit`` at ``finer``, to convergence if its effects are a subset of those of ``best``; None if that fails."""
+    """Fit ``refit`` at ``finer``, to convergence if ``best`` includes all its effects and more; None if that fails."""
     found = refit_at(finer, refit)
     if found is None or found.fit.converged or not set(refit.names) < set(best.names):
         return found

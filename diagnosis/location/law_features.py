@@ -28,7 +28,7 @@ class Feature:
 
 @dataclass(frozen=True)
 class Window:
-    """A part of the wing or beat; ``field`` [stations, instants] of a motion is 1 inside; ``words``: name, "" for all."""
+    """A part of the wing or beat; ``field`` [stations, instants] of a motion is 1 inside; ``words``: its name or ""."""
 
     words: str
     field: Callable[[StationMotion], Array]

@@ -74,7 +74,7 @@ def smooth(probe: Probe, chord: Float[Array, " J"] | None) -> LoadFamily:
 
 
 def localised(probe: Probe, chord: Float[Array, " J"] | None) -> LoadFamily:
-    """Return Gaussian bumps of force along the span, with moments by their chord locations; ``chord`` [stations] in m."""
+    """Return Gaussian bumps of force along the span, with moments by chord location; ``chord`` [stations] in m."""
     span = np.linspace(0.0, 1.0, 401)
     hats, shapes = probe.hats(span), []
     places: list[tuple[float | None, float | None, float | None]] = []
