@@ -134,7 +134,7 @@ def _misfit_curves(finding: Finding, given: PhaseMap, scale: Scale) -> Markup:
 
 
 def _curves(label: str, title: str, up: svg.Axis, y_label: str, *parts: object) -> Markup:
-    """Draw ``parts``, curves over the beat, with axes (``up``: vertical); ``label``: text alternative of the drawing."""
+    """Draw ``parts``, curves over the beat, with axes (``up``: vertical); ``label``: text alternative of the whole."""
     axes = svg.x_axis(ACROSS, TOP, BOTTOM, PHASE, BEATS), svg.y_axis(up, LEFT, RIGHT, y_label)
     return svg.drawing(WIDTH, BOTTOM + 34, label, svg.text(LEFT, 14, title, class_="title"), *axes, *parts)
 

@@ -23,7 +23,7 @@ SAME_FIT_DISTANCE = 0.05  # of a box: fits of the same suspects that are this ne
 
 @dataclass(frozen=True)
 class StartPoint:
-    """The nominal model with the suspects of ``trials``; ``unit`` [E]: their E genes, bounds at 0 and 1."""
+    """A start: the nominal model plus the suspects of ``trials``, their E genes at ``unit`` [E], bounds at 0 and 1."""
 
     trials: tuple[Trial, ...]
     unit: Float[Array, " E"]
@@ -35,7 +35,7 @@ class StartPoint:
 
 
 def start_points(trial: Trial, others: Sequence[Trial] = (), refit: Refit | None = None) -> list[StartPoint]:
-    """Return starts with the suspect of ``trial`` at its typical size, at the trial's and at its typical location.
+    """Return starts with the suspect of ``trial`` at typical size: at the trial's location, and at a typical one.
 
     The suspects of ``others`` are in the model too, with the genes that were fitted in ``refit``.
     """
@@ -100,7 +100,7 @@ class _CompetingFits:
         return self._expected_excess(fit) > min(self.target, rivalry) or repeated
 
     def _expected_excess(self, fit: _CompetingFit) -> float:
-        """Return the final excess if each step left reduces it as `Policy.acceleration` of the last step would."""
+        """Return the excess over the noise at the last step if progress becomes `Policy.acceleration` times as fast."""
         before, now = (self.data.excess(one.coefficients) for one in fit.last_fits)
         if now <= 0.0 or now >= before:
             return now
@@ -110,7 +110,7 @@ class _CompetingFits:
         return self.data.excess(fit.last_fits[-1].coefficients) if fit.last_fits else np.inf
 
     def _rivalry_limit(self) -> float:
-        """Return the excess above which a fit does not rival the best; noise alone may produce this much."""
+        """Return the excess above which a fit is no rival of the best: a multiple of its, at least that of noise."""
         least = min(self._excess(one) for one in self.fits)
         return max(self.data.policy.rivalry * least, tolerated_excess(self.data, 0.0, 0.0))
 

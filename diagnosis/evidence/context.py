@@ -1,4 +1,4 @@
-"""What every fit of a diagnosis needs: the rig, its recordings, and an evaluator."""
+"""Bundle what every fit of a diagnosis needs: the rig, its recordings, and an evaluator."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class FitContext:
         return (replace(self, subject=finer) for finer in self.subject.finer_subjects())
 
     def problem(self, model: Model, free: tuple[str, ...], base: Genome) -> Problem:
-        """Return the problem of fitting the genes ``free`` of ``model`` to all recordings, others as in ``base``."""
+        """Return the problem of fitting genes ``free`` of ``model`` to all recordings; ``base`` has the other genes."""
         return Problem(model, self.data.recordings, free, base, self.data.axes)
 
     def evaluate(

@@ -157,7 +157,7 @@ def with_measured_jacobian(context: FitContext, fit: Fit) -> Fit:
 
 
 def _converges(data: WhitenedData, before: Fit, after: Fit, gain: float) -> bool:
-    """Return whether a step gained too little, ``gain`` (actual / predicted decrease of the cost) not being low."""
+    """Return whether to stop: a step gained little, though not much less than predicted (``gain``: their ratio)."""
     return small_gain(data, before, after) and gain > GOOD_STEP_RATIO / 2
 
 
@@ -261,8 +261,7 @@ def _step(simulator: _Simulator, fit: Fit, *, accelerated: bool = False) -> tupl
 class _DampedSteps:
     """Gauss-Newton steps from a fit with S choices of what is added to the F curvatures, ``dampings`` [S, F].
 
-    ``own``: factors of the first choices, which are proportional to each gene's curvature; the others are equal for
-    all.
+    ``own``: factors of the first choices, proportional to each gene's curvature; the others are equal for all genes.
     """
 
     def __init__(self, data: WhitenedData, fit: Fit) -> None:

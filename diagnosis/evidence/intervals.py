@@ -16,7 +16,7 @@ CONFIDENCE = 0.9
 
 
 def standard_errors(freedom: float = np.inf) -> float:
-    """Return half the width of a CONFIDENCE interval in standard errors, known with ``freedom`` degrees of freedom."""
+    """Return half the width of a CONFIDENCE interval in standard errors that have ``freedom`` degrees of freedom."""
     return float(scipy.special.stdtrit(freedom, 0.5 + CONFIDENCE / 2))
 
 

@@ -117,5 +117,5 @@ def finer_change(finer: FitContext, refit: Refit) -> tuple[float, float]:
 
 
 def improves(data: WhitenedData, finer: Refit, coarse: Refit) -> bool:
-    """Return whether ``finer`` has so much less excess than ``coarse`` that it is worth its cost."""
+    """Return whether ``finer`` fits so much better than ``coarse`` that it is worth its cost (`Policy.finer_gain`)."""
     return finer.excess < (1.0 - data.policy.finer_gain) * coarse.excess and coarse.excess > 0.0

@@ -245,8 +245,7 @@ def suspect_pairs(
 ) -> Iterator[tuple[Trial, Trial]]:
     """Yield pairs of suspects that together are predicted to reach a chi-squared below ``beyond``, best first.
 
-    ``nominal``: the fit at which ``found``, the trials of each suspect, were tested; only the ``limit`` best pairs are
-    tried.
+    ``found``: trials of each suspect at the fit ``nominal``; only the ``limit`` best pairs are considered.
     """
     nuisance = Nuisance(data, nominal)
     residual = nuisance.residual

@@ -76,7 +76,7 @@ class WhitenedData:
 
     @cached_property
     def weight(self) -> Float[Array, " D"]:
-        """Factors [D]: their sum over squared coefficients is the mean square over all samples of all channels."""
+        """Weights [D]: the sum of weight times squared coefficient is the mean square over all samples and channels."""
         channels = sum(int(fit.used.sum()) for fit in self.beat_fits)
         return np.concatenate([np.tile(fit.weight, int(fit.used.sum())) for fit in self.beat_fits]) / channels
 
@@ -120,14 +120,14 @@ class WhitenedData:
 
     @cached_property
     def max_likelihood_weight(self) -> float:
-        """The weight at a model error as large as the tolerance; no model is taken to be more exact."""
+        """The :meth:`likelihood_weight` at a model error as large as the tolerance: no model is taken as more exact."""
         return float(1.0 / (1.0 + self.policy.tolerance**2 * len(self.scale) / self.effective_samples))
 
     def _chi_squared_excess(self, coefficients: Array) -> Array:
         return np.asarray(np.maximum(((coefficients / self.scale) ** 2).sum(axis=-1) - len(self.scale), 0.0))
 
     def excess(self, coefficients: Float[Array, " D"]) -> float:
-        """Return the mean square of ``coefficients`` [D] of a residual minus that of the noise; it may be negative."""
+        """Return the mean square of a residual with ``coefficients`` [D] minus that of the noise (m^2, N^2)."""
         return float(self.weight @ (coefficients**2 - self.variance))
 
     def excess_by_recording(self, coefficients: Float[Array, " D"]) -> Float[Array, " R"]:

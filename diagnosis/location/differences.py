@@ -23,7 +23,7 @@ MIN_RATIO = 1.05  # of two values of a variable that differ
 def residual_location(
     data: WhitenedData, residuals: Sequence[RecordingResidual], coefficients: Float[Array, " D"]
 ) -> Where:
-    """Return location and scaling of a residual with ``coefficients`` [D]; ``residuals``: the same by recording."""
+    """Return where and when a residual (``coefficients`` [D], by recording ``residuals``) lies, and how it scales."""
     spread = harmonics(data, coefficients)
     span, chord = (_extent_along(residuals, name) for name in ("span", "chord"))
     phase, axis = _phase(residuals), _axis(residuals)

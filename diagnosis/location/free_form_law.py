@@ -34,8 +34,8 @@ MIN_RECORDINGS = 3  # for a law
 class _NormalEquations:
     """Normal equations of R recordings in M coefficients, with the nominal genes projected out.
 
-    ``curvature`` [R, M, M], ``slope`` [R, M], ``power`` [R] sum of squares of the residual, ``count`` [R] of samples,
-    ``size`` [M] by which coefficients were scaled.
+    ``curvature`` [R, M, M] products of the responses, ``slope`` [R, M] of these with the residual, ``power`` [R] sum of
+    squares of the residual, ``count`` [R] of samples, ``size`` [M] by which coefficients were scaled.
     """
 
     curvature: Float[Array, "R M M"]
@@ -57,7 +57,7 @@ class _NormalEquations:
         return np.asarray(np.linalg.solve(matrix + ridge * np.eye(terms.shape[1]), slope[..., None])[..., 0])
 
     def remaining(self, recording: int, terms: Int[Index, "B N"], found: Float[Array, "B N"]) -> Float[Array, " B"]:
-        """Return the sum of squares [B] of a recording's residual after B laws with coefficients ``found``."""
+        """Return the sum of squares [B] of a recording's residual minus B laws of ``terms`` times ``found`` [B, N]."""
         matrix = self.curvature[recording][terms[:, :, None], terms[:, None, :]]
         along = (found * self.slope[recording][terms]).sum(axis=1)
         return np.asarray(self.power[recording] + np.einsum("bn,bnm,bm->b", found, matrix, found) - 2 * along)

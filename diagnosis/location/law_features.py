@@ -28,7 +28,7 @@ class Feature:
 
 @dataclass(frozen=True)
 class Window:
-    """A part of the wing or beat; ``field`` [stations, instants] of a motion is 1 inside; ``words``: its name or ""."""
+    """A part of the wing or beat: ``field`` of a motion is 1 inside, else 0 [stations, instants]; ``words`` name it."""
 
     words: str
     field: Callable[[StationMotion], Array]

@@ -107,7 +107,7 @@ def _locate(state: SearchState, *, unnamed: bool) -> Iterator[tuple[float, str, 
 
 
 def _where(state: SearchState, decision: Decision, best: Refit, missing: MissingPhysics) -> Where:
-    """Return where the misfit lies or, for a named effect, where that acts: a fit spreads a misfit over the beat."""
+    """Return where the misfit lies or, for a named effect, where the effect acts (a fit spreads a misfit in time)."""
     data, coefficients = state.data, state.fitted_nominal.refit.fit.coefficients
     if decision.verdict in ("named", "measurement fault"):
         acts = contribution(state.context, best)
@@ -194,7 +194,7 @@ def _finding(
 
 
 def _discretisation_error(state: SearchState) -> float:
-    """Return the misfit (m or N) by the discretisation: 0 if a finer one fits no better, at most the best residual."""
+    """Return the misfit (m or N) by the discretisation: at most the best residual, 0 if a finer one fits no better."""
     nominal = state.fitted_nominal
     if nominal.discretisation_error is None or nominal.tried_finer:
         return 0.0

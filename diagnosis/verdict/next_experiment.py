@@ -74,7 +74,7 @@ def rank_conditions(
 def _least_separation(
     context: FitContext, first: Refit, recording: Recording, others: Sequence[Refit], *, adapt: bool
 ) -> float | None:
-    """Return the separation of the nearest of the rivals ``others`` from ``recording``, the prediction of ``first``.
+    """Return the smallest separation of the rivals ``others`` from ``recording``, the prediction of ``first``.
 
     None where one of them cannot be simulated.
     """
@@ -86,7 +86,7 @@ def _least_separation(
 def separation(
     context: FitContext, genome: Float[Array, " G"], recording: Recording, rival: Fit, *, adapt: bool
 ) -> float | None:
-    """Return the root mean square difference between ``recording`` and its prediction by a rival, divided by the noise.
+    """Return the root mean square difference of a rival's prediction from ``recording``, in noise standard deviations.
 
     ``recording`` is the prediction of the first hypothesis, whose genes are ``genome`` [G]. With ``adapt`` the rival's
     genes adapt as far as the existing recordings allow. A difference that the genes can compensate would not
@@ -114,7 +114,7 @@ def separation(
 
 
 def _explained_by_genes(data: WhitenedData, rival: Fit, difference: Array, slopes: Array) -> float:
-    """Return the part of the square of ``difference`` [n] that the rival's genes can explain, less the cost of that.
+    """Return the part of the square of ``difference`` [n] that the rival's genes explain, minus the penalty for that.
 
     ``difference`` is divided by the noise, as are the ``slopes`` [F, n], its derivatives with respect to the genes.
     """

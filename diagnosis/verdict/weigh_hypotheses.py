@@ -1,6 +1,6 @@
 """Compute the probabilities of the fitted hypotheses.
 
-With thousands of samples, noise alone would reject even a law of the right kind in a slightly different form. So the
+With thousands of samples, chi-squared would reject even a law of the right kind in a slightly different form. So the
 residual of a right law in another form counts as noise of unknown size, and the fraction of the residual that a
 hypothesis explains decides. Its probability p, up to a common factor, is
 
@@ -81,7 +81,7 @@ def nominal_refuted(data: WhitenedData, excess: float, floor: float) -> bool:
 
 
 def _evidence(data: WhitenedData, excess: Array, genes: Array, effects: Array, suspects: int) -> Array:
-    """Return the log evidence [H]; ``excess`` [H] is divided by the noise variance and includes the tolerated one."""
+    """Return the log evidence [H] for ``excess`` [H], which is over the noise variance and includes what is tolerated."""
     return np.asarray(
         -0.5 * data.effective_samples * np.log(excess)
         - data.policy.gene_cost * genes
