@@ -1,4 +1,4 @@
-"""Diagnosis of missing physics: where model and recordings differ, which effect explains that, and validation."""
+"""Locate differences between model and recordings, name the physics that explains them, and validate the result."""
 
 from wingfit.diagnosis.diagnose import check, diagnose, diagnose_subject
 from wingfit.diagnosis.finding import Finding

@@ -1,4 +1,4 @@
-"""A diagnosis from recordings and a model to a finding."""
+"""Run a diagnosis: prepare the recordings, search for missing physics, and build the finding."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ SEARCH_FRACTION = 0.7  # of the work; the rest locates the missing physics and v
 
 @one_blas_thread
 def check(dataset: Dataset, spec: DiagnosisSpec) -> None:
-    """ValueError where ``spec`` does not fit ``dataset``; simulates nothing."""
+    """Raise ValueError where ``spec`` does not fit ``dataset``; simulates nothing."""
     subject, fitted, held_out, _ = _prepare(dataset, spec)
     axes = _axes(dataset, spec)
     WhitenedData.of(fitted, axes)
@@ -42,7 +42,7 @@ def check(dataset: Dataset, spec: DiagnosisSpec) -> None:
 
 @one_blas_thread
 def diagnose(dataset: Dataset, spec: DiagnosisSpec, evaluator: Evaluator) -> Iterator[Progress]:
-    """Diagnose ``dataset``; the last report holds the finding. ValueError where ``spec`` does not fit."""
+    """Diagnose ``dataset``; yields progress, with the finding last. ValueError where ``spec`` does not fit."""
     subject, fitted, held_out, free = _prepare(dataset, spec)
     yield from diagnose_subject(
         subject, dataset.name, fitted, held_out, spec, evaluator, free=free, axes=_axes(dataset, spec)
@@ -61,7 +61,11 @@ def diagnose_subject(
     free: tuple[str, ...] = (),
     axes: tuple[str, ...] = (),
 ) -> Iterator[Progress]:
-    """Diagnose any rig that meets the protocol; ``free``: nominal genes to fit (default: all that are searched)."""
+    """Diagnose any rig that implements :class:`Subject`; yields progress, the finding with the last report.
+
+    ``name``: of the dataset; ``fitted``, ``held_out``: recordings to fit and to validate with; ``free``: nominal genes
+    to fit (empty: all that a calibration searches); ``axes``: force axes to fit (empty: the default).
+    """
     began = time.monotonic()
     yield Progress(0.0, "reading the recordings", 0)
     held_out, copies = _without_copies(fitted, held_out)
@@ -84,7 +88,7 @@ def diagnose_subject(
 def _without_copies(
     fitted: Sequence[Recording], held_out: Sequence[Recording]
 ) -> tuple[tuple[Recording, ...], tuple[str, ...]]:
-    """Held-out recordings without copies of fitted ones, which validate nothing, and a remark for each copy."""
+    """Return ``held_out`` without copies of fitted recordings, which validate nothing, and a remark for each copy."""
     known = {one.values.tobytes(): one.name for one in reversed(fitted)}
     copies = {one.name: known[one.values.tobytes()] for one in held_out if one.values.tobytes() in known}
     remarks = [
@@ -95,7 +99,7 @@ def _without_copies(
 
 
 def _versions() -> dict[str, str]:
-    """Versions of the packages that the numbers depend on, as far as they are installed."""
+    """Return the versions of the installed packages that the numbers depend on, by name."""
     found = {}
     for name in ("wingfit", "numpy", "scipy", "numba"):
         with suppress(PackageNotFoundError):
@@ -106,7 +110,7 @@ def _versions() -> dict[str, str]:
 def _prepare(
     dataset: Dataset, spec: DiagnosisSpec
 ) -> tuple[Subject, tuple[Recording, ...], tuple[Recording, ...], tuple[str, ...]]:
-    """Subject, recordings to fit and held out (both filtered as they are fitted), and the free genes."""
+    """Return the rig, the recordings to fit and those held out (all low-passed as for the fit), and the free genes."""
     calibration = replace(spec.calibration, mode="joint", axes=_axes(dataset, spec) or spec.calibration.axes)
     ready = prepare(calibration, dataset)
     (stage,) = ready.stages

@@ -1,8 +1,8 @@
 """The result of a diagnosis: plain data from which the report is drawn.
 
-Lengths in m, forces in N, angles in rad, phases in beats (0 to 1, from the start of the beat as the dataset defines
-it), locations on a wing from 0 to 1 along the span (root to tip) and the chord (leading to trailing edge).
-``unit`` is that of a channel: "m" for tracks, "N" for forces; all misfits are root mean squares of one channel in it.
+Lengths are in m, forces in N, angles in rad, phases in beats (0 to 1, from the start of the beat as the dataset defines
+it), locations on a wing from 0 to 1 along the span (root to tip) and the chord (leading to trailing edge). ``unit`` is
+that of a channel: "m" for tracks, "N" for forces; all misfits are root mean squares of one channel in it.
 """
 
 from __future__ import annotations
@@ -29,16 +29,17 @@ class Interval:
 
 @dataclass(frozen=True)
 class Floors:
-    """The smallest misfit that can be expected.
+    """The smallest misfit that can be expected of a correct model, and its parts.
 
     Attributes:
         noise: root mean square of the measurement noise, from the scatter between beats.
         lag1_autocorrelation: of the noise, between successive samples.
-        discretisation: misfit by the model's discretisation, from a comparison with a finer one; at most the residual;
-            None where there is no finer one.
-        finer: the discretisation that it was compared with.
-        simulation: misfit below which no model is required to be: a tenth of the noise.
-        total: root of the sum of squares of these, the misfit of a right model.
+        discretisation: misfit caused by the model's discretisation, estimated with a finer one; at most the residual of
+            the best hypothesis, 0 if the finer one fits no better; None where there is no finer one.
+        finer: description of the finer discretisation; "" where there is none.
+        simulation: misfit that any model is allowed, for the error of the simulation: a tenth of the noise.
+        total: root of the sum of squares of noise, discretisation and simulation: the expected misfit of a correct
+            model.
     """
 
     noise: float
@@ -51,7 +52,7 @@ class Floors:
 
 @dataclass(frozen=True)
 class GeneValue:
-    """A gene of the best model; ``off`` is the value at which it switches its effect off, if it does."""
+    """A gene of a model, with its value; ``off``: value of a size gene that switches its effect off, else None."""
 
     name: str
     unit: str
@@ -68,16 +69,17 @@ class Hypothesis:
         effects: names; empty for the nominal model.
         title: display name.
         family: of the first effect; "" for the nominal model.
-        source: reference of its law.
-        signature: what it looks like.
-        probability: that this is the missing physics, given that one of the hypotheses considered, or none, is right.
-        evidence: natural logarithm of its evidence relative to the nominal model.
-        score: of the score test before any refit, chi-squared with ``freedom`` degrees.
-        freedom: number of its genes.
+        source: reference of the law of each effect.
+        signature: what the effects look like in a recording.
+        probability: that exactly these effects are missing; with that of physics outside the library, all sum to one.
+        evidence: natural log-likelihood minus the cost of the genes, relative to the nominal model.
+        score: decrease of chi-squared that the score tests predicted before any refit.
+        freedom: number of genes that the effects add.
         explained: fraction of the nominal model's excess (mean square beyond the noise) that its refit removes.
         predicted: the same cross-validated, recordings left out one at a time; None where that was not done.
-        misfit: root mean square after its refit.
-        refitted: whether it was refitted; otherwise all but the score is a linear extrapolation.
+        misfit: root mean square of the residual after its refit, noise included.
+        refitted: whether it was refitted; if not, ``explained`` and ``misfit`` are linear extrapolations, and
+            ``probability`` and ``evidence`` are 0.
         genes: of its effects; empty unless refitted. Only the best hypothesis has intervals from a measured Jacobian.
     """
 
@@ -99,9 +101,10 @@ class Hypothesis:
 
 @dataclass(frozen=True)
 class Exponent:
-    """How the misfit, or the named effect, scales with one variable of the condition: the exponent of a power law.
+    """The misfit, or the named effect, scales as a power of one variable of the condition, with exponent ``power``.
 
-    ``variable`` is "flap frequency", "air density" or "airspeed"; ``low`` and ``high`` are the range that was recorded.
+    ``variable`` is "flap frequency", "air density" or "airspeed"; ``low`` and ``high`` are the recorded range in
+    ``unit``.
     """
 
     variable: str
@@ -116,12 +119,12 @@ class Where:
     """Where the nominal model differs from the recordings; for a named effect, where that effect changes them.
 
     Attributes:
-        words: the same in a sentence or two.
+        words: all of the following as a sentence.
         span, chord: centre and extent on the wing; None where forces do not identify a location.
         phase: centre and extent in the beat; None where the misfit is spread over the whole beat.
-        axis: channel axis with most of it ("x", "y" or "z").
-        harmonics: fraction of its mean square in each harmonic of the beat, from 0.
-        exponents: how it scales.
+        axis: channel axis with most of the misfit ("x", "y" or "z").
+        harmonics: fraction of the misfit's mean square in each harmonic of the beat, from 0 (the mean).
+        exponents: how the misfit scales with the condition; empty where the recordings do not show that.
     """
 
     words: str
@@ -135,10 +138,11 @@ class Where:
 
 @dataclass(frozen=True)
 class MarkerMisfit:
-    """Misfit of one marker or force axis over all recordings: root mean square beyond the noise, before and after.
+    """Misfit of one marker or force axis over all recordings, before and after effects are added to the model.
 
-    ``span`` and ``chord`` from 0 to 1, ``x`` and ``y`` in m on the wing; None for forces. ``worst`` is the phase at
-    which it is largest, ``direction`` its mean direction there (x, y, z).
+    ``before`` and ``after``: root mean square beyond the noise. ``span`` and ``chord`` from 0 to 1, ``x`` and ``y`` in
+    m on the wing; None for forces. ``worst``: phase at which the misfit before is largest; ``direction``: unit vector
+    (x, y, z) of its mean there.
     """
 
     name: str
@@ -154,10 +158,10 @@ class MarkerMisfit:
 
 @dataclass(frozen=True)
 class PhaseMap:
-    """Misfit of the nominal model over the beat, averaged (root mean square) over the recordings.
+    """Periodic misfit over span and beat, root mean square over all recordings, before and after effects are added.
 
     ``bands`` are the span stations of the rows (one row, band 0, for forces), ``phase`` the columns; ``before`` and
-    ``after`` [bands][phase]; ``noise`` is the expected value of a cell by noise alone.
+    ``after`` [bands][phase]; ``noise`` is the value to be expected in a cell from noise alone.
     """
 
     bands: Numbers
@@ -169,10 +173,11 @@ class PhaseMap:
 
 @dataclass(frozen=True)
 class MissingLoad:
-    """The load missing from the nominal model, or the error of its drive, under one condition.
+    """The load missing from the nominal model, or the error of its drive, in one recording.
 
-    ``values`` and ``errors`` (standard) [stations][phase]: force per metre of span along the flap normal, N/m; for
-    recordings of forces the force itself, N; for a ``rod`` ("front" or "rear") its additional turn, rad, upward.
+    ``values`` and standard ``errors`` are nested tuples [stations][phase], with ``stations`` along the span and
+    ``phase`` in the beat: force per metre of span along the flap normal, N/m; for recordings of forces the force
+    itself, N; for a ``rod`` of the drive ("front" or "rear") its additional rotation, rad, upward.
     """
 
     recording: str
@@ -186,7 +191,10 @@ class MissingLoad:
 
 @dataclass(frozen=True)
 class RecordingMisfit:
-    """Misfit to one recording before (nominal model, refitted) and after (effects added), with 90 % intervals."""
+    """Misfit to one recording before (nominal model, refitted) and after (effects added), with 90 % intervals.
+
+    ``airspeed`` in m/s; ``floor``: misfit to be expected from noise and discretisation error.
+    """
 
     name: str
     held_out: bool
@@ -201,7 +209,10 @@ class RecordingMisfit:
 
 @dataclass(frozen=True)
 class Overlay:
-    """One channel over one beat: the recording, and the simulation before and after the diagnosis added effects."""
+    """One channel over one beat: the recording, and the simulation before and after the diagnosis added effects.
+
+    ``recorded``, ``before`` and ``after`` are values (m or N) at each ``phase``; ``held_out``: not used for the fit.
+    """
 
     recording: str
     channel: str
@@ -214,7 +225,10 @@ class Overlay:
 
 @dataclass(frozen=True)
 class Term:
-    """One term of a free-form law: a coefficient times a product of dimensionless features, such as ``rho V^2 c``."""
+    """One term of a free-form law of a load per metre of span: ``coefficient`` (in ``unit``) times ``feature``.
+
+    ``feature`` is a product of the local motion, the air and the wing, such as ``rho c |V_n| V_n``.
+    """
 
     feature: str
     coefficient: Interval
@@ -223,7 +237,10 @@ class Term:
 
 @dataclass(frozen=True)
 class FreeLaw:
-    """A sparse law for a residual that no effect explains; ``explained`` as in :class:`Hypothesis`, cross-validated."""
+    """A law of few terms for a missing load that no effect explains; without terms if no law predicts the recordings.
+
+    ``explained``: fraction of the excess in recordings that were left out when the law was selected and fitted.
+    """
 
     words: str
     terms: tuple[Term, ...]
@@ -232,7 +249,11 @@ class FreeLaw:
 
 @dataclass(frozen=True)
 class Advice:
-    """A condition to record next; ``separation``: distance of the predictions in standard deviations."""
+    """A condition to record next, because predictions of the hypotheses ``between`` differ there.
+
+    ``separation``: root mean square difference of the predictions in standard deviations of the noise; ``resolves``:
+    estimated probability that the recording decides between the hypotheses; ``airspeed`` in m/s.
+    """
 
     words: str
     flap_frequency_hz: float
@@ -247,7 +268,10 @@ class Advice:
 
 @dataclass(frozen=True)
 class Proof:
-    """Misfit over all held-out recordings divided by ``floor`` (m or N), before and after as in RecordingMisfit."""
+    """Misfit over all held-out recordings divided by ``floor`` (m or N), before and after as in RecordingMisfit.
+
+    ``improved``: whether the decrease is significant; ``words``: the result as text.
+    """
 
     before: Interval
     after: Interval
@@ -264,28 +288,29 @@ class Finding:
         dataset: its name.
         kind: "tracks" or "forces".
         unit: "m" or "N".
-        model: description of model, discretisation and preset.
+        model: description of the nominal model and its discretisation.
         verdict: the decision.
         summary: the verdict in a few sentences.
         probabilities: of every verdict; they sum to one.
         named: effects that the verdict names; for an ambiguous one, all that cannot be distinguished.
-        added_effects: in the model called "after": those named, the most probable of an ambiguous verdict, the best of
-            an unnamed one if its evidence suffices; else empty.
+        added_effects: effects in the model called "after": those named, the most probable of an ambiguous verdict, the
+            best of an unnamed one if its evidence suffices; else empty.
         strength: misfit after the best nominal refit divided by the noise.
         floors: the smallest misfit that can be expected.
         hypotheses: most probable first, the nominal model included.
         indistinguishable: hypotheses (each of one or several effects) that these recordings cannot distinguish.
-        where: location, phase, axis, scaling.
-        markers, phase_map, missing: the maps.
+        where: location, phase, axis and scaling of the misfit; None for an adequate model.
+        markers, phase_map, missing: misfit by marker, misfit over span and beat, and missing load.
         recordings: misfit to each.
         proof: validation on held-out recordings; None where there are none.
         overlays: tracks or forces to plot.
         genes: of the best model, nominal ones included.
-        law: for an unnamed verdict, a free-form law.
+        law: free-form law of the missing load for an unnamed verdict; None where there is none.
         advice: what to record next, best first.
         outline: of the wing, (x, y) in m; empty for forces.
         remarks: everything else that a reader must know.
-        seconds, evaluations: cost; ``versions`` of the packages that the numbers depend on.
+        seconds, evaluations: computing time, and number of individuals simulated.
+        versions: of the packages that the numbers depend on.
     """
 
     dataset: str
@@ -319,10 +344,10 @@ class Finding:
 
 
 def in_milli(value: float, unit: str) -> str:
-    """``value`` in ``unit`` ("m" or "N") as text in mm or mN."""
+    """Return ``value`` in ``unit`` ("m" or "N") as text in mm or mN."""
     return f"{1e3 * value:.3g} m{unit}"
 
 
 def table(values: Float[Array, "N M"]) -> Table:
-    """``values`` [N, M] as nested tuples, the form in which a finding stores them."""
+    """Return ``values`` [N, M] as nested tuples, the form in which a finding stores them."""
     return tuple(tuple(row) for row in values.tolist())

@@ -17,9 +17,9 @@ def _threshold(value: float, unit: str, reason: str) -> Any:
 class Policy:
     """The thresholds of a diagnosis.
 
-    *Excess* is the mean square of a residual beyond the noise; *evidence* is a natural logarithm. The first group
-    decides the verdict from the fitted hypotheses; the second decides which hypotheses are fitted, and for how many
-    steps.
+    *Excess* is the mean square of a residual minus that of the noise; *evidence* is a natural log-likelihood minus the
+    cost of the genes. The first group decides the verdict from the fitted hypotheses; the second decides which
+    hypotheses are fitted, and for how many steps.
     """
 
     # Verdict

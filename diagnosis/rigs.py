@@ -1,4 +1,4 @@
-"""The two known rigs as subjects: a flexible wing seen by cameras, and a vehicle on a force balance."""
+"""Prepare the two known rigs for a diagnosis: a flexible wing seen by cameras, and a vehicle on a force balance."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ _LOCATION_GENES: dict[str, Literal["span", "chord"]] = {"station": "span", "chor
 
 
 def subject_of(dataset: Dataset, spec: CalibrationSpec) -> Subject:
-    """The rig of ``dataset`` with the nominal model of ``spec``; ValueError where that model does not exist.
+    """Return the rig of ``dataset`` with the nominal model of ``spec``; ValueError where that model does not exist.
 
     Effects that ``spec`` names are part of the nominal model, and no suspects.
     """
@@ -51,20 +51,21 @@ def subject_of(dataset: Dataset, spec: CalibrationSpec) -> Subject:
 
 @dataclass(frozen=True, eq=False)
 class _Rig:
-    """What both rigs have in common."""
+    """What both rigs share: the ``dataset``, the nominal ``model``, and conditions that could be recorded."""
 
     dataset: Dataset
     model: FlexibleWing | BladeElementWing
 
     def extended(self, names: Sequence[str]) -> Model:
-        """The nominal model with suspects added, switched off."""
+        """Return the nominal model with the effects ``names`` added, switched off."""
         return self.model.with_effects(*names)
 
     def candidate_conditions(self) -> tuple[Condition, ...]:
-        """Conditions that the rigs of the dataset can run and did not, at most MAX_CONDITIONS, far from each other.
+        """Return conditions that the dataset's rigs can run and did not, at most MAX_CONDITIONS, far from each other.
 
-        All combinations of the frequencies and lags of a rig, and their midpoints, with every stream (pressure,
-        airspeed, incidence). None in free flight, where the vehicle and not the experimenter chooses the combinations.
+        They are selected from all combinations of the flap frequencies and phase lags of a rig, and their midpoints,
+        with every air stream (pressure, airspeed, angle of attack). None in free flight, where the vehicle and not the
+        experimenter chooses the combinations.
         """
         recordings, candidates = self.dataset.recordings, list[Condition]()
         for rig in dict.fromkeys(r.rig for r in recordings if r.rig != "free_flight"):
@@ -72,16 +73,17 @@ class _Rig:
         return tuple(_farthest_first(candidates, [r.condition for r in recordings], MAX_CONDITIONS))
 
     def simulated_recording(self, model: Model, genome: Float[Array, " G"], condition: Condition) -> Recording | None:
-        """What the rig would record, at the phases of the recording of the most similar condition; None if that fails.
+        """Return what the rig would record of ``model`` with ``genome`` [G] under ``condition``; None if that fails.
 
-        Tracks of all markers, or forces along both axes, low-passed as they would be fitted.
+        These are tracks of all markers, or forces along both axes, low-passed as for a fit, sampled at the phases of
+        the recording of the most similar condition.
         """
         blank = self._blank(condition)
         seen = model.observe(genome[None], blank)
         return None if seen.reasons[0] is not None else replace(blank, values=seen.channels[0])
 
     def _blank(self, condition: Condition) -> Recording:
-        """A recording under ``condition`` without data."""
+        """Return a recording under ``condition`` whose values are all NaN."""
         raise NotImplementedError
 
 
@@ -98,7 +100,7 @@ class WingSubject(_Rig):
 
     @property
     def outline(self) -> tuple[tuple[float, float], ...]:
-        """Leading edge from root to tip and trailing edge back, (x, y) in m, closed."""
+        """Leading edge from root to tip and trailing edge back, a closed polygon of (x, y) in m."""
         stations = self.model.wing.stations
         front = [(s.leading_edge, s.y) for s in stations]
         rear = [(s.leading_edge + s.chord, s.y) for s in reversed(stations)]
@@ -106,24 +108,23 @@ class WingSubject(_Rig):
 
     @property
     def description(self) -> str:
-        """The nominal model in one line for the user."""
+        """The nominal model in one line of text for the user."""
         bodies = Division.parse(self.model.division).bodies
         along = ", ".join(map(str, bodies)) if len(set(bodies)) > 1 else f"{bodies[0]} each"
         words = f"flexible wing of {sum(bodies)} bodies in {len(bodies)} strips ({along})"
         return words + _effects_text(self.model.effects)
 
     def with_initial_motion(self, model: Model, genome: Float[Array, " G"]) -> Model:
-        """The wing's search for the periodic motion starts from that of ``genome``, without its effects."""
+        """Return ``model``; its search for the periodic motion starts at that of ``genome`` [G] without effects."""
         return model.beside(genome) if isinstance(model, FlexibleWing) else model
 
     def finer_subjects(self) -> tuple[WingSubject, ...]:
-        """Models with more strips and the same chordwise bodies, then with the next even number of chordwise bodies.
+        """Return wings of more bodies: with more strips, then also with the next even number of bodies along the chord.
 
-        Strips alone do not show the chordwise bending that a discretisation omits, which is most of the error of a
+        More strips alone do not show the chordwise bending that a discretisation omits, which is most of the error of a
         coarse one (Robird wing with 4 bodies: 4 to 6 mm, in 8 strips no less; with 24 bodies 1 mm), except where the
-        chord does not bend.
-        An even number, because an odd number is worse than one fewer: 18 bodies, 3 along the chord, 3 to 5 mm. At most
-        MAX_BODIES.
+        chord does not bend. An even number, because an odd number is worse than one fewer: 18 bodies, 3 along the
+        chord, 3 to 5 mm. Wings of more than MAX_BODIES are omitted.
         """
         bodies = Division.parse(self.model.division).bodies
         chordwise, strips = max(bodies), len(bodies) + 2
@@ -135,7 +136,7 @@ class WingSubject(_Rig):
         )
 
     def channel_locations(self, recording: Recording) -> tuple[ChannelLocation, ...]:
-        """Three channels of each marker, at its position at rest."""
+        """Return three channels (x, y, z) for each marker, at its position at rest."""
         wing, planform, found = self.model.wing, Planform(self.model.wing), []
         for name in recording.markers:
             x, y, _ = wing.marker(name).position
@@ -144,7 +145,7 @@ class WingSubject(_Rig):
         return tuple(found)
 
     def beat_start_phase(self, recording: Recording) -> float:
-        """Phase (rad) at which the reference markers rise through the height of the hinge."""
+        """Return the phase (rad) at which the mean height of the reference markers rises past that of the hinge."""
         return recorded_crossing(self.model.wing, recording)
 
     def _blank(self, condition: Condition) -> Recording:
@@ -152,7 +153,7 @@ class WingSubject(_Rig):
         return _empty_recording(self.dataset, condition, markers=markers)
 
     def probe_responses(self, genome: Float[Array, " G"], recording: Recording, probe: Probe) -> Probed | None:
-        """Responses of the tracks to unit loads; None where the wing cannot be simulated with them."""
+        """Return the tracks' responses to the unit loads of ``probe``; None where they cannot be simulated."""
         try:
             return probed(self.model, genome, recording, probe)
         except ValueError:
@@ -161,25 +162,25 @@ class WingSubject(_Rig):
 
 @dataclass(frozen=True, eq=False)
 class VehicleSubject(_Rig):
-    """A flapping vehicle, recorded as forces, which are filtered for the fit according to ``spec``."""
+    """A flapping vehicle, recorded as forces; ``spec`` says how these are filtered for the fit."""
 
     model: BladeElementWing
     spec: CalibrationSpec
 
     @cached_property
     def suspects(self) -> tuple[Suspect, ...]:
-        """Effects that apply to a vehicle and are not in the nominal model, as an effect or as a term."""
+        """Effects that apply to the vehicle and are in the nominal model neither as an effect nor as a term."""
         known = {*self.model.effects, *self.model.terms}
         return _suspects(self.model.vehicle, known if self.model.vehicle.claps else known | {"clap_and_peel"})
 
     @property
     def outline(self) -> tuple[tuple[float, float], ...]:
-        """Empty: forces do not identify a location."""
+        """Empty: forces do not show where on a wing they act."""
         return ()
 
     @property
     def description(self) -> str:
-        """The nominal model in one line for the user."""
+        """The nominal model in one line of text for the user."""
         terms = set(self.model.terms)
         preset = min(PRESETS.values(), key=lambda one: len(terms ^ set(one.terms)))
         missing = [name for name in preset.terms if name not in terms]
@@ -189,11 +190,11 @@ class VehicleSubject(_Rig):
         return words + "".join(f", {one}" for one in changed) + _effects_text(self.model.effects)
 
     def with_initial_motion(self, model: Model, genome: Float[Array, " G"]) -> Model:  # noqa: ARG002  # part of the protocol
-        """Return ``model``: its motion is prescribed."""
+        """Return ``model`` unchanged: the motion of its wings is prescribed."""
         return model
 
     def finer_subjects(self) -> tuple[VehicleSubject, ...]:
-        """A model with twice as many elements and instants; none if its forces differ little or it is too large."""
+        """Return a model of twice the elements and instants; none if its forces differ little or it is too large."""
         return self._finer
 
     @cached_property
@@ -212,11 +213,11 @@ class VehicleSubject(_Rig):
         return False
 
     def channel_locations(self, recording: Recording) -> tuple[ChannelLocation, ...]:
-        """The axis of each channel."""
+        """Return the axis of each force channel; a force has no location."""
         return tuple(ChannelLocation(f"force_{axis}", axis) for axis in recording.forces)
 
     def beat_start_phase(self, recording: Recording) -> float:  # noqa: ARG002 - the protocol's
-        """Zero: times of forces count from the start of a beat."""
+        """Return zero: the times of forces count from the start of a beat."""
         return 0.0
 
     def _blank(self, condition: Condition) -> Recording:
@@ -224,7 +225,7 @@ class VehicleSubject(_Rig):
         return replace(blank, low_pass=fitted_through(self.spec, blank))
 
     def probe_responses(self, genome: Float[Array, " G"], recording: Recording, probe: Probe) -> None:
-        """None: recordings of forces show the missing force directly."""
+        """Return None: recordings of forces show the missing force directly."""
 
 
 # -- suspects --------------------------------------------------------------------------------------------------
@@ -256,7 +257,7 @@ def _suspect(effect: Effect, rig: Wing | Vehicle) -> Suspect:
 
 
 def _marker_shapes(wing: Wing) -> tuple[tuple[float, float], ...]:
-    """Station and chord of at most MAX_MARKERS_TRIED markers, the candidates for the fault of a marker."""
+    """Return (span, chord), 0 to 1, of up to MAX_MARKERS_TRIED markers, the candidates for the fault of a marker."""
     planform, every = Planform(wing), -(-len(wing.markers) // MAX_MARKERS_TRIED)
     places = (marker.position[:2] for marker in wing.markers[::every])
     return tuple((_station(wing, y), float(np.clip(planform.fraction(x, y), 0.0, 1.0))) for x, y in places)
@@ -267,7 +268,7 @@ def _station(wing: Wing, y: float) -> float:
 
 
 def _effects_text(effects: Sequence[str]) -> str:
-    """The effects of a model as text."""
+    """Return the names of ``effects`` as text that is appended to the description of a model; empty for none."""
     return f", with {', '.join(repr(EFFECTS[name].title) for name in effects)}" if effects else ""
 
 
@@ -277,9 +278,10 @@ def _effects_text(effects: Sequence[str]) -> str:
 def _empty_recording(
     dataset: Dataset, condition: Condition, markers: tuple[str, ...] = (), forces: tuple[ForceAxis, ...] = ()
 ) -> Recording:
-    """A recording of such channels without data, otherwise like the one under the most similar condition.
+    """Return a recording under ``condition`` of the channels ``markers`` or ``forces``, with all values NaN.
 
-    Its samples are at the same phases of the beat, so that it contains as much information.
+    All else is that of the recording under the most similar condition. Its samples are at the same phases of the beat,
+    so that it contains as much information.
     """
     like = min(dataset.recordings, key=lambda recording: _dissimilarity(dataset, recording.condition, condition))
     times = like.times * (like.condition.flap_frequency / condition.flap_frequency)
@@ -297,7 +299,7 @@ def _empty_recording(
 
 
 def _name(condition: Condition) -> str:
-    """Name of a recording under ``condition``."""
+    """Return the name of a recording under ``condition``."""
     lag, incidence = np.degrees(condition.phase_lag), np.degrees(condition.angle_of_attack)
     return (
         f"{condition.flap_frequency:g}hz-lag{lag:.3g}deg-{condition.pressure / 100.0:g}mbar-{condition.airspeed:g}ms-"
@@ -306,20 +308,20 @@ def _name(condition: Condition) -> str:
 
 
 def _dissimilarity(dataset: Dataset, one: Condition, other: Condition) -> tuple[bool, float]:
-    """Whether only one of two conditions has an air stream, and their distance otherwise."""
+    """Return whether only one of two conditions has an air stream, and their distance otherwise, for sorting."""
     positions = _normalised([one, other], [recording.condition for recording in dataset.recordings])
     return (one.airspeed > 0) != (other.airspeed > 0), float(np.linalg.norm(positions[0] - positions[1]))
 
 
 def _combinations(ran: Sequence[Condition]) -> Iterator[Condition]:
-    """All combinations of the settings of one rig."""
+    """Yield all combinations of the settings in ``ran``, the recorded conditions of one rig, and their midpoints."""
     frequencies, lags = (_levels([getattr(c, name) for c in ran]) for name in ("flap_frequency", "phase_lag"))
     for f, lag, stream in product(_with_midpoints(frequencies), _with_midpoints(lags), _streams(ran)):
         yield replace(stream, flap_frequency=f, phase_lag=lag)
 
 
 def _streams(ran: Sequence[Condition]) -> list[Condition]:
-    """Conditions with different streams, and midpoints between neighbours (geometric for the pressure)."""
+    """Return conditions with different streams of air, and midpoints between neighbours (of pressure: geometric)."""
     names = ("pressure", "airspeed", "angle_of_attack")
     scales = dict.fromkeys(names, float) | {"pressure": _logarithm}
     levels = {name: _levels([getattr(c, name) for c in ran], scales[name]) for name in names}
@@ -333,9 +335,10 @@ def _streams(ran: Sequence[Condition]) -> list[Condition]:
 
 
 def _levels(values: Sequence[float], scale: Callable[[float], float] = float) -> list[float]:
-    """Distinct settings: values within LEVEL_TOLERANCE of their range, or of half the largest value, count as one.
+    """Return the distinct settings among ``values``; of those that are nearly equal, the middle one.
 
-    Values are compared on ``scale``.
+    Nearly equal are values within LEVEL_TOLERANCE of their range, or of half the largest value if that is more, both
+    measured on ``scale`` (a function of the value).
     """
     ordered = sorted(values)
     low, high = scale(ordered[0]), scale(ordered[-1])
@@ -349,12 +352,12 @@ def _levels(values: Sequence[float], scale: Callable[[float], float] = float) ->
 
 
 def _logarithm(pressure: float) -> float:
-    """Logarithm of a pressure in Pa, at least 1 Pa: lower ones do not differ."""
+    """Return the logarithm of a ``pressure`` in Pa, at least 1 Pa: lower ones do not differ."""
     return float(np.log(max(pressure, 1.0)))
 
 
 def _with_midpoints(levels: Sequence[float]) -> list[float]:
-    """The levels and the midpoints between neighbours."""
+    """Return ``levels`` and the midpoints between neighbours."""
     return [*levels, *(0.5 * (one + other) for one, other in pairwise(levels))]
 
 
@@ -363,7 +366,7 @@ def _nearest(levels: Sequence[float], value: float) -> float:
 
 
 def _farthest_first(candidates: Sequence[Condition], recorded: Sequence[Condition], most: int) -> Iterator[Condition]:
-    """Up to ``most`` of the ``candidates``, each the farthest from all that are recorded or selected already."""
+    """Yield up to ``most`` of ``candidates``, each the farthest from all that are recorded or selected already."""
     if not candidates:
         return
     places, taken = _normalised(candidates, recorded), _normalised(recorded, recorded)
@@ -377,7 +380,7 @@ def _farthest_first(candidates: Sequence[Condition], recorded: Sequence[Conditio
 
 
 def _normalised(conditions: Sequence[Condition], ran: Sequence[Condition]) -> Array:
-    """Conditions [N, 5] divided by the recorded range: frequency, lag, log pressure, airspeed, incidence."""
+    """Return frequency, lag, log pressure, airspeed, incidence of ``conditions`` [N, 5] over their range in ``ran``."""
 
     def numbers(some: Sequence[Condition]) -> Array:
         rows = [(c.flap_frequency, c.phase_lag, _logarithm(c.pressure), c.airspeed, c.angle_of_attack) for c in some]

@@ -1,4 +1,4 @@
-"""The search for missing physics: nominal fit, score tests, refits of single effects and of several together."""
+"""Search for missing physics: fit the nominal model, score-test suspects, refit single effects, then several."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def run_search(state: SearchState, free: tuple[str, ...]) -> Steps:
 
 
 def _search_coarse_first(state: SearchState, fit: Fit, suspects: Sequence[Suspect]) -> Steps:
-    """Test suspects with the nominal ``fit``, or with a finer discretisation if that fits better than all suspects."""
+    """Test suspects at the nominal ``fit``, or with a finer discretisation if that fits better than all suspects."""
     nominal = choose_discretisation(state.context, fit, refine=state.spec.refine)
     if nominal.subject is not state.subject and not nominal_suffices(state.data, nominal.refit, len(suspects)):
         state.restart_from(choose_discretisation(state.context, fit, refine=False))
@@ -93,7 +93,10 @@ def _search_coarse_first(state: SearchState, fit: Fit, suspects: Sequence[Suspec
 
 
 def _final_fits(state: SearchState, floor: float, suspects: int) -> Iterator[str]:
-    """Weigh the hypotheses, with the best one and those indistinguishable from it fitted until they converge."""
+    """Fit the best hypothesis, and those that explain as much, until they converge; store the weights of all.
+
+    ``floor`` (m or N): discretisation error; ``suspects``: number of effects considered. Yields the name of each stage.
+    """
 
     def weighed() -> HypothesisWeights:
         return weigh(state.data, state.fitted_nominal.refit, state.refits, floor, suspects)
@@ -111,7 +114,10 @@ def _final_fits(state: SearchState, floor: float, suspects: int) -> Iterator[str
 
 
 def _indistinguishable(weights: HypothesisWeights) -> list[StartPoint]:
-    """Start points of single suspects that explain nearly equally well: the right one may be in a local minimum."""
+    """Return start points of the single suspects with nearly the best evidence: a fit may be in a local minimum.
+
+    Empty where there are fewer than two of them, or where a combination of effects is among them.
+    """
     evidence = weights.evidence[1:]
     least = max(evidence.max(initial=0.0) - weights.policy.overtake, 0.0)
     close = [one for one, found in zip(weights.refits[1:], evidence, strict=True) if found > least]
@@ -120,7 +126,7 @@ def _indistinguishable(weights: HypothesisWeights) -> list[StartPoint]:
 
 
 def _look_alikes(state: SearchState, best: Refit) -> list[StartPoint]:
-    """Start points in which an effect of the best hypothesis is replaced by one known to look similar.
+    """Return start points in which one effect of the hypothesis ``best`` is replaced by one known to look similar.
 
     A score test does not see what the nominal genes, or a similar effect fitted first, have already absorbed.
     """
@@ -137,7 +143,7 @@ def _look_alikes(state: SearchState, best: Refit) -> list[StartPoint]:
 
 
 def _unconverged(weights: HypothesisWeights) -> Refit | None:
-    """The best hypothesis if its fit has not converged, else the first such rival that could overtake it."""
+    """Return the best hypothesis if its fit has not converged, else such a rival that could overtake it, or None."""
     best = decide(weights).best
     if best.trials and not (best.fit.converged and best.fit.jacobian_measured):
         return best
@@ -187,7 +193,7 @@ def _refine_with_effects(state: SearchState) -> None:
 
 
 def _fit_at_finer(finer: FitContext, refit: Refit) -> Refit | None:
-    """``refit`` with a finer discretisation, fitted if that is promising; None where it cannot be simulated."""
+    """Return ``refit`` fitted at the ``finer`` discretisation, unchanged if not promising; None if that fails."""
     changes, gain = finer_change(finer, refit)
     if not changes:
         return None
@@ -200,7 +206,7 @@ def _fit_at_finer(finer: FitContext, refit: Refit) -> Refit | None:
 
 
 def _follow(finer: FitContext, refit: Refit, best: Refit) -> Refit | None:
-    """``refit`` with a finer discretisation; fitted to convergence if its effects are a subset of those of ``best``."""
+    """Fit ``refit`` at ``finer``, to convergence if ``best`` includes all its effects and more; None if that fails."""
     found = refit_at(finer, refit)
     if found is None or found.fit.converged or not set(refit.names) < set(best.names):
         return found
@@ -208,10 +214,11 @@ def _follow(finer: FitContext, refit: Refit, best: Refit) -> Refit | None:
 
 
 def _try_suspects(state: SearchState, suspects: Sequence[Suspect], at_least: Refit | None = None) -> Steps:
-    """Score tests with the nominal fit, then refits; yields the fraction done and the stage.
+    """Score-test ``suspects`` at the nominal fit, then refit the strongest; yields the fraction done and the stage.
 
-    There are few or no refits where none is, or is predicted to be, better than ``at_least``, the nominal model with a
-    finer discretisation: an effect and a discretisation error may each absorb the other's residual.
+    ``at_least``: the nominal model with a finer discretisation. If no suspect is predicted to fit better, there are no
+    refits; if none does fit better, there are few: an effect and a discretisation error may absorb each other's
+    residual.
     """
     nominal = state.fitted_nominal.refit
     tests = score_tests(state.context, nominal.fit, suspects)
@@ -226,9 +233,9 @@ def _try_suspects(state: SearchState, suspects: Sequence[Suspect], at_least: Ref
 
 
 def _nominal_from_best(state: SearchState) -> Refit | None:
-    """The nominal model fitted from the genes of the best hypothesis, if that is clearly better; else None.
+    """Fit the nominal model from the genes of the best hypothesis; return the fit if clearly better, else None.
 
-    Then the earlier nominal fit was in a local minimum, and the hypothesis is not the cause.
+    If it is, the earlier nominal fit was in a local minimum, and the effects of that hypothesis are not the cause.
     """
     nominal = state.fitted_nominal.refit
     best = min(state.refits, key=lambda one: one.excess, default=nominal)
@@ -239,7 +246,7 @@ def _nominal_from_best(state: SearchState) -> Refit | None:
 
 
 def _refits(state: SearchState, at_least: Refit | None) -> Steps:
-    """Refit suspects one at a time; if no refit explains the residual, refit from other starts and in combinations.
+    """Refit suspects one at a time; if no refit explains the residual, refit from the estimates and in combinations.
 
     If ``at_least`` is given and no single refit is clearly better than it, there are no further refits.
     """
@@ -258,7 +265,7 @@ def _refits(state: SearchState, at_least: Refit | None) -> Steps:
 
 
 def _single_refits(state: SearchState) -> Steps:
-    """Refit the suspects with the strongest score tests one at a time."""
+    """Refit the nominal model with each of the suspects with the strongest score tests, one at a time."""
     chosen = strongest_trials(state.data, state.trials, state.spec.refits)
     for k, trial in enumerate(chosen):
         if _is_outperformed(state, trial, chosen[0]):
@@ -268,7 +275,7 @@ def _single_refits(state: SearchState) -> Steps:
 
 
 def _refits_from_estimates(state: SearchState) -> Steps:
-    """Refit suspects from the genes' estimates, those whose score tests are strongest there.
+    """Refit from the estimates of the genes: suspects with the strongest score tests there, and those with a location.
 
     At the nominal fit a score test cannot see what the nominal genes have absorbed, such as a heavy mass.
     """
@@ -284,14 +291,17 @@ def _refits_from_estimates(state: SearchState) -> Steps:
 
 
 def _restart_trials(data: WhitenedData, found: Sequence[list[Trial]]) -> list[Trial]:
-    """The strongest trials, and those of all suspects with a location: a few tested locations say little of these."""
+    """Return the strongest trials in ``found``, and the best one of each other suspect with a location.
+
+    A few tested locations say little of a suspect whose location is free.
+    """
     strongest = strongest_trials(data, found, MAX_RESTARTED)
     others = [trials[0] for trials in found if trials and all(trials[0] is not one for one in strongest)]
     return strongest + [one for one in others if one.suspect.location_genes and not one.suspect.candidate_shapes]
 
 
 def _compete(state: SearchState, starts: Sequence[StartPoint]) -> Iterator[str]:
-    """Fit all start points in competition and store the best."""
+    """Fit all ``starts`` from the estimates in competition, and store the best; yields the name of each stage."""
     if not starts or state.initial_fit is None:
         return
     policy, nominal = state.data.policy, state.fitted_nominal.refit.excess
@@ -307,7 +317,7 @@ def _compete(state: SearchState, starts: Sequence[StartPoint]) -> Iterator[str]:
 
 
 def _refine_and_extend(state: SearchState) -> Iterator[str]:
-    """Refine the discretisation, whose error may look like a second effect, then try second effects."""
+    """Try a finer discretisation (its error may look like a second effect), then second effects; yields stages."""
     coarse = state.subject
     if state.spec.refine:
         _refine_with_effects(state)
@@ -318,7 +328,7 @@ def _refine_and_extend(state: SearchState) -> Iterator[str]:
 
 
 def _second_effects(state: SearchState) -> Iterator[str]:
-    """Refit the best hypothesis with second effects chosen by score tests at its fit."""
+    """Refit the best hypothesis together with each second effect that score tests at its fit propose."""
     best = state.by_excess[0]
     others, found = [one for one in select_suspects(state.subject, state.spec) if one.name not in best.names], []
     for suspect, trials in score_tests(state.context, best.fit, others, best.names):
@@ -330,7 +340,7 @@ def _second_effects(state: SearchState) -> Iterator[str]:
 
 
 def _combined_refits(state: SearchState) -> Iterator[str]:
-    """Refit combinations: the best hypotheses with a second effect, pairs of weak effects, and substitutes."""
+    """Refit the best hypotheses with a second effect, pairs of weak effects, and combinations with one replaced."""
     data, tried = state.data, {frozenset(one.names) for one in state.refits}
     for k, one in enumerate(state.by_excess[:MAX_RIVALS]):
         for trial in partner_trials(data, one, state.trials)[: MAX_PARTNERS if k == 0 else 1]:
@@ -344,7 +354,7 @@ def _combined_refits(state: SearchState) -> Iterator[str]:
 def _refit_untried(
     state: SearchState, tried: set[frozenset[str]], trials: Sequence[Trial], base: Fit | None = None
 ) -> Iterator[str]:
-    """Refit with the suspects of ``trials`` unless their names are in ``tried``; then they are added to it."""
+    """Refit with the suspects of ``trials``, unless the set of their names is in ``tried``; add it there."""
     names = frozenset(trial.suspect.name for trial in trials)
     if names not in tried:
         tried.add(names)
@@ -353,7 +363,7 @@ def _refit_untried(
 
 
 def _substituted_refits(state: SearchState) -> Iterator[str]:
-    """Replace each effect of the best combination by effects that can reproduce its contribution."""
+    """Refit the best combination with each of its effects replaced by effects that can reproduce the same change."""
     best = state.by_excess[0]
     if len(best.trials) < 2:
         return
@@ -365,7 +375,10 @@ def _substituted_refits(state: SearchState) -> Iterator[str]:
 
 
 def _continue_best(state: SearchState) -> bool:
-    """Continue the best refits until one needs no second effect; return whether one does not."""
+    """Continue the best refits that have not converged and would need a second effect.
+
+    Returns whether one of all refits needs none now.
+    """
     enough, limit = state.partner_threshold, state.data.policy.worth_continuing * state.fitted_nominal.refit.excess
     for k in np.argsort([one.excess for one in state.refits])[:MAX_CONTINUED]:
         one = state.refits[k]
@@ -375,13 +388,13 @@ def _continue_best(state: SearchState) -> bool:
 
 
 def _is_outperformed(state: SearchState, trial: Trial, best: Trial) -> bool:
-    """Whether ``trial`` is too weak to compete with a refit that has already explained the residual."""
+    """Return whether ``trial`` is skipped: much weaker than ``best``, while a refit already explains the residual."""
     weak = trial.gain <= state.data.policy.weak_after_success * best.gain
     return weak and bool(state.refits) and state.is_explained
 
 
 def select_suspects(subject: Subject, spec: DiagnosisSpec) -> list[Suspect]:
-    """The suspects that ``spec`` requests; ValueError for one that the rig does not have."""
+    """Return the suspects that ``spec`` requests; ValueError for one that the rig does not have."""
     known = {suspect.name: suspect for suspect in subject.suspects}
     for name in spec.suspects:
         if name not in known:

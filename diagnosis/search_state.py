@@ -1,4 +1,4 @@
-"""State of the search for missing physics."""
+"""The state of a search for missing physics, and a counter of simulated individuals."""
 
 from __future__ import annotations
 
@@ -22,9 +22,16 @@ from wingfit.records.array_types import ArrayLike
 
 @dataclass
 class SearchState:
-    """What is searched for, and the results so far.
+    """The request, the data and the results so far of a search for missing physics.
 
-    ``trials``: score tests by suspect; ``initial_fit``: nominal model at the estimates, and the context of that fit.
+    Attributes:
+        context: rig, whitened recordings and evaluator.
+        nominal: fit of the nominal model.
+        trials: score tests, a list for each suspect, best first.
+        refits: fits with suspects added.
+        weights: evidence and probability of each fit; None until the search ends.
+        initial_fit: the nominal model at the estimates of its genes, before any step of a fit, and the context used for
+            it.
     """
 
     context: FitContext
@@ -37,7 +44,7 @@ class SearchState:
 
     @property
     def subject(self) -> Subject:
-        """The rig with the discretisation of the nominal model."""
+        """The rig, with the discretisation of the present nominal fit."""
         return self.context.subject
 
     @property
@@ -54,23 +61,27 @@ class SearchState:
 
     @property
     def final_weights(self) -> HypothesisWeights:
-        """The weighed hypotheses; ValueError before the search has ended."""
+        """Evidence and probabilities of the hypotheses; ValueError before the search has ended."""
         if self.weights is None:
             raise ValueError("a finding needs a search that has ended")
         return self.weights
 
     @property
     def by_excess(self) -> list[Refit]:
-        """The refits, that with the least excess first."""
+        """The refits, least excess (mean square of the residual minus that of the noise) first."""
         return sorted(self.refits, key=lambda one: one.excess)
 
     def restart_from(self, nominal: Nominal) -> None:
-        """Continue with another nominal fit; earlier score tests and refits no longer hold."""
+        """Replace the nominal fit by ``nominal`` and delete all score tests and refits, which held for the old fit."""
         self.nominal, self.context = nominal, replace(self.context, subject=nominal.subject)
         self.trials, self.refits = [], []
 
     def add(self, refit: Refit | None) -> None:
-        """Store ``refit``; of two with the same suspects, store the one with the lower cost."""
+        """Store ``refit`` unless it is None.
+
+        Of two with the same suspects, only the one with the lower cost is stored; a converged one may cost
+        COST_TOLERANCE more.
+        """
         if refit is None:
             return
         for k, stored in enumerate(self.refits):
@@ -81,30 +92,30 @@ class SearchState:
 
     @property
     def partner_threshold(self) -> float:
-        """Excess (m^2 or N^2) of a hypothesis above which a second effect is tried."""
+        """Excess (m^2 or N^2) of a hypothesis above which a second effect is tried with it."""
         return tolerated_excess(self.data, self.data.policy.partner_form * self.fitted_nominal.refit.excess, 0.0)
 
     @property
     def is_explained(self) -> bool:
-        """Whether no second effect is needed: the best hypothesis is below the threshold, or there is none."""
+        """Whether no second effect is needed: least excess up to :attr:`partner_threshold`, or no refit exists."""
         return not self.refits or self.by_excess[0].excess <= self.partner_threshold
 
     @property
     def beats_unknown_law(self) -> bool:
-        """Whether a hypothesis has less excess than the assumed law outside the library."""
+        """Whether the best refit explains as much as a law outside the library would (`Policy.unknown_residual`)."""
         least = min((one.excess for one in self.refits), default=np.inf)
         return least <= self.data.policy.unknown_residual**2 * self.fitted_nominal.refit.excess
 
 
 @dataclass
 class CountingEvaluator:
-    """An evaluator that counts the individuals which it has the ``inner`` one evaluate."""
+    """An evaluator that passes all work to the evaluator ``inner`` and counts the individuals."""
 
     inner: Evaluator
     evaluations: int = 0
 
     def evaluate(self, problem: Problem, values: ArrayLike, *, residuals: bool = False) -> Evaluation:
-        """Evaluate ``values`` with the inner evaluator."""
+        """Return what ``inner`` returns for ``values`` [B, F] (B individuals, F free genes), and add B to the count."""
         self.evaluations += len(np.atleast_2d(values))
         return self.inner.evaluate(problem, values, residuals=residuals)
 

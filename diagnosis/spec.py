@@ -1,4 +1,4 @@
-"""What a user requests of a diagnosis, and the progress that it reports."""
+"""The request that starts a diagnosis, and the progress reports of a running diagnosis."""
 
 from __future__ import annotations
 
@@ -17,12 +17,13 @@ class DiagnosisSpec:
     Attributes:
         calibration: the nominal model (discretisation, preset, terms, effects already in it) and what is fitted
             (recordings, genes, fixed values, low-pass).
-        start: initial genes, such as a calibration's best; genes that it does not name start at their estimates.
+        start: initial values of nominal genes by name, such as a calibration's best; other genes start at their
+            estimates.
         suspects: names of the effects to consider; empty means the whole library.
-        refine: whether the model may take a finer discretisation where the discretisation limits it.
-        refits: largest number of suspects that are refitted in full.
-        axes: force axes to fit; empty means all that every recording has.
-        policy: thresholds.
+        refine: whether the diagnosis may change to a finer discretisation where the present one limits the fit.
+        refits: largest number of suspects that are added to the model and fitted, one at a time, after the score tests.
+        axes: force axes to fit ("x", "z"); empty means all that every recording has. Ignored for tracks.
+        policy: thresholds of the verdict and of the search.
     """
 
     calibration: CalibrationSpec = field(default_factory=CalibrationSpec)
@@ -36,7 +37,11 @@ class DiagnosisSpec:
 
 @dataclass(frozen=True)
 class Progress:
-    """Fraction of the work done, current stage, individuals evaluated so far, and with the last report the finding."""
+    """A report of a running diagnosis.
+
+    ``fraction`` of the work done (0 to 1), present ``stage`` in words, number of individuals simulated so far
+    (``evaluations``), and the ``finding``, None in all reports but the last.
+    """
 
     fraction: float
     stage: str

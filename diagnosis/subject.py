@@ -1,7 +1,7 @@
-"""What a diagnosis needs of a rig.
+"""The interface between a diagnosis and a rig: what a diagnosis must know of a rig.
 
-The two known rigs are adapted in :mod:`wingfit.diagnosis.rigs`; any other rig that meets :class:`Subject` works as
-well.
+:mod:`wingfit.diagnosis.rigs` implements it for the two known rigs; any other class that implements :class:`Subject`
+works as well.
 """
 
 from __future__ import annotations
@@ -21,20 +21,22 @@ Family = Literal["structure", "inertia", "actuation", "aerodynamics", "measureme
 
 @dataclass(frozen=True)
 class Suspect:
-    """An effect that is considered as missing: physics, or a fault of the measurement, that can be added to the model.
+    """An effect that may be missing in the model: physics, or a fault of the measurement, that can be added to it.
 
     Attributes:
-        name: by which :meth:`Subject.extended` adds it.
+        name: identifier with which :meth:`Subject.extended` adds the effect.
         title: display name.
         family: kind of physics, or "measurement".
-        genes: those it adds; with all sizes at zero it is exactly off.
-        size_genes: names of the genes that are its size.
-        typical: values of all its genes for an effect as large as in practice.
+        genes: the genes that the effect adds to the model; with all size genes at zero the effect is exactly off.
+        size_genes: names of those of ``genes`` that say how strong the effect is.
+        typical: value of each of ``genes`` for an effect as strong as in practice.
         source: reference of its law.
-        signature: what it looks like in a recording.
-        location_genes: names of the genes that give its location along "span" and "chord" (0 to 1), if any.
-        confused_with: names of suspects that look similar.
-        candidate_shapes: values of its shape genes that are tried; empty means that the screening chooses them.
+        signature: what the effect looks like in a recording, as text for the user.
+        location_genes: names of the genes that give its location along "span" and "chord" (0 to 1); empty if it has
+            none.
+        confused_with: names of suspects that look similar in a recording.
+        candidate_shapes: values of the shape genes (:attr:`shape_genes`), a tuple for each trial of the score test;
+            empty means that the score test spreads its own trials.
     """
 
     name: str
@@ -51,14 +53,15 @@ class Suspect:
 
     @property
     def shape_genes(self) -> tuple[str, ...]:
-        """Names of the genes that are not its size."""
+        """Names of the genes that are not sizes, such as the location."""
         return tuple(gene.name for gene in self.genes if gene.name not in self.size_genes)
 
 
 class ChannelLocation(NamedTuple):
-    """Where a channel is measured: marker or force axis ``name``, direction ``axis`` ("x", "y", "z"), location.
+    """Where one channel is measured: a coordinate of a marker, or a force.
 
-    ``span`` and ``chord`` from 0 to 1, ``x`` and ``y`` in m; None for a force.
+    ``name`` of the marker or force axis; ``axis``: direction "x", "y" or "z"; ``span`` (from the root) and ``chord``
+    (from the leading edge), fractions 0 to 1; ``x`` and ``y``: position at rest, m. The last four are None for a force.
     """
 
     name: str
@@ -70,56 +73,56 @@ class ChannelLocation(NamedTuple):
 
 
 class Subject(Protocol):
-    """The rig under diagnosis: its nominal model, the suspects, finer models, and where its channels are measured."""
+    """The rig that is diagnosed: nominal model, suspects, finer discretisations, and where channels are measured."""
 
     @property
     def model(self) -> Model:
-        """The nominal model."""
+        """The nominal model: the simulation before any suspect is added."""
         ...
 
     @property
     def suspects(self) -> tuple[Suspect, ...]:
-        """All effects that can be added."""
+        """All effects that :meth:`extended` can add."""
         ...
 
     @property
     def outline(self) -> tuple[tuple[float, float], ...]:
-        """Outline of the wing, (x, y) in m, closed; empty where there is nothing to draw."""
+        """Outline of the wing from above, a closed polygon of (x, y) in m; empty if there is nothing to draw."""
         ...
 
     @property
     def description(self) -> str:
-        """The nominal model in one line for the user."""
+        """The nominal model in one line of text for the user."""
         ...
 
     def extended(self, names: Sequence[str]) -> Model:
-        """The nominal model with the named suspects added; their genes follow its own and are off."""
+        """Return the nominal model with the suspects ``names`` added, all off; their genes follow the model's own."""
         ...
 
     def with_initial_motion(self, model: Model, genome: Array) -> Model:
-        """``model``, whose search for the periodic motion starts from the motion of ``genome`` [G]."""
+        """Return ``model`` such that its search for the periodic motion starts at the motion of ``genome`` [G]."""
         ...
 
     def finer_subjects(self) -> Sequence[Subject]:
-        """The subject with finer discretisations, cheapest first; empty where there is none or its cost is too high."""
+        """Return the rig with finer discretisations, cheapest first; empty if none exists or all are too costly."""
         ...
 
     def channel_locations(self, recording: Recording) -> tuple[ChannelLocation, ...]:
-        """Where each channel of ``recording`` is measured."""
+        """Return where each channel of ``recording`` is measured, in the order of its channels."""
         ...
 
     def beat_start_phase(self, recording: Recording) -> float:
-        """Phase 2 pi f t (rad) of ``recording`` at which a beat starts."""
+        """Return the phase 2 pi f t (rad; f flap frequency, t time in ``recording``) at which a beat starts."""
         ...
 
     def simulated_recording(self, model: Model, genome: Array, condition: Condition) -> Recording | None:
-        """What the rig would record of ``model`` with ``genome`` [G] under ``condition``; None if that fails."""
+        """Return what the rig would record of ``model`` with ``genome`` [G] under ``condition``; None if that fails."""
         ...
 
     def probe_responses(self, genome: Array, recording: Recording, probe: Probe) -> Probed | None:
-        """Responses of the nominal model with ``genome`` [G] to unit loads; None for a rig that cannot be probed."""
+        """Return responses of the nominal model with ``genome`` [G] to unit loads; None if it cannot be probed."""
         ...
 
     def candidate_conditions(self) -> tuple[Condition, ...]:
-        """Conditions that the rig can run and that could be recorded next."""
+        """Return conditions that the rig can run and that could be recorded next."""
         ...

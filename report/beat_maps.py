@@ -1,4 +1,4 @@
-"""Maps of the misfit and of the missing load over span and phase."""
+"""Draw maps of the misfit and of the missing load over span and phase."""
 
 from __future__ import annotations
 
@@ -38,7 +38,10 @@ Classes = Sequence[Sequence[str | None]]
 
 
 def misfit_maps(finding: Finding) -> Markup | None:
-    """Misfit over span and phase, before and after, with the noise; curves where there is one row."""
+    """Draw the misfit over span and phase, before and after effects are added, with the noise.
+
+    Curves over the phase where there is a single row, as for forces; None without data.
+    """
     given = finding.phase_map
     if given is None or not given.bands or not given.phase:
         return None
@@ -56,7 +59,7 @@ def misfit_maps(finding: Finding) -> Markup | None:
 
 
 def missing_kind(finding: Finding) -> str:
-    """Kind of the missing physics: "load" or "motion of the drive"."""
+    """Return the kind of the missing physics: "load" or "motion of the drive"."""
     return _kind(finding.missing[0]) if finding.missing else "load"
 
 
@@ -65,13 +68,13 @@ def _kind(load: MissingLoad) -> str:
 
 
 def _name(load: MissingLoad, letters: int) -> str:
-    """The recording, and the rod where the load belongs to one."""
+    """Return a title of ``load``: its recording, shortened to ``letters``, and the rod where it belongs to one."""
     of = f"{load.rod} rod, " if load.rod else ""
     return of + shortened(load.recording, letters - len(of))
 
 
 def missing_loads(finding: Finding) -> Markup | None:
-    """The load, or motion, missing from the nominal model, in the recordings where it is largest."""
+    """Draw the missing load, or motion of the drive, in the recordings where it is most significant, or None."""
     loads = [m for m in finding.missing if m.stations and m.phase]
     if not loads:
         return None
@@ -131,7 +134,7 @@ def _misfit_curves(finding: Finding, given: PhaseMap, scale: Scale) -> Markup:
 
 
 def _curves(label: str, title: str, up: svg.Axis, y_label: str, *parts: object) -> Markup:
-    """Curves over the beat, with their axes."""
+    """Draw ``parts``, curves over the beat, with axes (``up``: vertical); ``label``: text alternative of the whole."""
     axes = svg.x_axis(ACROSS, TOP, BOTTOM, PHASE, BEATS), svg.y_axis(up, LEFT, RIGHT, y_label)
     return svg.drawing(WIDTH, BOTTOM + 34, label, svg.text(LEFT, 14, title, class_="title"), *axes, *parts)
 
@@ -180,7 +183,11 @@ def _load_curve(load: MissingLoad, scale: Scale) -> Markup:
 
 
 def _grid(title: str, bands: Sequence[float], classes: Classes, over: Classes | None = None) -> Markup:
-    """Cells over phase (to the right) and span (tip on top), with axes."""
+    """Draw cells over phase (to the right) and span (tip on top), with axes.
+
+    ``bands``: span of each row (0 to 1); ``classes``: CSS class of each cell, [rows][columns]; ``over``: of a second
+    layer.
+    """
     down = svg.Axis(0, 1, TOP, BOTTOM)
     tall = HEIGHT / len(bands)
     every = math.ceil(13 / tall)
@@ -199,13 +206,13 @@ def _grid(title: str, bands: Sequence[float], classes: Classes, over: Classes | 
 
 
 def _largest(table: ArrayLike) -> tuple[int, int]:
-    """Row and column of the largest value."""
+    """Return row and column of the largest value in ``table``."""
     i, j = np.unravel_index(np.argmax(table), np.shape(table))
     return int(i), int(j)
 
 
 def _peak(load: MissingLoad) -> tuple[int, int, float]:
-    """Row and column where the load is largest in standard errors, and that ratio."""
+    """Return row and column where ``load`` is largest in standard errors, and its ratio to the standard error there."""
     values, errors = np.abs(load.values), np.array(load.errors)
     ratios = np.divide(values, errors, out=np.zeros_like(values), where=errors > 0)
     i, j = _largest(ratios)
@@ -213,7 +220,7 @@ def _peak(load: MissingLoad) -> tuple[int, int, float]:
 
 
 def _pooled(values: ArrayLike, pool: Callable[..., Any] = np.mean) -> list[Any]:
-    """``values`` with at most MOST_ROWS rows and MOST_COLUMNS columns: neighbours are pooled."""
+    """Return ``values`` of at most MOST_ROWS and MOST_COLUMNS; the function ``pool`` combines neighbours."""
     pooled = np.asarray(values, dtype=np.float64)
     for k, most in zip(range(pooled.ndim), (MOST_ROWS, MOST_COLUMNS), strict=False):
         size = pooled.shape[k]

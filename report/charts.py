@@ -1,4 +1,4 @@
-"""A page of line charts as one HTML file, for the plots of the command line."""
+"""Draw a page of line charts as one HTML file, for the plots of the command line."""
 
 from __future__ import annotations
 
@@ -19,7 +19,10 @@ DECADES = 8  # shown of a logarithmic axis: smaller values are rounding errors
 
 @dataclass(frozen=True)
 class Curve:
-    """Values ``y`` over ``x``, drawn as a line, as ``dots``, or as a ``band`` between its lower and upper ends."""
+    """Values ``y`` over ``x``, drawn as a line, as ``dots``, or as a ``band`` between its lower and its upper ends.
+
+    ``name``: its text in the legend.
+    """
 
     name: str
     x: Values
@@ -30,7 +33,7 @@ class Curve:
 
 @dataclass(frozen=True)
 class Chart:
-    """Curves on common axes."""
+    """Curves on common axes; ``logarithmic``: the y axis."""
 
     title: str
     x_label: str
@@ -40,7 +43,7 @@ class Chart:
 
 
 def chart_page(title: str, charts: Sequence[Chart]) -> str:
-    """One HTML file with all ``charts`` that have values: no script, nothing loaded."""
+    """Return one HTML file with all ``charts`` that have values; it contains no script and loads nothing."""
     figures = [_figure(chart) for chart in charts if any(map(_finite, chart.curves))]
     body = tag("main", tag("h1", title), panels(*figures, size="wide"))
     return render("document.html", title=title, body=body)

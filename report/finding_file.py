@@ -1,6 +1,6 @@
-"""A finding as JSON, and back, without loss.
+"""Convert a finding to JSON, and back, without loss.
 
-Numbers have the SI units of :mod:`wingfit.diagnosis.finding`; the report converts them for reading.
+Numbers have the SI units of :mod:`wingfit.diagnosis.finding`; only the report converts them for reading.
 """
 
 from __future__ import annotations
@@ -28,16 +28,16 @@ ADAPTER = pydantic.TypeAdapter(_FindingFile)
 
 
 def finding_json(finding: Finding) -> dict[str, Any]:
-    """All fields of ``finding`` by name, lists for tuples, and ``format_version`` in front.
+    """Return all fields of ``finding`` by name, tuples as lists, with ``format_version`` in front.
 
     Raises:
-        ValueError: if a value is not finite or not plain, which JSON cannot say; the message names it.
+        ValueError: if a value is not finite, or of a type that JSON does not have; the message names the value.
     """
     return {"format_version": FORMAT_VERSION, **_plain(finding, "finding")}
 
 
 def finding_from_json(data: Mapping[str, Any]) -> Finding:
-    """The finding of which :func:`finding_json` made ``data``.
+    """Return the finding that :func:`finding_json` converted to ``data``.
 
     Raises:
         ValueError: if ``data`` does not meet the schema; the message names the first field that does not.

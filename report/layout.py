@@ -1,4 +1,4 @@
-"""Blocks of a page: the document itself, figures, details. Templates (Jinja) are in templates/."""
+"""Make the blocks of a page: the document, figures, details. Templates (Jinja) are in templates/."""
 
 from __future__ import annotations
 
@@ -21,20 +21,23 @@ _TEMPLATES = Environment(
 
 
 def render(template: str, **values: Any) -> str:
-    """A template, filled in: one HTML file with no script that loads nothing, for screen, phone and paper."""
+    """Return the HTML file that ``template``, a file name, gives with ``values``.
+
+    It has no script, loads nothing, and suits screen, phone and paper.
+    """
     return _TEMPLATES.get_template(template).render(**values)
 
 
 def figure(caption: str, *parts: object, note: object = None) -> Markup:
-    """A figure whose caption states its result; ``note`` explains the drawing."""
+    """Return a figure of ``parts`` whose caption states the result; ``note`` explains the drawing."""
     return tag("figure", tag("figcaption", caption), *parts, None if note is None else tag("p", note, class_="note"))
 
 
 def panels(*drawings: object, size: str = "") -> Markup:
-    """Drawings side by side where there is room, else below each other; ``size``: "small", "wide", or the usual one."""
+    """Return drawings side by side where there is room, else stacked; ``size``: "small", "wide", or "", the usual."""
     return tag("div", *drawings, class_=f"panels {size}".strip())
 
 
 def folded(summary: str, *parts: object) -> Markup:
-    """Details that open on a click, and are open on paper."""
+    """Return ``parts`` as details that open with a click on ``summary``, and are always open on paper."""
     return tag("details", tag("summary", summary), *parts)

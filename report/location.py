@@ -1,4 +1,4 @@
-"""Location of the misfit in span, chord and phase, its axis, and its scaling with the condition."""
+"""Draw where the misfit lies in span, chord and phase, and how it scales with the condition."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ LEVEL = 1.0  # an interval of an exponent that contains zero and is narrower sho
 
 
 def place(finding: Finding) -> Markup | None:
-    """Bars for span, chord and phase; harmonics; exponents."""
+    """Draw bars for the location in span, chord and phase; harmonics; exponents. None for an adequate model."""
     where = finding.where
     if where is None:
         return None
@@ -114,7 +114,7 @@ def _powers(exponents: tuple[Exponent, ...], subject: str) -> Markup | None:
 
 
 def _scaling(exponents: tuple[Exponent, ...], subject: str) -> str:
-    """The scaling that the intervals of the exponents show, in one sentence."""
+    """Return a sentence on how ``subject`` scales with the condition, as the intervals of the exponents show."""
     bounded = [
         (e, e.power.low, e.power.high) for e in exponents if e.power.low is not None and e.power.high is not None
     ]
@@ -128,7 +128,7 @@ def _scaling(exponents: tuple[Exponent, ...], subject: str) -> str:
 
 
 def _pieces(interval: Interval, *, turns: bool) -> list[tuple[float, float]]:
-    """Parts of 0 to 1 that an interval covers; phases are periodic."""
+    """Return the parts of 0 to 1 that ``interval`` covers; with ``turns`` it is one of phases, which are periodic."""
     low, high = (interval.value if v is None else v for v in (interval.low, interval.high))
     if not turns:
         return [(max(low, 0.0), min(high, 1.0))]

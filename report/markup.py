@@ -1,4 +1,7 @@
-"""HTML and SVG elements. Text that is not :class:`Markup` is escaped, so text of a dataset never becomes markup."""
+"""Build HTML and SVG elements.
+
+Text that is not :class:`Markup` is escaped, so that text of a dataset never becomes markup.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +13,7 @@ _EMPTY = frozenset({"meta", "br", "line", "rect", "circle", "path"})
 
 
 class Markup(str):
-    """Text that is already markup, which Jinja does not escape either."""
+    """Text that is already HTML or SVG; neither :func:`escaped` nor Jinja escapes it."""
 
     __slots__ = ()
 
@@ -19,12 +22,12 @@ class Markup(str):
 
 
 def escaped(value: object) -> Markup:
-    """``value`` as markup: unchanged if it is markup, also of a Jinja macro; else its text, escaped."""
+    """Return ``value`` as markup: unchanged if it is markup (also that of a Jinja macro), else its text, escaped."""
     return Markup(value if hasattr(value, "__html__") else escape(_CONTROL.sub("\ufffd", str(value))))
 
 
 def tag(element: str, *children: object, **attributes: object) -> Markup:
-    """An element; children and attributes that are None are omitted.
+    """Return an HTML or SVG element with ``children`` and ``attributes``; those that are None are omitted.
 
     Names of attributes: ``class_`` is "class", ``stroke_width`` is "stroke-width"; numbers are rounded to 1/100.
     """
@@ -36,7 +39,7 @@ def tag(element: str, *children: object, **attributes: object) -> Markup:
 
 
 def joined(*children: object) -> Markup:
-    """The children, concatenated."""
+    """Return ``children`` as one markup, each escaped; those that are None are omitted."""
     return Markup("".join(escaped(child) for child in children if child is not None))
 
 

@@ -1,4 +1,4 @@
-"""Misfit before and after: over the floor, by recording, and in the samples."""
+"""Draw the misfit before and after effects are added: over the floor, by recording, and in the samples."""
 
 from __future__ import annotations
 
@@ -19,7 +19,10 @@ BEATS = (0.0, 0.25, 0.5, 0.75, 1.0)
 
 
 def proof(finding: Finding) -> Markup | None:
-    """Misfit on held-out recordings, as multiples of the floor."""
+    """Draw the misfit on held-out recordings as multiples of the floor, the misfit to be expected.
+
+    Without any, a warning that the result is not validated; None then for an adequate model.
+    """
     given = finding.proof
     if given is None:
         if finding.verdict == "adequate":
@@ -47,7 +50,7 @@ def proof(finding: Finding) -> Markup | None:
 
 
 def _proof_caption(finding: Finding, given: Proof) -> str:
-    """The result of the validation in one sentence."""
+    """Return the result of the validation in one sentence."""
     if "after" not in stages(finding):
         return f"On held-out recordings the misfit is {number(given.before.value)} times the floor"
     times = f"from {number(given.before.value)} to {number(given.after.value)} times the floor"
@@ -57,7 +60,7 @@ def _proof_caption(finding: Finding, given: Proof) -> str:
 
 
 def recordings(finding: Finding) -> Markup | None:
-    """A row for every recording, held-out ones first."""
+    """Draw the misfit with interval of every recording, held-out ones first; None without recordings."""
     if not finding.recordings:
         return None
     scale = channel_scale(finding)
@@ -78,7 +81,7 @@ def recordings(finding: Finding) -> Markup | None:
 
 
 def _recordings_caption(finding: Finding) -> str:
-    """The result by recording in one sentence."""
+    """Return the result by recording in one sentence."""
     scale = channel_scale(finding)
     group = [r for r in finding.recordings if r.held_out] or list(finding.recordings)
     kind = "held-out" if group[0].held_out else "fitted"
@@ -93,7 +96,7 @@ def _recordings_caption(finding: Finding) -> str:
 
 
 def overlays(finding: Finding) -> Markup | None:
-    """Recorded samples with both simulations, one small chart each."""
+    """Draw recorded samples with both simulations, one small chart for each recorded channel; None without any."""
     shown = [o for o in finding.overlays if o.phase][:MOST_OVERLAYS]
     if not shown:
         return None
@@ -108,7 +111,7 @@ def overlays(finding: Finding) -> Markup | None:
 
 
 def _overlays_caption(finding: Finding, shown: Sequence[Overlay], scale: Scale) -> str:
-    """The typical distance between simulation and recording in one sentence."""
+    """Return the typical distance between simulation and recording in one sentence."""
     before, after = (
         median([math.dist(o.recorded, getattr(o, name)) / len(o.phase) ** 0.5 for o in shown])
         for name in ("before", "after")
@@ -134,7 +137,7 @@ def _recordings(finding: Finding, title: str, rows: Sequence[RecordingMisfit], a
 
 
 def _overlay(finding: Finding, overlay: Overlay, scale: Scale) -> Markup:
-    """Recorded and simulated beat, and below it, to another scale, the residuals."""
+    """Draw the recorded and simulated beat, and below it, to another scale, the residuals."""
     left, right = 50.0, 292.0
     simulated = {name: [v * scale.factor for v in getattr(overlay, name)] for name in stages(finding)}
     recorded = [v * scale.factor for v in overlay.recorded]
@@ -164,7 +167,7 @@ def _overlay(finding: Finding, overlay: Overlay, scale: Scale) -> Markup:
 
 
 def table(finding: Finding) -> tuple[list[str], list[list[str]]]:
-    """Headings of the misfits in a table of the recordings, and its rows."""
+    """Return the headings of the columns of misfits in the table of recordings, and the rows of that table."""
     scale = channel_scale(finding)
 
     def cell(interval: Interval) -> str:
@@ -182,7 +185,7 @@ def _use(recording: RecordingMisfit | Overlay) -> str:
 
 
 def _along(values: Sequence[float]) -> Axis:
-    """An axis from zero, or logarithmic where the values span more than DECADE."""
+    """Return an axis from zero that holds ``values``; logarithmic where their ratios exceed DECADE."""
     positive = [v for v in values if v > 0]
     low, high = min(positive, default=1.0), max(positive, default=1.0)
     if high > DECADE * low:

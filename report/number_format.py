@@ -1,4 +1,4 @@
-"""Numbers with units: millimetres, millinewtons, degrees, at most four digits."""
+"""Format numbers with units: millimetres, millinewtons, degrees, at most four digits."""
 
 from __future__ import annotations
 
@@ -13,23 +13,23 @@ _PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, 
 
 
 class Scale(NamedTuple):
-    """A factor on SI values, and the unit of the product."""
+    """A factor by which SI values are multiplied, and the ``unit`` of the product."""
 
     factor: float
     unit: str
 
     def text(self, value: float, digits: int = 3) -> str:
-        """``value`` with its unit."""
+        """Return ``value`` (SI) with its unit, to ``digits`` significant digits."""
         return with_unit(number(value * self.factor, digits), self.unit)
 
 
 def channel_scale(finding: Finding) -> Scale:
-    """Misfits and samples are shown in mm or mN."""
+    """Return the scale in which misfits and samples are shown: mm or mN."""
     return Scale(1e3, "mm" if finding.unit == "m" else "mN")
 
 
 def scale_for(values: Iterable[float | None], unit: str) -> Scale:
-    """A scale whose prefix suits the largest of ``values``; radians become degrees, small masses grams."""
+    """Return a scale whose prefix suits the largest of ``values``; radians become degrees, small masses grams."""
     largest = max((abs(v) for v in values if v is not None), default=0.0)
     if unit == "rad":
         return Scale(180 / math.pi, "°")
@@ -42,7 +42,7 @@ def scale_for(values: Iterable[float | None], unit: str) -> Scale:
 
 
 def number(value: float, digits: int = 3) -> str:
-    """``value`` to ``digits`` significant digits, with a true minus sign; integers up to 99999 stay whole."""
+    """Return ``value`` to ``digits`` significant digits, with a true minus sign; integers up to 99999 stay whole."""
     if value == 0:
         return "0"
     power = math.floor(math.log10(abs(value)))
@@ -53,24 +53,24 @@ def number(value: float, digits: int = 3) -> str:
 
 
 def signed(value: float) -> str:
-    """A number with its sign, + too."""
+    """Return ``value`` as a number with its sign, also "+"."""
     return f"+{number(value)}" if value > 0 else number(value)
 
 
 def share(part: float) -> str:
-    """A fraction as a whole percentage."""
+    """Return the fraction ``part`` as a whole percentage."""
     return with_unit(number(float(round(100 * part))), "%")
 
 
 def with_unit(text: str, unit: str) -> str:
-    """Number and unit, with a space between them except before °."""
+    """Return the number ``text`` and its unit, with a space between them except before °."""
     if not unit:
         return text
     return f"{text}{unit}" if unit == "°" else f"{text}\u00a0{unit}"
 
 
 def percent(part: float) -> str:
-    """A fraction as a percentage; rounded to 0 % or 100 % only where it is exactly that."""
+    """Return the fraction ``part`` as a percentage; rounded to 0 % or 100 % only where it is exactly that."""
     value = 100 * part
     if 0 < value < 0.1:
         return "< 0.1\u00a0%"
@@ -80,7 +80,7 @@ def percent(part: float) -> str:
 
 
 def bounds(interval: Interval, scale: Scale, digits: int = 3) -> str:
-    """The 90 % interval in words, without its unit."""
+    """Return the 90 % interval as text without its unit, such as "1 to 3" or "above 1"."""
     low, high = (None if v is None else number(v * scale.factor, digits) for v in (interval.low, interval.high))
     if low is None and high is None:
         return "not bounded by the data"
@@ -90,7 +90,7 @@ def bounds(interval: Interval, scale: Scale, digits: int = 3) -> str:
 
 
 def condition(recording: RecordingMisfit) -> str:
-    """Flap frequency, lag, pressure and airspeed."""
+    """Return flap frequency, phase lag, pressure and airspeed of ``recording`` as text."""
     parts = [f"{number(recording.flap_frequency_hz)} Hz"]
     if recording.phase_lag_deg:
         parts.append(f"lag {number(recording.phase_lag_deg)}°")
@@ -101,7 +101,7 @@ def condition(recording: RecordingMisfit) -> str:
 
 
 def shortened(text: str, letters: int) -> str:
-    """``text`` with at most ``letters`` characters; the middle is cut, as names differ at both ends."""
+    """Return ``text`` with at most ``letters`` characters; the middle is cut, because names differ at both ends."""
     if len(text) <= letters:
         return text
     tail = letters // 3
@@ -109,26 +109,26 @@ def shortened(text: str, letters: int) -> str:
 
 
 def titles_of(names: Iterable[str], finding: Finding) -> list[str]:
-    """Titles of effects, from the hypotheses of one effect; else their names as words."""
+    """Return the display titles of the effects ``names``; for one without a hypothesis of its own, its name."""
     known = {h.effects[0]: h.title for h in finding.hypotheses if len(h.effects) == 1}
     return [known.get(name) or name.replace("_", " ").capitalize() for name in names]
 
 
 def listed(items: Iterable[str], last: str = "and") -> str:
-    """Items separated by commas, with the word ``last`` before the last one."""
+    """Return ``items`` separated by commas, with the word ``last`` before the last one."""
     words = list(items)
     return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} {last} {words[-1]}" if words else ""
 
 
 def best_of(finding: Finding) -> Hypothesis | None:
-    """The hypothesis of the "after" model, else the most probable one besides the nominal model."""
+    """Return the hypothesis of the "after" model, or the most probable one besides the nominal model; None if none."""
     others = [h for h in finding.hypotheses if h.effects]
     put_in = [h for h in others if set(h.effects) == set(finding.added_effects)]
     return next(iter([*put_in, *others]), None)
 
 
 def stages(finding: Finding) -> dict[str, str]:
-    """Names of the models compared: "before" and, where effects were added, "after"."""
+    """Return the legend texts of the models that are compared: "before" and, where effects were added, "after"."""
     if not finding.added_effects:
         return {"before": "nominal model, refitted"}
     after = "the named effects" if finding.named else "the closest of the library"  # short: titles of maps
@@ -136,17 +136,17 @@ def stages(finding: Finding) -> dict[str, str]:
 
 
 def added_effects(finding: Finding) -> str:
-    """What the "after" model adds: the named effects or, without any, the closest ones of the library."""
+    """Return what the "after" model adds: the named effects or, without any, the closest ones of the library."""
     return "the named effects" if finding.named else "the closest effects of the library, which do not explain it"
 
 
 def change(finding: Finding, before: str, after: str) -> str:
-    """Both values, or only the first where no effect was added."""
+    """Return both values as text, or only the first where no effect was added."""
     return f"{before} before, {after} after" if "after" in stages(finding) else before
 
 
 def capital(text: str) -> str:
-    """``text`` with a capital letter in front, the others as they are."""
+    """Return ``text`` with a capital first letter, the other letters unchanged."""
     return text[:1].upper() + text[1:]
 
 

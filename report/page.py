@@ -1,4 +1,4 @@
-"""The report of a finding: verdict, validation, location, ranking, numbers."""
+"""Make the report of a finding: verdict, validation, location, ranking of hypotheses, numbers."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from wingfit.report.svg import Axis, drawing, text, x_axis
 
 
 def html(finding: Finding) -> str:
-    """The report as one HTML file, without scripts or anything to load."""
+    """Return the report as one HTML file, which contains no script and loads nothing."""
     return render(
         "finding.html",
         title=f"{headline(finding)} ({finding.dataset})",
@@ -40,7 +40,7 @@ def html(finding: Finding) -> str:
 
 
 def headline(finding: Finding) -> str:
-    """The verdict in one line."""
+    """Return the verdict in one line."""
     named = titles_of(finding.named, finding)
     together = " + ".join(named)
     if finding.verdict == "ambiguous" and named:
@@ -55,7 +55,7 @@ def headline(finding: Finding) -> str:
 
 
 def _tiles(finding: Finding) -> list[tuple[str, str, str]]:
-    """Of each of the main numbers its name, its value and its meaning."""
+    """Return name, value and meaning of each of the main numbers."""
     scale = channel_scale(finding)
     correlation = number(finding.floors.lag1_autocorrelation, 2)
     tiles = [
@@ -103,7 +103,7 @@ def _floors(finding: Finding) -> Markup:
 
 
 def _made(finding: Finding) -> list[str]:
-    """Lines on the model, the computation and the versions."""
+    """Return lines of text on the model, the computation and the versions."""
     versions = ", ".join(f"{name} {version}" for name, version in finding.versions.items())
     size, unit = (60, "minutes") if finding.seconds >= 60 else (1, "seconds")
     spent = f"{number(finding.seconds / size, 2)} {unit}"

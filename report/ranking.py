@@ -1,4 +1,4 @@
-"""Ranking of the hypotheses."""
+"""Select and describe the hypotheses for their ranking in the report."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ MOST_SHOWN = 8
 
 
 def parts(finding: Finding) -> tuple[list[Hypothesis], list[Hypothesis]]:
-    """The strongest hypotheses, and all others."""
+    """Return the hypotheses that are always shown (the first MOST_SHOWN and the nominal model), and all others."""
     # the nominal model is always shown: all others are compared with it
     shown = [h for k, h in enumerate(finding.hypotheses) if k < MOST_SHOWN or not h.effects]
     return shown, [h for h in finding.hypotheses if h not in shown]
 
 
 def is_selected(hypothesis: Hypothesis, finding: Finding) -> bool:
-    """Whether the verdict names this hypothesis."""
+    """Return whether the verdict names this hypothesis."""
     selected = finding.indistinguishable if finding.verdict == "ambiguous" else [finding.named]
     return bool(hypothesis.effects) and any(set(hypothesis.effects) == set(names) for names in selected)
 
 
 def caption(finding: Finding) -> str:
-    """The main result of the ranking in one sentence."""
+    """Return the main result of the ranking in one sentence."""
     best = best_of(finding)
     if best is None:
         return "Only the nominal model was considered"

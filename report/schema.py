@@ -1,4 +1,4 @@
-"""The JSON Schema of a finding, generated from its types; ``python -m wingfit.report.schema`` prints it."""
+"""Generate the JSON Schema of a finding from its types; ``python -m wingfit.report.schema`` prints it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from wingfit.report.finding_file import ADAPTER, FORMAT_VERSION
 
 
 def finding_schema() -> dict[str, Any]:
-    """JSON Schema (2020-12) of what :func:`finding_json` makes."""
+    """Return the JSON Schema (2020-12) of the output of :func:`finding_json`."""
     schema = untitled(ADAPTER.json_schema(mode="serialization"))
     required = [*schema["required"], "format_version"]  # fields with a default are always written
     return {
@@ -24,7 +24,7 @@ def finding_schema() -> dict[str, Any]:
 
 
 def schema_text() -> str:
-    """The text of the published schema, docs/schemas/finding.schema.json."""
+    """Return the text of the published schema, docs/schemas/finding.schema.json."""
     return as_text(finding_schema())
 
 

@@ -1,7 +1,7 @@
-"""SVG charts: axes with round numbers, marks, colour levels, legends.
+"""Draw SVG charts: axes with round numbers, marks, colour levels, legends.
 
-Drawings are about 360 units wide, so that text keeps its size on a phone, where each fills the width. Colours are CSS
-classes, defined in style.css for light and dark.
+Coordinates are in units of which a drawing is about 360 wide, so that text keeps its size on a phone, where each
+drawing fills the width. Colours are CSS classes, defined in style.css for light and dark.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class Axis:
     logarithmic: bool = False
 
     def at(self, value: float) -> float:
-        """Coordinate of ``value``; values beyond the ends are moved to them."""
+        """Return the coordinate of ``value``; values beyond the ends are moved to them."""
         value = min(max(value, self.low), self.high)
         if self.logarithmic:
             part = math.log(value / self.low) / math.log(self.high / self.low)
@@ -44,7 +44,7 @@ class Axis:
         return self.start + part * (self.end - self.start)
 
     def ticks(self, count: int = 5) -> list[float]:
-        """Round values on the axis, about ``count``."""
+        """Return round values on the axis, about ``count`` of them."""
         if self.logarithmic:
             powers = range(math.floor(math.log10(self.low)), math.ceil(math.log10(self.high)) + 1)
             found = [m * 10.0**p for p in powers for m in (1, 2, 5)]
@@ -56,7 +56,10 @@ class Axis:
 
 
 def axis(values: Sequence[float], start: float, end: float, *, zero: bool = False, room: float = 0.05) -> Axis:
-    """A linear axis that holds all ``values``, and zero if required; ``room``: free part of the range at its ends."""
+    """Return a linear axis from ``start`` to ``end`` that holds all ``values``, and the value 0 if ``zero``.
+
+    ``room``: free part of the range at each end.
+    """
     held = [*values, 0.0] if zero or not values else list(values)
     low, high = min(held), max(held)
     free = room * (high - low) if high > low else abs(high) * 0.1 or 1.0
@@ -65,52 +68,52 @@ def axis(values: Sequence[float], start: float, end: float, *, zero: bool = Fals
 
 
 def drawing(width: float, height: float, label: str, *parts: object) -> Markup:
-    """An SVG that fills the width of its parent; ``label`` is its text alternative."""
+    """Return an SVG of ``parts`` that fills the width of its parent; ``label`` is its text alternative."""
     return tag("svg", *parts, viewBox=f"0 0 {width:g} {height:g}", role="img", aria_label=label)
 
 
 def text(x: float, y: float, words: object, *, anchor: str = "start", class_: str | None = None) -> Markup:
-    """Text with its baseline at ``y``."""
+    """Draw ``words`` at ``x`` with the baseline at ``y``; ``anchor``: which end, or the middle, is at ``x``."""
     return tag("text", words, x=x, y=y, text_anchor=None if anchor == "start" else anchor, class_=class_)
 
 
 def turned_text(x: float, y: float, words: str) -> Markup:
-    """The label of a vertical axis, centred at (x, y)."""
+    """Draw the label of a vertical axis, centred at (x, y)."""
     return tag("text", words, transform=f"translate({x:g},{y:g}) rotate(-90)", text_anchor="middle", class_="label")
 
 
 def line(x1: float, y1: float, x2: float, y2: float, class_: str = "grid") -> Markup:
-    """A straight line."""
+    """Draw a straight line from (x1, y1) to (x2, y2)."""
     return tag("line", x1=x1, y1=y1, x2=x2, y2=y2, class_=class_)
 
 
 def places(across: Axis, x: Iterable[float], up: Axis, y: Iterable[float]) -> Points:
-    """Coordinates of the points (x, y) on two axes."""
+    """Return the coordinates of the points (x, y) on the axes ``across`` and ``up``."""
     return [(across.at(a), up.at(b)) for a, b in zip(x, y, strict=True)]
 
 
 def curve(points: Points, class_: str, end: str = "") -> Markup | None:
-    """A line through ``points``; ``end`` "Z" closes it."""
+    """Draw a line through ``points``, None without any; ``end`` "Z" closes the line."""
     return tag("path", d="M" + "L".join(f"{x:.1f} {y:.1f}" for x, y in points) + end, class_=class_) if points else None
 
 
 def area(points: Points, class_: str) -> Markup | None:
-    """The area inside ``points``."""
+    """Draw the area inside ``points``."""
     return curve(points, class_, "Z")
 
 
 def band(low: Points, high: Points) -> Markup | None:
-    """The area between two lines."""
+    """Draw the area between two lines."""
     return area([*low, *reversed(high)], "band")
 
 
 def dots(points: Points, class_: str) -> Markup | None:
-    """Points as one path with round line ends; the class sets their size."""
+    """Draw ``points`` as one path with round line ends; the CSS class sets their size. None without points."""
     return tag("path", d="".join(f"M{x:.1f} {y:.1f}h0" for x, y in points), class_=class_) if points else None
 
 
 def arrow(x: float, y: float, dx: float, dy: float, class_: str) -> Markup:
-    """An arrow from (x, y) along (dx, dy); its head shrinks with it."""
+    """Draw an arrow from (x, y) along (dx, dy); the head of a short arrow is smaller."""
     length = math.hypot(dx, dy)
     if length < 0.5:
         return tag("circle", cx=x, cy=y, r=1.2, class_=class_)
@@ -123,7 +126,10 @@ def arrow(x: float, y: float, dx: float, dy: float, class_: str) -> Markup:
 
 
 def whisker(along: Axis, y: float, interval: Interval, class_: str, factor: float = 1.0) -> Markup:
-    """A dot with its interval, times ``factor``; an end without a bound is an arrow to the end of the axis."""
+    """Draw a dot with its interval at the height ``y``; values are multiplied by ``factor``.
+
+    An end without a bound is an arrow to the end of the axis.
+    """
     parts: list[Markup] = []
     value = along.at(interval.value * factor)
     for bound, edge in ((interval.low, along.start), (interval.high, along.end)):
@@ -138,7 +144,7 @@ def whisker(along: Axis, y: float, interval: Interval, class_: str, factor: floa
 
 
 def x_axis(along: Axis, top: float, bottom: float, label: str, ticks: Sequence[float] | None = None) -> Markup:
-    """Grid lines, their numbers below, and the label below these (27 units in all)."""
+    """Draw grid lines, their numbers below, and the label below these (27 units in all)."""
     parts: list[Markup] = []
     for value in along.ticks() if ticks is None else ticks:
         at = along.at(value)
@@ -148,7 +154,7 @@ def x_axis(along: Axis, top: float, bottom: float, label: str, ticks: Sequence[f
 
 
 def y_axis(up: Axis, left: float, right: float, label: str, *, count: int = 4) -> Markup:
-    """Grid lines, their numbers to the left, and beside these the rotated label (about 46 units in all)."""
+    """Draw grid lines, their numbers to the left, and beside these the rotated label (about 46 units in all)."""
     parts: list[Markup] = []
     room = 36.0  # between the axis and the middle of the label
     for value in up.ticks(count):
@@ -158,17 +164,20 @@ def y_axis(up: Axis, left: float, right: float, label: str, *, count: int = 4) -
 
 
 def level(value: float, most: float) -> int:
-    """Colour of ``value`` on a map from 0 to ``most``, 0 to LEVELS - 1."""
+    """Return the number of the colour of ``value`` on a map from 0 to ``most``: 0 to LEVELS - 1."""
     return min(LEVELS - 1, max(0, int(LEVELS * value / most))) if most > 0 else 0
 
 
 def side(value: float, most: float) -> int:
-    """Colour of ``value`` on a map from -``most`` to ``most``, 0 to 2 SIDES; zero is SIDES."""
+    """Return the number of the colour of ``value`` on a map from -``most`` to ``most``: 0 to 2 SIDES; zero is SIDES."""
     return SIDES + max(-SIDES, min(SIDES, round(SIDES * value / most))) if most > 0 else SIDES
 
 
 def cells(classes: Sequence[Sequence[str | None]], across: Axis, down: Axis) -> Markup:
-    """A grid of cells, rows downwards; None: no cell. Equal neighbours of a row become one rectangle."""
+    """Draw a grid of cells with the CSS ``classes`` [rows][columns], rows downwards; None: no cell.
+
+    Equal neighbours of a row become one rectangle.
+    """
     rows, columns = len(classes), len(classes[0])
     width, height = (across.end - across.start) / columns, (down.end - down.start) / rows
     paths: dict[str, list[str]] = {}
@@ -186,7 +195,7 @@ def cells(classes: Sequence[Sequence[str | None]], across: Axis, down: Axis) -> 
 def colour_bar(
     across: Axis, y: float, classes: Sequence[str], label: str, mark: tuple[float, str] | None = None
 ) -> Markup:
-    """A colour bar of ``classes`` over ``across``, 44 units high with its numbers; ``mark``: a value and its name."""
+    """Draw a bar of the colours ``classes`` over ``across``, 44 units high; ``mark``: a value and its name."""
     width = (across.end - across.start) / len(classes)
     parts = [
         tag("rect", x=across.start + k * width, y=y, width=width + 0.3, height=9.0, class_=name)
@@ -204,7 +213,7 @@ def colour_bar(
 
 
 def bar(part: float, class_: str) -> Markup:
-    """A bar that fills the fraction ``part`` of the width of its parent."""
+    """Draw a bar that fills the fraction ``part`` (0 to 1) of the width of its parent."""
     shown = min(1.0, max(0.0, part))
     return tag(
         "svg",
@@ -218,7 +227,7 @@ def bar(part: float, class_: str) -> Markup:
 
 
 def legend(*entries: tuple[str, str]) -> Markup:
-    """A legend of (kind, name); ``kind`` is one of the swatches below."""
+    """Draw a legend; each entry is (kind, name), and ``kind`` is one of the symbols defined below."""
     swatches: dict[str, Callable[[], object]] = {
         "before": lambda: tag("circle", cx=9, cy=6, r=3.6, class_="dot before"),
         "after": lambda: tag("circle", cx=9, cy=6, r=3.6, class_="dot after"),

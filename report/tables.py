@@ -1,4 +1,4 @@
-"""Rows of the tables of the report: genes, free-form law, sources."""
+"""Make the rows of the tables of the report: genes, free-form law, sources."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from wingfit.report.number_format import bounds, number, scale_for, titles_of, w
 
 
 def genes(finding: Finding) -> tuple[list[GeneValue], list[GeneValue]]:
-    """Genes of the effects, and those of the nominal model."""
+    """Return the genes of the effects, and those of the nominal model."""
     effects = [g for g in finding.genes if g.off is not None or "." in g.name]
     return effects, [g for g in finding.genes if g not in effects]
 
 
 def gene(given: GeneValue) -> tuple[str, str, str]:
-    """Value of a gene, its 90 % interval, and the value that means no effect."""
+    """Return value and 90 % interval of a gene as text, and the value that means no effect ("" if there is none)."""
     value = given.value
     scale = scale_for((value.value, value.low, value.high), given.unit)
     off = "" if given.off is None else with_unit(number(given.off * scale.factor), scale.unit)
@@ -26,12 +26,12 @@ def gene(given: GeneValue) -> tuple[str, str, str]:
 
 
 def interval_of(term: Term) -> str:
-    """The 90 % interval of the coefficient of a term, in SI units."""
+    """Return the 90 % interval of the coefficient of ``term``, in SI units."""
     return bounds(term.coefficient, scale_for((), "1" if term.unit == "rad" else term.unit))
 
 
 def sources(finding: Finding) -> list[tuple[str, str]]:
-    """Titles of the named effects, and the sources of their laws."""
+    """Return (title, source of its law) of each named effect."""
     found: dict[str, str] = {}
     for h in sorted(finding.hypotheses, key=lambda h: len(h.effects) > 1):  # its own source rather than a common one
         if h.source and set(h.effects) <= set(finding.named):

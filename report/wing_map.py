@@ -1,4 +1,4 @@
-"""Misfit of each marker on the wing, before and after, and its direction."""
+"""Draw the misfit of each marker on the wing, before and after effects are added, and its direction."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ MOST_ROWS = 24
 
 
 def wing_map(finding: Finding) -> Markup | None:
-    """Markers on the planform; force axes, which have no position, as a list."""
+    """Draw markers on the planform, or force axes, which have no position, as a list; None without either."""
     placed = [m for m in finding.markers if m.x is not None and m.y is not None]
     scale = channel_scale(finding)
     if placed:
@@ -28,7 +28,7 @@ def wing_map(finding: Finding) -> Markup | None:
 
 
 def caption(finding: Finding, scale: Scale) -> str:
-    """The largest misfit in one sentence."""
+    """Return a sentence on the largest misfit."""
     worst = max(finding.markers, key=lambda m: m.before)
     what = "marker" if finding.kind == "tracks" else "force axis"
     if worst.before <= 0:
@@ -107,7 +107,7 @@ class _Plan:
         )
 
     def place(self, finding: Finding) -> Markup | None:
-        """The estimated location as a box, over the full chord where no part of it is estimated."""
+        """Draw the estimated location as a box, over the full chord where no part of the chord is estimated."""
         where = finding.where
         if where is None or where.span is None or not self.outline:
             return None
@@ -120,7 +120,7 @@ class _Plan:
 
 
 def _directions(placed: Sequence[MarkerMisfit], plan: _Plan, scale: Scale) -> Markup:
-    """Oblique view of the wing, with arrows along the mean direction of the misfit at its largest."""
+    """Draw an oblique view of the wing, with arrows along the mean direction of the misfit at its largest."""
     reach = (plan.x1 - plan.x0) * SLANT
     size = (RIGHT - LEFT - 30) / (plan.y1 - plan.y0 + reach or 1.0)
 
@@ -165,7 +165,7 @@ def _triad(x: float, y: float) -> Markup:
 
 
 def _way(placed: Sequence[MarkerMisfit]) -> str:
-    """Axis and phase of the largest part of the mean-square misfit, in words."""
+    """Return a text on the axis and the phase of the largest part of the mean-square misfit."""
     weights = [m.before**2 for m in placed]
     if not sum(weights):
         return "no direction: no misfit beyond the noise"
@@ -182,7 +182,7 @@ def _way(placed: Sequence[MarkerMisfit]) -> str:
 
 
 def _radius(points: Sequence[tuple[float, float]]) -> float:
-    """Radius of the circles: small enough that close markers hardly overlap."""
+    """Return the radius of the circles at ``points``: small enough that close markers hardly overlap."""
     nearest = sorted(
         min((math.dist(a, b) for j, b in enumerate(points) if j != i), default=16.0) for i, a in enumerate(points)
     )
@@ -197,7 +197,7 @@ def _ends(place: Interval | None) -> tuple[float, float]:
 
 
 def _axes(finding: Finding, scale: Scale) -> Markup:
-    """Misfit of every channel without a position, largest first."""
+    """Draw the misfit of every channel without a position, largest first."""
     shown = sorted(finding.markers, key=lambda m: -m.before)[:MOST_ROWS]
     most = max(max(m.before, m.after) for m in shown) * scale.factor or 1.0
     along = svg.Axis(0, 1.05 * most, 12, 348)

@@ -1,1 +1,1 @@
-"""Whitened recordings, fits of hypotheses, and score tests."""
+"""Reduce recordings to whitened coefficients, fit hypotheses to these, and score-test suspects."""

@@ -1,4 +1,4 @@
-"""Competing fits of suspects from the genes' estimates: those that can no longer win are stopped."""
+"""Fit several suspects in competition, from the estimates of the genes; fits that can no longer win are stopped."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ SAME_FIT_DISTANCE = 0.05  # of a box: fits of the same suspects that are this ne
 
 @dataclass(frozen=True)
 class StartPoint:
-    """The nominal model with the suspects of ``trials``, their genes at ``unit`` [E] in unit coordinates."""
+    """A start: the nominal model plus the suspects of ``trials``, their E genes at ``unit`` [E], bounds at 0 and 1."""
 
     trials: tuple[Trial, ...]
     unit: Float[Array, " E"]
@@ -35,9 +35,9 @@ class StartPoint:
 
 
 def start_points(trial: Trial, others: Sequence[Trial] = (), refit: Refit | None = None) -> list[StartPoint]:
-    """A suspect of typical size at the location of ``trial`` and at its typical location.
+    """Return starts with the suspect of ``trial`` at typical size: at the trial's location, and at a typical one.
 
-    It is combined with the suspects ``others`` of ``refit``, which keep their fitted genes.
+    The suspects of ``others`` are in the model too, with the genes that were fitted in ``refit``.
     """
     suspect = trial.suspect
     typical, size = typical_units(suspect), size_columns(suspect)
@@ -52,18 +52,17 @@ def start_points(trial: Trial, others: Sequence[Trial] = (), refit: Refit | None
 def fit_from_estimates(
     context: FitContext, initial: Fit, starts: Sequence[StartPoint], limit: float, target: float = np.inf
 ) -> Iterator[list[tuple[StartPoint, Fit]]]:
-    """Fit all ``starts`` from the estimates, the genes of ``initial``; yields the rivals of the best after every step.
+    """Fit all ``starts`` from the nominal genes of ``initial`` (the estimates); yields the best after every step.
 
-    At the nominal fit the genes have absorbed what they could of a suspect, and may not return. Every fit runs for
-    FIRST_STEPS; then each that can still overtake the best continues. A fit is stopped
+    At the nominal fit, genes have absorbed what they could of a suspect's effect, and a fit may not undo that. Each
+    report has the best start with its fit, and all whose excess is not much larger (`Policy.rivalry`); there is none
+    where no start can be simulated. Every fit runs for FIRST_STEPS; then each that can still overtake the best
+    continues. A fit is stopped
 
-    - where it gains little and has far more excess than the best (`Policy.rivalry`), or more than ``limit`` (m^2
-      or N^2);
-    - where it does not lead and would end above one of these, or above ``target``, even with faster progress
-      (`Policy.acceleration`);
-    - where a fit of the same suspects has come to the same genes.
-
-    Yields nothing where none can be simulated.
+    - where a step gains little and its excess is far above the best (`Policy.rivalry`) or above ``limit`` (m^2 or N^2);
+    - where it is not the best, and even with faster progress (`Policy.acceleration`) would end far above the best, or
+      above ``target`` (m^2 or N^2);
+    - where a better fit of the same suspects has come to the same genes.
     """
     fits = _CompetingFits(context.data, limit, target)
     for start in starts:
@@ -73,18 +72,18 @@ def fit_from_estimates(
 
 
 class _CompetingFits:
-    """Fits that compete; hopeless ones are stopped."""
+    """Fits that run side by side, hopeless ones being stopped; ``limit``, ``target``: see fit_from_estimates."""
 
     def __init__(self, data: WhitenedData, limit: float, target: float) -> None:
         self.data, self.limit, self.target = data, limit, target
         self.fits = list[_CompetingFit]()
 
     def add(self, start: StartPoint, steps: Iterator[Fit]) -> None:
-        """Add the fit from ``start``."""
+        """Add the fit from ``start``; the iterator ``steps`` yields its successive results."""
         self.fits.append(_CompetingFit(start, steps))
 
     def run(self, steps: int) -> Iterator[list[tuple[StartPoint, Fit]]]:
-        """Run all fits to ``steps`` steps, those with the lowest cost first; yields the rivals after each step."""
+        """Continue all fits, lowest cost first, up to ``steps`` steps each; yields the best fits after each step."""
         for fit in sorted(self.fits, key=lambda one: one.cost):
             while fit.steps_taken < steps and not self._should_stop(fit) and fit.step():
                 yield self._rivals()
@@ -101,7 +100,7 @@ class _CompetingFits:
         return self._expected_excess(fit) > min(self.target, rivalry) or repeated
 
     def _expected_excess(self, fit: _CompetingFit) -> float:
-        """Excess at the last step if the fit progresses faster than in its latest step (`Policy.acceleration`)."""
+        """Return the excess over the noise at the last step if progress becomes `Policy.acceleration` times as fast."""
         before, now = (self.data.excess(one.coefficients) for one in fit.last_fits)
         if now <= 0.0 or now >= before:
             return now
@@ -111,7 +110,7 @@ class _CompetingFits:
         return self.data.excess(fit.last_fits[-1].coefficients) if fit.last_fits else np.inf
 
     def _rivalry_limit(self) -> float:
-        """Excess above which a fit is no rival of the best, and at least what noise may produce."""
+        """Return the excess above which a fit is no rival of the best: a multiple of its, at least that of noise."""
         least = min(self._excess(one) for one in self.fits)
         return max(self.data.policy.rivalry * least, tolerated_excess(self.data, 0.0, 0.0))
 
@@ -123,7 +122,7 @@ class _CompetingFits:
 
 @dataclass
 class _CompetingFit:
-    """A running fit with its last two steps."""
+    """A running fit: its start, the iterator over its steps, the last two results, and the number of steps."""
 
     start: StartPoint
     steps: Iterator[Fit]
@@ -136,13 +135,13 @@ class _CompetingFit:
         return self.last_fits[-1].cost if self.last_fits else np.inf
 
     def same_as(self, other: _CompetingFit) -> bool:
-        """Whether two fits of the same suspects have come to the same genes."""
+        """Return whether ``other`` is a different fit of the same suspects that has come to the same genes."""
         if self is other or self.start.names != other.start.names:
             return False
         return bool(np.abs(self.last_fits[-1].unit - other.last_fits[-1].unit).max() <= SAME_FIT_DISTANCE)
 
     def step(self) -> bool:
-        """Take a step; return whether there was one."""
+        """Take a step; return False where the fit has ended or failed."""
         try:
             self.last_fits = [*self.last_fits[-1:], next(self.steps)]
         except (StopIteration, *FIT_ERRORS):
@@ -152,7 +151,7 @@ class _CompetingFit:
 
 
 def _from_estimates(context: FitContext, initial: Fit, start: StartPoint) -> Iterator[Fit]:
-    """Fits of the nominal model with the suspects of ``start``; InitialSimulationError where it cannot be simulated."""
+    """Return the steps of a fit from ``initial`` and ``start``; InitialSimulationError if these cannot be simulated."""
     suspects = [trial.suspect for trial in start.trials]
     model = context.subject.extended([suspect.name for suspect in suspects])
     free = (*initial.problem.free, *(gene.name for suspect in suspects for gene in suspect.genes))

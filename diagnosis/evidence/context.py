@@ -1,4 +1,4 @@
-"""What every fit of a diagnosis needs: the rig, its recordings, and an evaluator."""
+"""Bundle what every fit of a diagnosis needs: the rig, its recordings, and an evaluator."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ class FitContext:
     evaluator: Evaluator
 
     def finer(self) -> Iterator[FitContext]:
-        """The same with the finer discretisations of the rig, cheapest first."""
+        """Return this context with each finer discretisation of the rig, cheapest first."""
         return (replace(self, subject=finer) for finer in self.subject.finer_subjects())
 
     def problem(self, model: Model, free: tuple[str, ...], base: Genome) -> Problem:
-        """The genes ``free`` of ``model`` against all recordings; the other genes keep their value in ``base``."""
+        """Return the problem of fitting genes ``free`` of ``model`` to all recordings; ``base`` has the other genes."""
         return Problem(model, self.data.recordings, free, base, self.data.axes)
 
     def evaluate(
         self, problem: Problem, values: Float[Array, "B F"]
     ) -> tuple[Float[Array, "B D"], tuple[str | None, ...], list[Array]]:
-        """Coefficients of the residuals, reasons of failures, and residuals; see :meth:`WhitenedData.evaluate`."""
+        """Simulate ``values`` [B, F] of F free genes; returns the same as :meth:`WhitenedData.evaluate`."""
         return self.data.evaluate(problem, self.evaluator, values)

@@ -1,8 +1,8 @@
-"""Gauss-Newton fits of Fourier coefficients in the box of the genes, with a Jacobian that is updated or measured.
+"""Fit genes to Fourier coefficients by Gauss-Newton steps within their bounds; the Jacobian is measured or updated.
 
-A diagnosis refits a dozen extended models that differ little from the nominal one. They take over its Jacobian; only
-the columns of added genes are measured. Each step updates it (Broyden 1965), and it is measured again where it no
-longer predicts what a step does.
+A diagnosis fits a dozen models that differ from the nominal one by a few added genes. They take over its Jacobian; only
+the columns of the added genes are measured by finite differences. Each step updates it (Broyden 1965); where it no
+longer predicts what a step does, it is measured again.
 """
 
 from __future__ import annotations
@@ -22,23 +22,23 @@ from wingfit.inference.gauss_newton import Quadratic, Trials
 from wingfit.records.array_types import Array, Bool, Float, Mask
 
 PRIOR_SD = 0.5  # standard deviation of a gene's prior, unit coordinates
-# Dampings tried at once, a group of lanes. Relative to each gene's own curvature (Marquardt 1963), about the last good
-# factor, they suit genes that are identifiable one by one; relative to the box (Levenberg 1944), they follow the curved
-# valleys of stiffnesses that compensate each other.
+# Dampings tried at once, as many as fill the lanes of the processor. Relative to each gene's own curvature (Marquardt
+# 1963), about the last good factor, they suit genes that are identifiable one by one; equal for all genes (Levenberg
+# 1944), they follow the curved valleys of stiffnesses that compensate each other.
 DAMPING_FACTORS = (10.0 ** np.array([-4.0, -1.0, 0.0, 1.0]), 10.0 ** np.array([0.5, 2.0, 3.5, 5.0]))
 FIRST_DAMPING, LEAST_DAMPING, LARGEST_DAMPING = 1e-3, 1e-6, 1e4  # relative to each gene's curvature
 SINGULAR = 1e-12  # of the largest curvature, added to every damping so that no curvature is singular
 GOOD_STEP_RATIO = 0.6  # of the predicted decrease; below it the Jacobian is measured again
 RELATIVE_TOLERANCE = 2e-3  # of the weighted chi-squared; a fit has converged where a step gains less
 COST_TOLERANCE = 0.3  # least decrease of the cost that is worth another step
-SLOW_FACTOR = 5.0  # times that: a step that gains less is small, because the valley is curved or the slopes are inexact
+SLOW_FACTOR = 5.0  # times these: a step that gains less is slow, as the valley is curved or the Jacobian inexact
 ACCELERATION_STEP = 0.02  # of the box: length along a step over which the second derivative is measured
 SAME_MOTION_DISTANCE = 0.05  # of the box: an initial motion of genes this near is reused
 FAILED_COEFFICIENT = 1e12  # coefficient of an individual that cannot be simulated
 
 
 class InitialSimulationError(ValueError):
-    """The model cannot be simulated at the start of a fit."""
+    """Raised where the model cannot be simulated at the start of a fit."""
 
 
 FIT_ERRORS = (InitialSimulationError, np.linalg.LinAlgError)  # end one fit, not the diagnosis
@@ -50,13 +50,13 @@ class Fit:
 
     Attributes:
         problem: the model with its free genes.
-        unit: [F] genes in unit coordinates (0 to 1 across each box).
-        coefficients: [D] of the residuals.
-        jacobian: [D, F] derivatives of the coefficients with the unit coordinates.
-        residuals: per recording [T, C].
+        unit: [F] genes in unit coordinates (scaled so that their bounds are 0 and 1).
+        coefficients: [D] Fourier coefficients of the residuals (:class:`WhitenedData`), m or N.
+        jacobian: [D, F] derivatives of the coefficients with respect to ``unit``.
+        residuals: of each recording [T, C], simulated minus recorded, m or N.
         cost: deviance of the coefficients plus the squared distance of the genes from their prior.
-        motion_genes: [F] genes whose motion is the initial motion of simulations near this fit.
-        damping: last good damping factor.
+        motion_genes: [F] genes whose periodic motion is the initial motion of simulations near this fit.
+        damping: factor of the last step that lowered the cost, with which the next step begins.
         jacobian_measured: whether all columns were measured at this fit.
         converged: whether the fit ended because no step gained enough.
     """
@@ -99,8 +99,8 @@ def broyden_fit(
 ) -> Fit:
     """Fit the free genes from ``start`` [F] with Broyden updates; InitialSimulationError where it cannot be simulated.
 
-    ``jacobian`` [D, F] is used in the columns ``known`` [F]; the others are measured first, and again where a step
-    gains much less than predicted. If that does not help, all columns are measured, once.
+    ``jacobian`` [D, F] is used in the columns ``known`` [F]; the other columns are measured first, and again where a
+    step gains much less than predicted. If that does not help, all columns are measured, once. At most ``steps`` steps.
     """
     simulator = _Simulator(context, problem)
     first = _initial_fit(simulator, start)
@@ -127,10 +127,10 @@ def broyden_fit(
 
 
 def gauss_newton_fit(context: FitContext, problem: Problem, start: Float[Array, " F"], steps: int) -> Iterator[Fit]:
-    """Fit with the Jacobian measured at every step and at the end; yields every step, the final fit last.
+    """Fit from ``start`` [F], with the Jacobian measured at every step and at the end; yields each step.
 
-    Differences are one-sided until steps gain little. Then they are central, and steps include geodesic acceleration
-    (Transtrum and Sethna 2012, Sec. 3), which follows a curved valley.
+    At most ``steps`` steps. Differences are one-sided until steps gain little. Then they are central, and steps include
+    geodesic acceleration (Transtrum and Sethna 2012, Sec. 3), which follows a curved valley of the cost.
     """
     simulator, every, accelerated = _Simulator(context, problem), np.ones(len(start), bool), False
     now = _measure_columns(simulator, _initial_fit(simulator, start), every, 1)
@@ -147,7 +147,7 @@ def gauss_newton_fit(context: FitContext, problem: Problem, start: Float[Array, 
 
 
 def with_measured_jacobian(context: FitContext, fit: Fit) -> Fit:
-    """``fit`` with all columns of its Jacobian measured.
+    """Return ``fit`` with all columns of its Jacobian measured.
 
     Broyden-updated columns are good enough for stepping, but not for confidence intervals.
     """
@@ -157,12 +157,12 @@ def with_measured_jacobian(context: FitContext, fit: Fit) -> Fit:
 
 
 def _converges(data: WhitenedData, before: Fit, after: Fit, gain: float) -> bool:
-    """Whether a step gained too little, although nearly as much as predicted."""
+    """Return whether to stop: a step gained little, though not much less than predicted (``gain``: their ratio)."""
     return small_gain(data, before, after) and gain > GOOD_STEP_RATIO / 2
 
 
 def small_gain(data: WhitenedData, before: Fit, after: Fit, times: float = 1.0) -> bool:
-    """Whether a step decreased the cost by at most ``times`` the gain that is worth a step."""
+    """Return whether a step decreased the cost by at most ``times`` the least decrease that is worth another step."""
     whole = data.likelihood_weight(before.coefficients) * data.chi_squared(before.coefficients)
     return before.cost - after.cost <= times * max(COST_TOLERANCE, RELATIVE_TOLERANCE * whole)
 
@@ -173,20 +173,20 @@ def _cost(data: WhitenedData, coefficients: Array, unit: Array) -> Array:
 
 @dataclass(frozen=True)
 class _Simulator:
-    """Simulates individuals of a fit's problem."""
+    """Simulates individuals of ``problem``, given by genes scaled so that their bounds are 0 and 1."""
 
     context: FitContext
     problem: Problem
 
     def at(self, units: Array, motion_genes: Array) -> tuple[Array, tuple[str | None, ...], list[Array]]:
-        """Evaluate ``units`` [B, F], starting from the motion of ``motion_genes`` [F]; as WhitenedData.evaluate."""
+        """Simulate ``units`` [B, F], starting from the motion of ``motion_genes`` [F]; as WhitenedData.evaluate."""
         problem, genes = self.problem, free_genes(self.problem)
         genome = problem.genomes(values_at(genes, motion_genes[None]))[0]
         model = self.context.subject.with_initial_motion(problem.model, genome)
         return self.context.evaluate(replace(problem, model=model), values_at(genes, units))
 
     def outputs(self, motion_genes: Array, units: Array) -> tuple[Outputs, tuple[str | None, ...]]:
-        """Coefficients as the only output, and the reasons of failures, for :func:`differences`."""
+        """Return coefficients as the only output, and why individuals failed, as :func:`differences` requires."""
         found, reasons, _ = self.at(units, motion_genes)
         return [found], reasons
 
@@ -206,7 +206,7 @@ def _initial_fit(simulator: _Simulator, unit: Array) -> Fit:
 
 
 def _measure_columns(simulator: _Simulator, fit: Fit, which: Mask, sides: int = 2) -> Fit:
-    """``fit`` with the columns ``which`` of its Jacobian measured by one-sided or central differences in the box."""
+    """Return ``fit`` with columns ``which`` [F] of its Jacobian measured by differences to one or two ``sides``."""
     (columns,) = np.nonzero(which)
     if not len(columns):
         return fit
@@ -218,7 +218,7 @@ def _measure_columns(simulator: _Simulator, fit: Fit, which: Mask, sides: int = 
 
 
 def _step(simulator: _Simulator, fit: Fit, *, accelerated: bool = False) -> tuple[Fit | None, float]:
-    """The best of several damped steps, with its updated Jacobian, and the ratio of actual to predicted decrease.
+    """Try several damped steps; return the best, its Jacobian updated, and its actual / predicted decrease of the cost.
 
     ``accelerated``: try steps with geodesic acceleration as well. (None, 0) where no step decreases the cost.
     """
@@ -259,7 +259,10 @@ def _step(simulator: _Simulator, fit: Fit, *, accelerated: bool = False) -> tupl
 
 
 class _DampedSteps:
-    """Steps from a fit with several ``dampings`` [S, F]; ``own``: factors relative to each gene's own curvature."""
+    """Gauss-Newton steps from a fit with S choices of what is added to the F curvatures, ``dampings`` [S, F].
+
+    ``own``: factors of the first choices, proportional to each gene's curvature; the others are equal for all genes.
+    """
 
     def __init__(self, data: WhitenedData, fit: Fit) -> None:
         white, self.slopes = fit.coefficients / data.scale, fit.jacobian / data.scale[:, None]
@@ -271,13 +274,13 @@ class _DampedSteps:
         self.dampings = np.concatenate([np.outer(self.own, np.diag(curvature)), by_box]) + SINGULAR * curvature.max()
 
     def move(self, damping: Array, acceleration: Array | float = 0.0) -> Array:
-        """The step [F] with ``damping`` [F]; ``acceleration`` [D]: second-order change of the coefficients."""
+        """Return the step [F] with ``damping`` [F]; ``acceleration`` [D]: second-order change of the coefficients."""
         accelerated = self.weight * self.slopes.T @ np.broadcast_to(acceleration / self.scale, len(self.scale))
         return self.quadratic.step(self.unit, damping, self.quadratic.slope + accelerated)
 
 
 def _second_order(simulator: _Simulator, fit: Fit, moves: Array) -> Array:
-    """Second-order changes [S, D] of the coefficients along ``moves`` [S, F], by finite differences."""
+    """Return the second-order changes [S, D] of the coefficients along ``moves`` [S, F]; zero where that fails."""
     part = np.minimum(1.0, ACCELERATION_STEP / np.maximum(np.abs(moves).max(axis=1, keepdims=True), 1e-12))
     found, reasons, _ = simulator.at(np.clip(fit.unit + part * moves, 0.0, 1.0), fit.motion_genes)
     accelerations = (found - fit.coefficients - part * moves @ fit.jacobian.T) / part**2

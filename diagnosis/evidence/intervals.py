@@ -1,4 +1,4 @@
-"""Confidence intervals of genes from noise and from model error."""
+"""Compute confidence intervals of genes from noise and from model error."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ CONFIDENCE = 0.9
 
 
 def standard_errors(freedom: float = np.inf) -> float:
-    """Half-width of a CONFIDENCE interval in standard errors, for errors known with ``freedom`` degrees of freedom."""
+    """Return half the width of a CONFIDENCE interval in standard errors that have ``freedom`` degrees of freedom."""
     return float(scipy.special.stdtrit(freedom, 0.5 + CONFIDENCE / 2))
 
 
 def covariance(data: WhitenedData, fit: Fit) -> Float[Array, "F F"]:
-    """Covariance [F, F] of the genes in unit coordinates.
+    """Return the covariance [F, F] of the genes of ``fit`` in unit coordinates (bounds at 0 and 1).
 
     It includes noise; the model error as a few independent samples (:meth:`WhitenedData.likelihood_weight`), no smaller
-    than the tolerance; and the prior. For forces it adds the scatter of the recordings' scores (a sandwich with
-    recordings as clusters: Liang and Zeger 1986).
+    than the tolerance; and the prior. For forces it adds the scatter of the recordings' scores, the gradients of the
+    log-likelihood (a sandwich with recordings as clusters: Liang and Zeger 1986).
     """
     white, slopes = fit.coefficients / data.scale, fit.jacobian / data.scale[:, None]
     weight, recordings = data.likelihood_weight(fit.coefficients), len(data.recordings)
@@ -41,12 +41,12 @@ def covariance(data: WhitenedData, fit: Fit) -> Float[Array, "F F"]:
 
 
 def _clustered(data: WhitenedData) -> bool:
-    """Whether only recordings are independent: beats of a force differ in size with all their harmonics."""
+    """Return whether only whole recordings are independent: beats of a force differ in size with all harmonics."""
     return any(recording.kind == "forces" for recording in data.recordings)
 
 
 def gene_values(data: WhitenedData, refit: Refit) -> tuple[GeneValue, ...]:
-    """Values and 90 % intervals of all free genes; a size of zero switches its suspect off."""
+    """Return values and 90 % intervals of all free genes; ``off`` is 0 for a size gene of an added suspect."""
     fit, errors = refit.fit, np.sqrt(np.diag(covariance(data, refit.fit)))
     freedom = max(len(data.recordings) - 1, 1) if _clustered(data) else np.inf
     wide = standard_errors(freedom)

@@ -1,4 +1,4 @@
-"""The nominal model, fitted with a sufficient discretisation."""
+"""Fit the nominal model, and choose a discretisation that does not limit the fit."""
 
 from __future__ import annotations
 
@@ -25,11 +25,12 @@ class Nominal:
     """The fitted nominal model.
 
     Attributes:
-        subject: with the discretisation that was chosen.
-        refit: its fit.
-        discretisation_error: misfit (m or N) by the discretisation, from the next finer one; None where there is none.
-        finer: description of the next finer one.
-        remarks: for the user.
+        subject: the rig with the discretisation that was chosen.
+        refit: the fit.
+        discretisation_error: root mean square change (m or N) of the simulation by a finer discretisation, as far as
+            the genes cannot compensate it; None where there is no finer one.
+        finer: description of that finer discretisation; "" where there is none.
+        remarks: for the user, on discretisations that were replaced.
         tried_finer: description of a finer discretisation that was fitted with little gain; it shows that
             discretisation is not the cause of the residual. "" where none was fitted.
     """
@@ -43,9 +44,10 @@ class Nominal:
 
 
 def fit_nominal(context: FitContext, free: tuple[str, ...], values: Mapping[str, float]) -> Iterator[Fit]:
-    """Fit the genes ``free``, all genes at ``values`` first; yields every step.
+    """Fit the genes ``free`` of the nominal model; yields every step.
 
-    ValueError where the model cannot be simulated at ``values``.
+    The fit starts with all genes at ``values`` (by name; others at their estimates). ValueError where the model cannot
+    be simulated there.
     """
     model = context.subject.model
     base = base_genome(model, values)
@@ -55,7 +57,10 @@ def fit_nominal(context: FitContext, free: tuple[str, ...], values: Mapping[str,
 
 
 def choose_discretisation(context: FitContext, fit: Fit, *, refine: bool) -> Nominal:
-    """Take finer discretisations while these fit much better; return the last one with its discretisation error."""
+    """Take finer discretisations while these fit much better; return the last one with its discretisation error.
+
+    ``fit``: of the nominal model of ``context``; without ``refine``, finer ones only serve to estimate the error.
+    """
     data, current, remarks = context.data, make_refit(context.data, fit), list[str]()
     for _ in range(MAX_REFINEMENTS):
         error, finest, ineffective, better = 0.0, "", "", None
@@ -81,10 +86,11 @@ def choose_discretisation(context: FitContext, fit: Fit, *, refine: bool) -> Nom
 
 
 def finer_is_promising(data: WhitenedData, changes: float, gain: float, current: Refit) -> bool:
-    """Whether a finer discretisation is worth a fit.
+    """Return whether a finer discretisation is worth a fit.
 
-    ``changes`` (m or N) is the change that it makes, ``gain`` the fraction of the excess that it is predicted to
-    remove. A linearised prediction does not hold where the change exceeds the whole residual.
+    ``changes`` (m or N) and ``gain`` are those of :func:`finer_change`, ``current`` the fit with the present
+    discretisation. A low predicted gain does not count where the change exceeds the whole residual: the prediction is
+    linearised.
     """
     negligible = data.policy.negligible * data.noise
     matters = changes >= negligible and current.excess >= negligible**2
@@ -92,10 +98,10 @@ def finer_is_promising(data: WhitenedData, changes: float, gain: float, current:
 
 
 def finer_change(finer: FitContext, refit: Refit) -> tuple[float, float]:
-    """Change by a finer model that the genes cannot compensate (root mean square, m or N), and the gain.
+    """Return how much the ``finer`` model changes the simulation of ``refit``, and the gain predicted from that.
 
-    The gain is the fraction of the excess that the change removes by the linearised model; zeros where the simulation
-    fails.
+    The change (root mean square, m or N) is the part that the genes cannot compensate. The gain is the fraction of the
+    excess that this change would remove in the linearised model. Both are zero where the simulation fails.
     """
     fit, data = refit.fit, finer.data
     found, reasons, _ = finer.evaluate(replace(fit.problem, model=finer.subject.extended(refit.names)), fit.individual)
@@ -111,5 +117,5 @@ def finer_change(finer: FitContext, refit: Refit) -> tuple[float, float]:
 
 
 def improves(data: WhitenedData, finer: Refit, coarse: Refit) -> bool:
-    """Whether ``finer`` removes so much of the excess of ``coarse`` that it is worth its cost."""
+    """Return whether ``finer`` fits so much better than ``coarse`` that it is worth its cost (`Policy.finer_gain`)."""
     return finer.excess < (1.0 - data.policy.finer_gain) * coarse.excess and coarse.excess > 0.0

@@ -1,4 +1,4 @@
-"""Full refits of the strongest suspects, alone and together, and their cross-validation."""
+"""Fit the nominal model with one or several suspects added, and cross-validate the fits."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ MAX_HALVINGS = 3  # of the suspects' initial sizes if the start cannot be simula
 
 @dataclass(frozen=True)
 class Refit:
-    """The nominal model with suspects added, fitted in full.
+    """The nominal model with suspects added, all genes fitted.
 
     Attributes:
         trials: the trial from which each suspect started; empty for the nominal model.
         fit: the fit.
-        excess: mean square beyond the noise, m^2 or N^2.
+        excess: mean square of the residual minus that of the noise, m^2 or N^2.
         predicted: the same cross-validated, recordings left out one at a time; None with a single recording.
     """
 
@@ -58,15 +58,16 @@ class Refit:
 
 
 def make_refit(data: WhitenedData, fit: Fit, trials: Sequence[Trial] = ()) -> Refit:
-    """``fit`` with its excess, fitted and cross-validated."""
+    """Return ``fit`` of a model with the suspects of ``trials``, with its excess, fitted and cross-validated."""
     return Refit(tuple(trials), fit, data.excess(fit.coefficients), cross_validated_excess(data, fit))
 
 
 def cross_validated_excess(data: WhitenedData, fit: Fit) -> float | None:
-    """Mean square beyond the noise of each recording when only the others are fitted, by the linearised model.
+    """Return the mean square beyond the noise (m^2 or N^2) of recordings that are each predicted from the others.
 
-    A prior limits how far genes move, and the move that noise in the other recordings makes is allowed for: neither a
-    gene that only one recording identifies nor noise counts against the hypothesis. None for a single recording.
+    Each prediction is that of the linearised model, fitted to the other recordings. A prior limits how far genes move,
+    so that a gene that only one recording identifies does not count against the hypothesis; nor does the move that
+    noise in the other recordings makes. None for a single recording.
     """
     if len(data.recordings) < 2:
         return None
@@ -94,7 +95,8 @@ def cross_validated_excess(data: WhitenedData, fit: Fit) -> float | None:
 def refit_with(context: FitContext, nominal: Fit, trials: Sequence[Trial], base: Fit | None = None) -> Refit | None:
     """Fit the nominal model with the suspects of ``trials``, each from its trial's location and size.
 
-    ``base`` is a fit that contains all but the last of them. None where no start can be simulated.
+    ``nominal``: fit of the nominal model; ``base``: a fit that already contains all suspects but the last, if there is
+    one. None where no start can be simulated, even with smaller sizes.
     """
     before, data = base or nominal, context.data
     model = context.subject.extended([trial.suspect.name for trial in trials])
@@ -130,7 +132,8 @@ def _fit_added_genes(context: FitContext, problem: Problem, start: Array, first_
 def _fit_subset(context: FitContext, problem: Problem, start: Array, before: Fit, which: Mask) -> tuple[Array, Array]:
     """Fit the genes ``which`` [F] of ``problem`` only, because shape genes that move before the size may diverge.
 
-    Returns all genes [F], the others at ``start``, and the columns of the Jacobian that ``before`` has, [D, K].
+    Returns all genes [F], with those not fitted as in ``start`` [F], and the Jacobian's columns [D, K] of the K genes
+    that the fit ``before`` has.
     """
     genes = free_genes(problem)
     base = problem.base.replace(dict(zip(problem.free, values_at(genes, start[None])[0].tolist(), strict=True)))
@@ -142,7 +145,7 @@ def _fit_subset(context: FitContext, problem: Problem, start: Array, before: Fit
 
 
 def refit_at(context: FitContext, refit: Refit, start: Float[Array, " F"] | None = None) -> Refit | None:
-    """``refit`` fitted with the model of ``context`` from its current genes, or anew from ``start`` [F].
+    """Fit ``refit`` again with the model of ``context``, from its present genes or from ``start`` [F].
 
     None where that cannot be simulated.
     """
@@ -156,9 +159,10 @@ def refit_at(context: FitContext, refit: Refit, start: Float[Array, " F"] | None
 
 
 def continue_fit(context: FitContext, refit: Refit, steps: int = CONTINUED_STEPS) -> Refit:
-    """``refit`` fitted further with the Jacobian measured at every step; unchanged where that cannot be simulated.
+    """Continue ``refit`` for up to ``steps`` steps, the Jacobian being measured at every step.
 
-    An individual that was reached from a nearby motion may flutter when it is simulated from rest.
+    Returns it unchanged where that cannot be simulated: an individual whose simulation started from the motion of
+    similar genes may flutter when it starts from rest.
     """
     fit = refit.fit
     try:
@@ -170,21 +174,21 @@ def continue_fit(context: FitContext, refit: Refit, steps: int = CONTINUED_STEPS
 
 
 def fit_to_convergence(context: FitContext, refit: Refit) -> Refit:
-    """``refit`` fitted until it converges, with a measured Jacobian; score tests need that."""
+    """Continue ``refit`` unless it has converged, and measure its Jacobian: score tests require both."""
     if not refit.fit.converged:
         refit = continue_fit(context, refit)
     return make_refit(context.data, with_measured_jacobian(context, refit.fit), refit.trials)
 
 
 def strongest_trials(data: WhitenedData, found: Sequence[list[Trial]], limit: int) -> list[Trial]:
-    """The best trial of each suspect that is worth a refit (`Policy.worth_refit`), strongest first."""
+    """Return up to ``limit`` trials, strongest first: the best of each suspect worth a refit (`Policy.worth_refit`)."""
     policy = data.policy
     best = sorted((trials[0] for trials in found if trials), key=lambda trial: -trial.gain)
     return [trial for trial in best[:limit] if trial.gain >= policy.worth_refit * best[0].gain and trial.gain > 0.0]
 
 
 def partner_trials(data: WhitenedData, base: Refit, found: Sequence[list[Trial]]) -> list[Trial]:
-    """Trials of second effects that would explain most of the residual of ``base``, strongest first."""
+    """Return the trials in ``found`` of second effects that would explain most of the residual of ``base``."""
     nuisance = Nuisance(data, base.fit)
     residual = nuisance.residual
     least_gain = data.policy.partner_gain * (float(residual @ residual) - len(residual))
@@ -192,7 +196,7 @@ def partner_trials(data: WhitenedData, base: Refit, found: Sequence[list[Trial]]
 
 
 def contribution(context: FitContext, refit: Refit, trials: Sequence[Trial] = ()) -> Float[Array, " D"] | None:
-    """Change of the coefficients [D] when the suspects of ``trials`` (all by default) are switched off.
+    """Return how the coefficients [D] change when the suspects of ``trials`` (all by default) are switched off.
 
     All other genes stay the same. None where that cannot be simulated.
     """
@@ -206,7 +210,7 @@ def contribution(context: FitContext, refit: Refit, trials: Sequence[Trial] = ()
 def substitute_trials(
     context: FitContext, refit: Refit, trial: Trial, found: Sequence[list[Trial]], limit: int
 ) -> list[Trial]:
-    """Trials of other suspects that can reproduce most of the contribution of ``trial`` to ``refit``, best first."""
+    """Return up to ``limit`` trials of other suspects that can reproduce most of what ``trial`` adds to ``refit``."""
     change = contribution(context, refit, [trial])
     if change is None:
         return []
@@ -223,7 +227,10 @@ def substitute_trials(
 def _by_explained(
     nuisance: Nuisance, misfit: Array, found: Sequence[list[Trial]], known: Sequence[str]
 ) -> list[tuple[float, Trial]]:
-    """The trial of each suspect not ``known`` that explains most of ``misfit``, with the decrease; strongest first."""
+    """Return the trial of each suspect not ``known`` that explains most of ``misfit``, with the decrease; best first.
+
+    ``misfit`` [N]: whitened, without what the nuisance genes explain; the decrease is that of its sum of squares.
+    """
     best = []
     for trials in found:
         if trials and trials[0].suspect.name not in known:
@@ -236,7 +243,10 @@ def _by_explained(
 def suspect_pairs(
     data: WhitenedData, nominal: Fit, found: Sequence[list[Trial]], beyond: float, limit: int
 ) -> Iterator[tuple[Trial, Trial]]:
-    """Pairs of suspects that together are predicted to reach a chi-squared below ``beyond``, best first."""
+    """Yield pairs of suspects that together are predicted to reach a chi-squared below ``beyond``, best first.
+
+    ``found``: trials of each suspect at the fit ``nominal``; only the ``limit`` best pairs are considered.
+    """
     nuisance = Nuisance(data, nominal)
     residual = nuisance.residual
     best = [trials[0] for trials in found if trials and trials[0].gain > 0.0]
@@ -250,7 +260,7 @@ def suspect_pairs(
 
 
 def _scaled_start(trial: Trial, part: float) -> Array:
-    """Initial genes of the suspect with its size multiplied by ``part``."""
+    """Return the initial genes [E] of the suspect (bounds at 0 and 1) with its size multiplied by ``part``."""
     start, off, size = trial.start, off_units(trial.suspect), size_columns(trial.suspect)
     start[size] = off[size] + part * (start[size] - off[size])
     return start

@@ -1,8 +1,8 @@
-"""The score test of every suspect: how much of the residual it would explain, the nominal genes free to adapt.
+"""Score tests: estimate how much of the residual each suspect would explain, the nominal genes being free to adapt.
 
 A suspect is added at typical sizes, at several locations and shapes. The changes that it makes to the simulated
-recordings are fitted to the residual, after what the nominal genes can explain has been projected out of both (a score
-test with nuisance parameters: Rao 1948; with finite sizes, because many effects have zero slope at zero size).
+recordings are fitted to the residual, after the part that the nominal genes can explain has been projected out of both
+(a score test with nuisance parameters: Rao 1948; with finite sizes, because many effects have zero slope at zero size).
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ from wingfit.inference import score_test
 from wingfit.inference.score_test import amounts, remaining, spread
 from wingfit.records.array_types import Array, Float
 
-LOCATION_SAMPLES = 15  # besides the typical location: two groups of lanes
+LOCATION_SAMPLES = 15  # besides the typical location; 16 in all fill the lanes of the processor twice
 SHAPE_SAMPLES = 7  # for a suspect with other shape genes
-VISIBLE_CHANGE = 1e-3  # of the noise: a suspect that changes less in all is not visible
+VISIBLE_CHANGE = 1e-3  # of the noise: a trial that changes the recordings less is ignored
 
 
 @dataclass(frozen=True)
@@ -33,12 +33,12 @@ class Trial:
 
     Attributes:
         suspect: the effect that is tried.
-        unit: [S, E] its E genes in unit coordinates, one row for each size.
-        changes: [S, D] change of the D harmonic coefficients of all recordings by each size.
-        gain: decrease of chi-squared when all sizes and the nominal genes are fitted.
-        multiples: [S] fitted multiples of the sizes.
-        freedom: degrees of freedom, location and shape genes included.
-        remaining_chi_squared: after that fit, by the linearised model.
+        unit: [S, E] its E genes in unit coordinates (scaled so that their bounds are 0 and 1), one row for each size.
+        changes: [S, D] change of the D Fourier coefficients of all recordings by each size.
+        gain: decrease of chi-squared when the sizes and the nominal genes are fitted, by the linearised model.
+        multiples: [S] factors by which the fit multiplies the sizes.
+        freedom: number of genes E, location and shape included.
+        remaining_chi_squared: chi-squared after that fit.
     """
 
     suspect: Suspect
@@ -51,7 +51,7 @@ class Trial:
 
     @property
     def start(self) -> Float[Array, " E"]:
-        """Genes [E] of the suspect in unit coordinates, at the fitted sizes."""
+        """Genes [E] of the suspect in unit coordinates, with sizes as fitted: the start of a refit."""
         off = off_units(self.suspect)
         size = size_columns(self.suspect)
         start = self.unit[0].copy()
@@ -60,10 +60,11 @@ class Trial:
 
 
 class Nuisance:
-    """The nominal genes as nuisance parameters; their prior counts as F further samples.
+    """The genes of a fit as nuisance parameters: a score test lets them adapt before it credits a suspect.
 
-    The prior is weighted against the likelihood at this fit (:meth:`WhitenedData.likelihood_weight`). ``residual`` [D +
-    F] is the whitened residual that the genes cannot explain.
+    The prior of these F genes counts as F further samples, weighted against the likelihood at ``fit``
+    (:meth:`WhitenedData.likelihood_weight`). ``residual`` [D + F]: the whitened residual without the part that the
+    genes can explain; ``scale`` [D] whitens.
     """
 
     def __init__(self, data: WhitenedData, fit: Fit) -> None:
@@ -74,34 +75,34 @@ class Nuisance:
         self.residual = self.genes.rest(np.concatenate([fit.coefficients / data.scale, weight * (fit.unit - 0.5)]))
 
     def project_out(self, changes: Float[Array, "*B D"]) -> Float[Array, "*B N"]:
-        """Whitened ``changes`` [..., D] of harmonic coefficients, minus the part that the F nominal genes can explain.
+        """Whiten ``changes`` [..., D] of the coefficients, and subtract the part that the F genes can explain.
 
-        The result [..., D + F] has an entry for the prior of each gene.
+        The result [..., D + F] has an additional entry for the prior of each gene.
         """
         return self.genes.rest(changes / self.scale)
 
 
 def off_units(suspect: Suspect) -> Float[Array, " E"]:
-    """Genes [E] in unit coordinates with the suspect switched off."""
+    """Return the genes [E] of ``suspect`` in unit coordinates (bounds at 0 and 1) that switch it off."""
     return unit_at(list(suspect.genes), np.array([gene.nominal for gene in suspect.genes]))
 
 
 def typical_units(suspect: Suspect) -> Float[Array, " E"]:
-    """Genes [E] in unit coordinates with the suspect at its typical size and location."""
+    """Return the genes [E] of ``suspect`` in unit coordinates (bounds at 0 and 1) at its typical size and location."""
     return unit_at(list(suspect.genes), np.array([suspect.typical[gene.name] for gene in suspect.genes]))
 
 
 def size_columns(suspect: Suspect) -> list[int]:
-    """Columns of the suspect's size genes."""
+    """Return the indices of the size genes among the genes of ``suspect``."""
     return [k for k, gene in enumerate(suspect.genes) if gene.name in suspect.size_genes]
 
 
 def score_tests(
     context: FitContext, nominal: Fit, suspects: Sequence[Suspect], known: Sequence[str] = ()
 ) -> Iterator[tuple[Suspect, list[Trial]]]:
-    """Test every suspect at a fit; yields its trials, best first (none where it cannot be simulated).
+    """Score-test every suspect at a fit; yields its trials, best first (none where it cannot be simulated).
 
-    ``nominal`` is the nominal fit, or a fit with the suspects ``known`` added; all its genes may adapt.
+    ``nominal``: the fit of the nominal model, or of one with the suspects ``known`` added; all its genes may adapt.
     """
     nuisance = Nuisance(context.data, nominal)
     values = nominal.problem.base.replace(nominal.values).as_dict()
@@ -143,7 +144,7 @@ def _trial(suspect: Suspect, genes: Array, changes: Array, nuisance: Nuisance) -
 
 
 def _multiple_limits(suspect: Suspect, genes: Array) -> tuple[Array, Array]:
-    """Smallest and largest multiples [S] of each size that stay in the box."""
+    """Return the least and the largest factor [S] on each size in ``genes`` [S, E] within the bounds of its gene."""
     off, size = off_units(suspect), np.array(size_columns(suspect))
     column = size[np.abs(genes[:, size] - off[size]).argmax(axis=1)]  # of the gene that each row moves
     move = genes[np.arange(len(genes)), column] - off[column]
@@ -152,7 +153,10 @@ def _multiple_limits(suspect: Suspect, genes: Array) -> tuple[Array, Array]:
 
 
 def _shapes_to_try(suspect: Suspect, typical: Array) -> list[Array]:
-    """Shapes [E'] in unit coordinates: the suspect's candidate shapes, else ``typical`` and an even spread."""
+    """Return values [E'] in unit coordinates for the E' genes other than sizes.
+
+    These are the suspect's candidate shapes or, if it has none, ``typical`` [E'] and others spread over the bounds.
+    """
     if suspect.candidate_shapes:
         genes = [gene for gene in suspect.genes if gene.name in suspect.shape_genes]
         return [unit_at(genes, np.array(spot)) for spot in suspect.candidate_shapes]
@@ -161,7 +165,10 @@ def _shapes_to_try(suspect: Suspect, typical: Array) -> list[Array]:
 
 
 def _genes_to_try(suspect: Suspect) -> Iterator[Array]:
-    """Genes [S, E] in unit coordinates, one row for each size, at one location and shape."""
+    """Yield the genes [S, E] of each trial in unit coordinates: a row for each size, at one location and shape.
+
+    A suspect without other genes than sizes is tried at several multiples of its typical size.
+    """
     off, typical, size = off_units(suspect), typical_units(suspect), size_columns(suspect)
     shape = [k for k in range(len(off)) if k not in size]
     for spot in _shapes_to_try(suspect, typical[shape]) if shape else [typical[shape]]:

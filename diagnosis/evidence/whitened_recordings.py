@@ -1,4 +1,4 @@
-"""Recordings as one whitened vector of Fourier coefficients, and the excess of a residual beyond the noise."""
+"""Reduce recordings to one vector of Fourier coefficients with known noise, and measure residuals beyond that noise."""
 
 from __future__ import annotations
 
@@ -20,15 +20,17 @@ from wingfit.records.array_types import Array, Float
 
 @dataclass(frozen=True)
 class WhitenedData:
-    """Recordings with their noise.
+    """Recordings, reduced to Fourier coefficients of the beat, with the noise of these.
 
-    A coefficient vector [D] holds the coefficients of all used channels, recording by recording, channel by channel.
+    A coefficient vector [D], of recordings or of residuals, holds the coefficients (m or N) of all used channels,
+    recording by recording, channel by channel. Used are channels with enough samples.
 
     Attributes:
         recordings: R of them.
-        beat_fits: the harmonic fit of each recording.
+        beat_fits: for each recording, the linear map from samples to coefficients, and their noise.
         axes: force axes that are compared; empty for tracks.
-        tolerance: root mean square (m or N) below which no model is required to be.
+        tolerance: root mean square (m or N) that any model may differ from the truth.
+        policy: thresholds.
     """
 
     recordings: tuple[Recording, ...]
@@ -39,7 +41,7 @@ class WhitenedData:
 
     @classmethod
     def of(cls, recordings: Sequence[Recording], axes: tuple[str, ...] = (), policy: Policy = POLICY) -> WhitenedData:
-        """Reduce ``recordings`` to coefficients; ValueError for one that cannot be used, or for none."""
+        """Reduce ``recordings`` (of forces: ``axes``) to coefficients; ValueError for an unusable one, or none."""
         if not recordings:
             raise ValueError("no recording to diagnose: give at least one that is not held out")
         beat_fits = tuple(
@@ -51,46 +53,46 @@ class WhitenedData:
 
     @cached_property
     def noiseless(self) -> WhitenedData:
-        """The same with zero noise variance, for coefficients that were simulated."""
+        """The same with zero noise variance, for coefficients that come from simulations alone."""
         beat_fits = tuple(replace(fit, variance=np.zeros_like(fit.variance)) for fit in self.beat_fits)
         return replace(self, beat_fits=beat_fits)
 
     @cached_property
     def noise(self) -> float:
-        """Root mean square of the noise of a sample, m or N; not below the tolerance."""
+        """Root mean square of the noise of a sample over all used channels, m or N; at least the tolerance."""
         square = np.mean(np.concatenate([fit.noise[fit.used] ** 2 for fit in self.beat_fits]))
         return max(float(np.sqrt(square)), self.tolerance)
 
     @cached_property
     def recording_slices(self) -> tuple[slice, ...]:
-        """Slice of each recording in the coefficient vector."""
+        """Where the coefficients of each recording are in a coefficient vector [D]."""
         ends = np.cumsum([0, *(fit.used.sum() * len(fit.order) for fit in self.beat_fits)]).tolist()
         return tuple(slice(a, b) for a, b in pairwise(ends))
 
     @cached_property
     def variance(self) -> Float[Array, " D"]:
-        """[D] noise variance of the coefficients."""
+        """Noise variance [D] of the coefficients, m^2 or N^2."""
         return np.concatenate([fit.variance[fit.used].ravel() for fit in self.beat_fits])
 
     @cached_property
     def weight(self) -> Float[Array, " D"]:
-        """[D] weight of a coefficient's square in the mean square over all samples of all channels."""
+        """Weights [D]: the sum of weight times squared coefficient is the mean square over all samples and channels."""
         channels = sum(int(fit.used.sum()) for fit in self.beat_fits)
         return np.concatenate([np.tile(fit.weight, int(fit.used.sum())) for fit in self.beat_fits]) / channels
 
     @cached_property
     def scale(self) -> Float[Array, " D"]:
-        """[D] standard deviation of the coefficients by noise and tolerance together; whitening divides by it."""
+        """Standard deviation [D] of each coefficient by noise and tolerance together; whitening divides by it."""
         allowed = [self.tolerance**2 / (len(v.order) * np.tile(v.weight, int(v.used.sum()))) for v in self.beat_fits]
         return np.asarray(np.sqrt(self.variance + np.concatenate(allowed)))
 
     def coefficients_of(self, residuals: Sequence[Float[Array, "*B _ _"]]) -> Float[Array, "*B D"]:
-        """Coefficients [..., D] of the residuals [..., T, C] of each recording."""
+        """Return the coefficients [..., D] of ``residuals``: for each recording [..., T, C], C channels at T times."""
         found = [fit.of(one)[..., fit.used, :] for fit, one in zip(self.beat_fits, residuals, strict=True)]
         return np.concatenate([one.reshape(*one.shape[:-2], -1) for one in found], axis=-1)
 
     def chi_squared(self, coefficients: Float[Array, " D"]) -> float:
-        """Sum of squares of whitened coefficients [D]."""
+        """Return the sum of squares of ``coefficients`` [D], each divided by :attr:`scale`."""
         return float(np.sum((coefficients / self.scale) ** 2))
 
     @cached_property
@@ -99,39 +101,43 @@ class WhitenedData:
         return min(self.policy.effective_samples * len(self.recordings), self.policy.max_effective_samples)
 
     def deviance(self, coefficients: Float[Array, "*B D"]) -> Float[Array, "*B"]:
-        """Minus twice the log-likelihood [...] of residual coefficients [..., D], for noise plus a model error.
+        """Return minus twice the log-likelihood [...] of residual ``coefficients`` [..., D].
 
-        The chi-squared beyond its expectation D is attributed to an error of the model. Of this error only
-        ``effective_samples`` are independent, and its size is unknown, so its logarithm counts (as in Student's t).
+        The residual consists of noise and an error of the model, to which the chi-squared beyond its expectation D is
+        attributed. Only :attr:`effective_samples` values of that error are independent, and its size is unknown, so the
+        likelihood depends on the logarithm of its mean square (as in Student's t).
         """
         beyond = self._chi_squared_excess(coefficients)
         whole = ((coefficients / self.scale) ** 2).sum(axis=-1)
         return np.asarray(whole - beyond + self.effective_samples * np.log1p(beyond / self.effective_samples))
 
     def likelihood_weight(self, coefficients: Float[Array, " D"]) -> float:
-        """Slope of :meth:`deviance` with chi-squared at coefficients [D], as in iteratively reweighted fits."""
+        """Return the derivative of :meth:`deviance` with respect to chi-squared at ``coefficients`` [D], at most 1.
+
+        A fit weights all squared residuals by it, as in iteratively reweighted least squares.
+        """
         return float(1.0 / (1.0 + self._chi_squared_excess(coefficients) / self.effective_samples))
 
     @cached_property
     def max_likelihood_weight(self) -> float:
-        """The weight at a model error as large as the tolerance; no model is taken to be more exact."""
+        """The :meth:`likelihood_weight` at a model error as large as the tolerance: no model is taken as more exact."""
         return float(1.0 / (1.0 + self.policy.tolerance**2 * len(self.scale) / self.effective_samples))
 
     def _chi_squared_excess(self, coefficients: Array) -> Array:
         return np.asarray(np.maximum(((coefficients / self.scale) ** 2).sum(axis=-1) - len(self.scale), 0.0))
 
     def excess(self, coefficients: Float[Array, " D"]) -> float:
-        """Mean square beyond the noise of residuals with coefficients [D], m^2 or N^2; noise may make it negative."""
+        """Return the mean square of a residual with ``coefficients`` [D] minus that of the noise (m^2, N^2)."""
         return float(self.weight @ (coefficients**2 - self.variance))
 
     def excess_by_recording(self, coefficients: Float[Array, " D"]) -> Float[Array, " R"]:
-        """Excess [R] of each recording."""
+        """Return the :meth:`excess` [R] of each of the R recordings (m^2 or N^2)."""
         every = self.weight * (coefficients**2 - self.variance)
         return np.array([every[part].sum() / self.recording_weights[r] for r, part in enumerate(self.recording_slices)])
 
     @cached_property
     def recording_weights(self) -> Float[Array, " R"]:
-        """[R] weight of each recording in the mean square."""
+        """Fraction [R] of all used channels that belongs to each recording: its weight in the mean square."""
         used = np.array([int(fit.used.sum()) for fit in self.beat_fits], float)
         return np.asarray(used / used.sum())
 
@@ -139,9 +145,10 @@ class WhitenedData:
     def excess_standard_error(self) -> float:
         """Standard error of :meth:`excess` (m^2 or N^2) by noise alone.
 
-        The noise of means and trends lies below the lowest line between harmonics and is known up to a factor only;
-        half of it counts. Markers are independent of each other. Harmonics are not, since beats differ in size or
-        timing as a whole; so each marker, and a recording of forces as a whole, counts as one sample of its noise.
+        The noise of means and trends lies at lower frequencies than where noise is measured, between the harmonics, so
+        its variance is known up to a factor only: half of it counts as error. The noise of different markers is
+        independent. That of different harmonics is not, since beats differ in size or timing as a whole; so each
+        marker, and a recording of forces as a whole, counts as one sample of its noise.
         """
         independent = sum(
             1.0 if recording.kind == "forces" else fit.used.sum() / 3.0
@@ -154,7 +161,11 @@ class WhitenedData:
     def evaluate(
         self, problem: Problem, evaluator: Evaluator, values: Float[Array, "B F"]
     ) -> tuple[Float[Array, "B D"], tuple[str | None, ...], list[Array]]:
-        """Coefficients [B, D] of the residuals of ``values`` [B, F], reasons of failed individuals, and residuals."""
+        """Simulate ``values`` [B, F] (B individuals, F free genes of ``problem``) and compare them with the recordings.
+
+        Returns the coefficients [B, D] of the residuals, why each individual failed (None if it did not), and the
+        residuals [B, T, C] of each recording, simulated minus recorded (m or N).
+        """
         evaluation = evaluator.evaluate(problem, values, residuals=True)
         residuals = residuals_of(evaluation)
         return self.coefficients_of(residuals), evaluation.reasons, residuals

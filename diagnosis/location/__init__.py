@@ -1,1 +1,1 @@
-"""Where and when model and recordings differ, and the missing load that would explain it."""
+"""Determine where and when model and recordings differ, and which missing load would explain the difference."""

@@ -1,4 +1,4 @@
-"""Where the nominal model differs from the recordings, in numbers and as text."""
+"""Describe where the nominal model differs from the recordings, in numbers and as text."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ MIN_RATIO = 1.05  # of two values of a variable that differ
 def residual_location(
     data: WhitenedData, residuals: Sequence[RecordingResidual], coefficients: Float[Array, " D"]
 ) -> Where:
-    """Location, phase, axis, harmonics and scaling of coefficients [D], split into ``residuals``."""
+    """Return where and when a residual (``coefficients`` [D], by recording ``residuals``) lies, and how it scales."""
     spread = harmonics(data, coefficients)
     span, chord = (_extent_along(residuals, name) for name in ("span", "chord"))
     phase, axis = _phase(residuals), _axis(residuals)
@@ -33,7 +33,7 @@ def residual_location(
 
 
 def _extent_along(residuals: Sequence[RecordingResidual], name: str) -> Interval | None:
-    """Median and extent of the misfit along the span or the chord, from markers; None for forces."""
+    """Return median and extent of the misfit along ``name``, "span" or "chord"; None for forces or without misfit."""
     at, mass = [], []
     for residual in residuals:
         for place, one in zip(residual.locations, residual.excess, strict=True):
@@ -55,7 +55,7 @@ def _extent_along(residuals: Sequence[RecordingResidual], name: str) -> Interval
 
 
 def _cell_edges(positions: Array) -> Array:
-    """Edges [n + 1] of the cells of the span or chord that markers at sorted ``positions`` [n] represent."""
+    """Return the edges [n + 1] of the parts of the span or chord that markers at sorted ``positions`` [n] represent."""
     if len(positions) < 2:
         return np.repeat(positions, 2)
     half = 0.5 * (positions[1:] + positions[:-1])
@@ -64,7 +64,7 @@ def _cell_edges(positions: Array) -> Array:
 
 
 def _phase(residuals: Sequence[RecordingResidual]) -> Interval | None:
-    """Centre and extent of the misfit in the beat; None where it is spread over the whole beat.
+    """Return centre and extent of the misfit in the beat; None where it is spread over the whole beat.
 
     The centre is that of the misfit above half of its maximum, because a fit spreads a misfit over the beat.
     """
@@ -94,7 +94,7 @@ def _axis(residuals: Sequence[RecordingResidual]) -> str:
 
 
 def _exponents(data: WhitenedData, coefficients: Array) -> tuple[Exponent, ...]:
-    """Exponents with which the misfit scales with each variable that differs between the recordings."""
+    """Return the exponent with which the misfit scales with each variable that differs between the recordings."""
     excess = data.excess_by_recording(coefficients)
     level = 0.02 * max(float(excess.max()), 0.0)
     if len(excess) < 3 or level <= 0.0:
@@ -121,7 +121,7 @@ def _exponents(data: WhitenedData, coefficients: Array) -> tuple[Exponent, ...]:
 
 
 def _variables(conditions: Sequence[Condition]) -> list[tuple[str, str, tuple[float, float], Array]]:
-    """Name, unit, range and values of the variables, all positive."""
+    """Return name, unit, range and values of each variable that is positive under all conditions."""
     every = (
         ("flap frequency", "Hz", [c.flap_frequency for c in conditions]),
         ("air density", "kg/m^3", [density(c.pressure, c.temperature) for c in conditions]),
@@ -152,7 +152,7 @@ def _sentence(
 def cause_location(
     span: Interval | None, chord: Interval | None, phase: Interval | None, *, drive_error: bool = False
 ) -> str:
-    """Where the cause of a misfit acts, as text that continues the misfit's location; "" where it is not known.
+    """Return where the cause of a misfit acts, as text to append to the location of the misfit; "" where not known.
 
     ``drive_error``: the cause is an error of the drive rods.
     """

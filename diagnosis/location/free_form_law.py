@@ -1,10 +1,11 @@
-"""A free-form law for a load that no effect of the library explains, selected by cross-validation.
+"""Fit a free-form law to a load that no effect of the library explains; cross-validation selects its terms.
 
 The missing load is a sum of few terms, each a coefficient, the same for all recordings, times a product of the local
 motion, the air and the wing (:mod:`wingfit.diagnosis.location.law_features`). Terms are added by forward selection: the
 term that best predicts recordings left out one at a time. The law is fitted to the tracks through their responses to
 loads, not to an inferred load, which a prior has smoothed. The reported explained fraction is nested: each recording is
-predicted by a law selected without it. The nominal genes, refitted to all recordings, are projected out first.
+predicted by a law selected without it. What the nominal genes, refitted to all recordings, can explain is projected out
+first.
 """
 
 from __future__ import annotations
@@ -33,8 +34,8 @@ MIN_RECORDINGS = 3  # for a law
 class _NormalEquations:
     """Normal equations of R recordings in M coefficients, with the nominal genes projected out.
 
-    ``curvature`` [R, M, M], ``slope`` [R, M], ``power`` [R] sum of squares of the residual, ``count`` [R] of samples,
-    ``size`` [M] by which coefficients were scaled.
+    ``curvature`` [R, M, M] products of the responses, ``slope`` [R, M] of these with the residual, ``power`` [R] sum of
+    squares of the residual, ``count`` [R] of samples, ``size`` [M] by which coefficients were scaled.
     """
 
     curvature: Float[Array, "R M M"]
@@ -44,25 +45,25 @@ class _NormalEquations:
     size: Float[Array, " M"]
 
     def without(self, remaining: int) -> _NormalEquations:
-        """All recordings but one."""
+        """Return the equations of all recordings but number ``remaining``."""
         kept = np.arange(len(self.power)) != remaining
         return _NormalEquations(self.curvature[kept], self.slope[kept], self.power[kept], self.count[kept], self.size)
 
     def fit(self, terms: Int[Index, "B N"], which: Bool[Mask, " R"]) -> Float[Array, "B N"]:
-        """Coefficients [B, N] of ``terms`` [B, N] from the recordings ``which`` [R]."""
+        """Return coefficients [B, N] of B laws with N ``terms`` [B, N] each, from the recordings ``which`` [R]."""
         matrix = self.curvature[which].sum(axis=0)[terms[:, :, None], terms[:, None, :]]
         ridge = 1e-9 * np.einsum("bnn->bn", matrix).max(axis=1, initial=1e-300)[:, None, None]
         slope = self.slope[which].sum(axis=0)[terms]
         return np.asarray(np.linalg.solve(matrix + ridge * np.eye(terms.shape[1]), slope[..., None])[..., 0])
 
     def remaining(self, recording: int, terms: Int[Index, "B N"], found: Float[Array, "B N"]) -> Float[Array, " B"]:
-        """Sum of squares [B] of a recording's residual with coefficients ``found`` [B, N] of ``terms`` [B, N]."""
+        """Return the sum of squares [B] of a recording's residual minus B laws of ``terms`` times ``found`` [B, N]."""
         matrix = self.curvature[recording][terms[:, :, None], terms[:, None, :]]
         along = (found * self.slope[recording][terms]).sum(axis=1)
         return np.asarray(self.power[recording] + np.einsum("bn,bnm,bm->b", found, matrix, found) - 2 * along)
 
     def explained(self, terms: Int[Index, "B N"]) -> Float[Array, " B"]:
-        """Fraction [B] of the excess that ``terms`` [B, N] explain, recordings left out one at a time."""
+        """Return the fraction [B] of the excess that each law explains, recordings left out one at a time."""
         after = np.zeros(len(terms))
         for r in range(len(self.power)):
             after += self.remaining(r, terms, self.fit(terms, np.arange(len(self.power)) != r)) - self.count[r]
@@ -70,12 +71,12 @@ class _NormalEquations:
 
     @property
     def excess(self) -> float:
-        """Sum of squares beyond the noise."""
+        """Sum of squares of all residuals beyond the noise, which contributes 1 for each whitened sample."""
         return max(float((self.power - self.count).sum()), 1e-9)
 
 
 def free_law(cases: Sequence[Case], probe: Probe, motions: Sequence[StationMotion]) -> FreeLaw | None:
-    """The law of the missing load of ``cases``, from the ``motions`` of the nominal model at the stations of ``probe``.
+    """Return a law of the missing load in ``cases`` from the ``motions`` of the model at the stations of ``probe``.
 
     None for fewer than three recordings, or without a misfit beyond the noise. A law without terms means that none
     predicts left-out recordings.
@@ -117,7 +118,11 @@ def _sums(
 
 
 def _products(case: Case, loads: Array) -> Array:
-    """All products [M + F + 1, M + F + 1] of a recording's responses to candidates and genes, and its residual."""
+    """Return all inner products [M + F + 1, M + F + 1] of M + F + 1 columns of a recording.
+
+    The columns are its responses to the M candidates, given by ``loads`` [forces, M], and to the F genes, and its
+    residual.
+    """
     both = np.concatenate([case.responses[:, : len(loads)], case.sensitivities, case.residual[:, None]], axis=1)
     others = both.shape[1] - len(loads)
     shown = np.zeros((both.shape[1], loads.shape[1] + others))
@@ -127,7 +132,7 @@ def _products(case: Case, loads: Array) -> Array:
 
 
 def _probe_sizes(probe: Probe, crossing: float, motion: StationMotion, dictionary: Sequence[Candidate]) -> Array:
-    """Sizes of the probe's unit forces [P, M] that best reproduce each candidate load."""
+    """Return the sizes [P, M] of the probe's P unit forces that best reproduce each of M candidate loads."""
     series = np.linalg.pinv(probe.terms(motion.phase + crossing))
     hats = np.linalg.pinv(probe.hats(motion.stations))
     fields = np.array([candidate.field(motion) for candidate in dictionary])
@@ -135,7 +140,10 @@ def _probe_sizes(probe: Probe, crossing: float, motion: StationMotion, dictionar
 
 
 def _select_terms(sums: _NormalEquations) -> Index:
-    """Terms that improve the prediction of left-out recordings enough; simpler ones are preferred."""
+    """Return the indices of the terms that improve the prediction of left-out recordings enough (MIN_GAIN).
+
+    Of candidates that explain nearly as much, the simplest is taken.
+    """
     terms, before = np.zeros(0, np.int64), 0.0
     usable = np.flatnonzero(np.einsum("rmm->m", sums.curvature)[: len(sums.size)] > 0)
     while len(terms) < MAX_TERMS:
@@ -149,7 +157,7 @@ def _select_terms(sums: _NormalEquations) -> Index:
 
 
 def _cross_validated(sums: _NormalEquations) -> float:
-    """Fraction of the excess explained by laws that were selected and fitted without the recording in question."""
+    """Return the fraction of the excess of each recording explained by laws selected and fitted without it."""
     after = 0.0
     for r in range(len(sums.power)):
         terms = _select_terms(sums.without(r))[None]
@@ -173,7 +181,7 @@ def _fitted_law(sums: _NormalEquations, dictionary: Sequence[Candidate], terms: 
 
 
 def _jackknife(sums: _NormalEquations, terms: Index) -> Array:
-    """Standard errors [N] by the jackknife over recordings (Efron, The Jackknife, 1982, Eq. 3.1)."""
+    """Return standard errors [N] of the coefficients by the jackknife over recordings (Efron 1982, Eq. 3.1)."""
     count = len(sums.power)
     each = np.array([sums.fit(terms[None], np.arange(count) != r)[0] for r in range(count)])
     return np.asarray(np.sqrt((count - 1) / count * ((each - each.mean(axis=0)) ** 2).sum(axis=0)))

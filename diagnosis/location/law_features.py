@@ -15,9 +15,9 @@ OUTER, INNER = 0.6, 0.4  # of the span: start of the outer part, end of the inne
 
 @dataclass(frozen=True)
 class Feature:
-    """A load per metre of span: a coefficient in ``unit`` times ``field`` [stations, instants] of a motion.
+    """A load per metre of span: a coefficient in ``unit`` times ``field``.
 
-    ``words`` describe it.
+    ``field`` returns the values [stations, instants] for a motion of the wing; ``words``: description for the user.
     """
 
     name: str
@@ -28,7 +28,7 @@ class Feature:
 
 @dataclass(frozen=True)
 class Window:
-    """A part of the wing or beat. ``field`` [stations, instants] is 1 inside; ``words`` names it, "" for the whole."""
+    """A part of the wing or beat: ``field`` of a motion is 1 inside, else 0 [stations, instants]; ``words`` name it."""
 
     words: str
     field: Callable[[StationMotion], Array]
@@ -116,19 +116,19 @@ def _where(motion: StationMotion, inside: Mask) -> Array:
 
 @dataclass(frozen=True)
 class Candidate:
-    """A feature restricted to a window of the span and one of the beat."""
+    """A candidate term: a feature that acts only in one window of the span and one of the beat."""
 
     feature: Feature
     span: Window
     beat: Window
 
     def field(self, motion: StationMotion) -> Float[Array, "J N"]:
-        """Load per metre of span for a coefficient of one, [stations, instants]."""
+        """Return the load per metre of span for a coefficient of one, [stations, instants]."""
         return self.feature.field(motion) * self.span.field(motion) * self.beat.field(motion)
 
     @property
     def name(self) -> str:
-        """Such as ``rho c |V_n| V_n (outer 40 % of the span)``."""
+        """Short name, such as ``rho c |V_n| V_n (outer 40 % of the span)``."""
         where = ", ".join(window.words for window in (self.span, self.beat) if window.words)
         return f"{self.feature.name} ({where})" if where else self.feature.name
 
@@ -139,7 +139,7 @@ class Candidate:
 
 
 def candidates() -> Iterator[Candidate]:
-    """All features in all windows, unrestricted ones first."""
+    """Yield all features in all windows, unrestricted ones first."""
     for span in SPAN_WINDOWS:
         for beat in BEAT_WINDOWS:
             for feature in FEATURES:

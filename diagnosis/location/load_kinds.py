@@ -1,4 +1,4 @@
-"""Prior families of missing loads on a wing: smooth loads, localised loads, and errors of the drive."""
+"""Define the kinds of missing load on a wing, with priors: smooth loads, localised loads, errors of the drive."""
 
 from __future__ import annotations
 
@@ -23,11 +23,14 @@ _RODS = (((1.0, 1.0),), ((1.0, 0.0),), ((0.0, 1.0),), ((1.0, 0.0), (0.0, 1.0))) 
 
 
 class LoadFamily(NamedTuple):
-    """A family of loads (forces and moments) along the span.
+    """A family of kinds of load (forces and moments) along the span.
 
-    Each load of the family is a sum of the K ``shapes`` [Z, stations], with independent sizes. ``places`` has the
-    centre, width and chord location of each load, None where it has none. ``share`` is the prior probability of each
-    load. With ``drive_error``, the columns after the stations are rotations of the two rods.
+    Attributes:
+        shapes: for each kind, Z shapes [Z, stations]; a load of this kind is their sum with independent random sizes.
+        places: centre, width and chord location (0 to 1) of each kind; None where it has none.
+        share: prior probability of each kind.
+        drive_error: whether the columns of the shapes after the stations are rotations of the two rods, and no load
+            acts.
     """
 
     shapes: tuple[Array, ...]
@@ -40,7 +43,7 @@ class LoadFamily(NamedTuple):
 
 
 class LoadForm(NamedTuple):
-    """One shape of a family, with standard deviations ``spread`` [M] of the terms of the beat."""
+    """Kind ``number`` of a ``family``, with standard deviations ``spread`` [M] of the M Fourier terms of the beat."""
 
     family: LoadFamily
     number: int
@@ -48,18 +51,18 @@ class LoadForm(NamedTuple):
 
     @property
     def root(self) -> Float[Array, "P Q"]:
-        """Square root [P, Q] (Q is Z times M) of the covariance at strength one."""
+        """Square root [P, Q] of the prior covariance of the probe's P genes at strength 1; Q = Z M (Z shapes)."""
         return np.asarray(np.kron(self.family.shapes[self.number].T, np.diag(self.spread)), float)
 
 
 def spreads(probe: Probe) -> list[Float[Array, " M"]]:
-    """Possible standard deviations [M] of the terms of a load over the beat."""
+    """Return possible standard deviations [M] of the M Fourier terms of a load over the beat, relative to the mean."""
     order = np.arange(1, probe.harmonics + 1)
     return [np.concatenate([[1.0], np.tile(order**-decay, 2)]) for decay in _DECAYS]
 
 
 def smooth(probe: Probe, chord: Float[Array, " J"] | None) -> LoadFamily:
-    """Loads that are correlated over a length of the span; forces and moments are independent."""
+    """Return loads correlated over a length of the span, moments independent of forces; ``chord`` [stations] in m."""
     y, shapes = np.array(probe.stations), []
     for length in _LENGTHS:
         root = np.linalg.cholesky(np.exp(-0.5 * ((y[:, None] - y) / length) ** 2) + 1e-9 * np.eye(len(y))).T
@@ -71,7 +74,7 @@ def smooth(probe: Probe, chord: Float[Array, " J"] | None) -> LoadFamily:
 
 
 def localised(probe: Probe, chord: Float[Array, " J"] | None) -> LoadFamily:
-    """Localised loads: forces as Gaussian bumps along the span, with the moments of their location along the chord."""
+    """Return Gaussian bumps of force along the span, with moments by chord location; ``chord`` [stations] in m."""
     span = np.linspace(0.0, 1.0, 401)
     hats, shapes = probe.hats(span), []
     places: list[tuple[float | None, float | None, float | None]] = []
@@ -90,7 +93,7 @@ def localised(probe: Probe, chord: Float[Array, " J"] | None) -> LoadFamily:
 
 
 def drive_errors(probe: Probe) -> LoadFamily:
-    """Errors of the drive rods; empty for a probe that does not drive."""
+    """Return errors of the drive rods; empty for a probe that does not rotate the rods."""
     if not probe.driving:
         return LoadFamily((), (), 0.0, drive_error=True)
     still = np.zeros((2, probe.loads // (1 + 2 * probe.harmonics)))
@@ -99,5 +102,5 @@ def drive_errors(probe: Probe) -> LoadFamily:
 
 
 def _without_rods(probe: Probe, shapes: Sequence[Array]) -> tuple[Array, ...]:
-    """Shapes of loads with zeros for the rods."""
+    """Return ``shapes`` of loads with columns of zeros appended for the rods, if the probe rotates these."""
     return tuple(np.pad(shape, ((0, 0), (0, 2 * probe.driving))) for shape in shapes)

@@ -1,4 +1,4 @@
-"""Maps of a misfit: by marker, over the beat, along the span, by harmonic and direction."""
+"""Compute maps of the misfit: by marker, over span and beat, by harmonic, and the channels to plot."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ BANDS = 6  # along the span
 
 @dataclass(frozen=True)
 class RecordingResidual:
-    """Residual of one recording.
+    """Residual of one recording, simulated minus recorded, in its C used channels.
 
-    ``coefficients`` and ``variance`` [C, P] of its used channels, their ``locations``, and ``beat`` [PHASES, C], the
-    periodic residual from the start of the beat.
+    ``coefficients`` and their noise ``variance`` [C, P] (P Fourier coefficients, as in ``beat_fit``), ``locations`` of
+    the channels, and ``beat`` [PHASES, C], the periodic residual (m or N) from the start of the beat.
     """
 
     beat_fit: HarmonicFit
@@ -33,14 +33,14 @@ class RecordingResidual:
 
     @property
     def excess(self) -> Array:
-        """[C] mean square of each channel beyond the noise, at least 0."""
+        """Mean square [C] of each channel minus that of the noise, at least 0."""
         return np.maximum((self.coefficients**2 - self.variance) @ self.beat_fit.weight, 0.0)
 
 
 def recording_residuals(
     subject: Subject, data: WhitenedData, coefficients: Float[Array, " D"]
 ) -> list[RecordingResidual]:
-    """Split a coefficient vector [D] by recording."""
+    """Split ``coefficients`` [D] of the residuals by recording."""
     found = []
     for recording, beat_fit, part in zip(data.recordings, data.beat_fits, data.recording_slices, strict=True):
         own = coefficients[part].reshape(-1, len(beat_fit.order))
@@ -51,7 +51,10 @@ def recording_residuals(
 
 
 def beat_series(beat_fit: HarmonicFit, origin: float, count: int = PHASES) -> Float[Array, "count P"]:
-    """[count, P] value of each coefficient's basis function at equal steps of the beat; zero for slow trends."""
+    """Return the basis function of each of P coefficients at ``count`` equal steps of the beat, [count, P].
+
+    ``origin``: phase (rad) at which the beat starts. Slow trends are zero.
+    """
     psi = origin + 2 * np.pi * np.arange(count) / count
     angle, column = psi[:, None] * beat_fit.order, np.arange(len(beat_fit.order))
     last = int(beat_fit.order[~beat_fit.trend].max())  # columns: mean, cosines, sines, trends
@@ -60,7 +63,7 @@ def beat_series(beat_fit: HarmonicFit, origin: float, count: int = PHASES) -> Fl
 
 
 def markers(before: Sequence[RecordingResidual], after: Sequence[RecordingResidual]) -> tuple[MarkerMisfit, ...]:
-    """Misfit of each marker, or force axis, over all recordings that contain it."""
+    """Return the misfit of each marker or force axis over all recordings, before and after effects are added."""
     places: dict[str, ChannelLocation] = {}
     for residual in before:
         for place in residual.locations:
@@ -84,13 +87,13 @@ def _marker(
 
 
 def _channels_of(name: str, residuals: Sequence[RecordingResidual]) -> Iterator[tuple[RecordingResidual, int]]:
-    """The channels of a marker or force axis: the residual of each recording that has it, and the columns there."""
+    """Yield (residual of a recording, column there) of each channel of the marker or force axis ``name``."""
     for residual in residuals:
         yield from ((residual, c) for c, place in enumerate(residual.locations) if place.name == name)
 
 
 def _root_mean_square(name: str, residuals: Sequence[RecordingResidual]) -> float:
-    """Root mean square beyond the noise of a marker or force axis."""
+    """Return the root mean square (m or N) beyond the noise of the marker or force axis ``name``."""
     squares = [
         float(residual.beat_fit.weight @ (residual.coefficients[c] ** 2 - residual.variance[c]))
         for residual, c in _channels_of(name, residuals)
@@ -99,7 +102,7 @@ def _root_mean_square(name: str, residuals: Sequence[RecordingResidual]) -> floa
 
 
 def phase_map(before: Sequence[RecordingResidual], after: Sequence[RecordingResidual]) -> PhaseMap:
-    """Root mean square of the periodic misfit over span bands and phase."""
+    """Return the periodic misfit (root mean square) in BANDS of the span at PHASES of the beat, before and after."""
     known = np.array([p.span for residual in before for p in residual.locations if p.span is not None], float)
     edges = np.linspace(known.min(), known.max() + 1e-9, BANDS + 1) if len(known) else np.zeros(2)
     first, then = (np.sqrt(_squares(recording_residuals, edges)) for recording_residuals in (before, after))
@@ -128,7 +131,7 @@ def _squares(recording_residuals: Sequence[RecordingResidual], edges: Array) -> 
 
 
 def harmonics(data: WhitenedData, coefficients: Float[Array, " D"]) -> tuple[float, ...]:
-    """Fraction of the excess in each harmonic of the beat, from 0; trends are ignored."""
+    """Return the fraction of the excess in each harmonic of the beat, from 0 (the mean); trends are ignored."""
     order = np.concatenate([np.tile(v.order, int(v.used.sum())) for v in data.beat_fits])
     trend = np.concatenate([np.tile(v.trend, int(v.used.sum())) for v in data.beat_fits])
     every = np.where(trend, 0.0, data.weight * (coefficients**2 - data.variance))
@@ -139,10 +142,10 @@ def harmonics(data: WhitenedData, coefficients: Float[Array, " D"]) -> tuple[flo
 def overlays(
     subject: Subject, data: WhitenedData, before: Sequence[Array], after: Sequence[Array], held_out: bool, most: int = 2
 ) -> Iterator[Overlay]:
-    """The channel in which the two models differ most, for the ``most`` recordings that changed most.
+    """Yield the channel that the added effects change most, of each of the ``most`` recordings that they change most.
 
-    Where they do not differ, the channel with the largest misfit of the nominal model. ``before`` and ``after`` are
-    residuals [T, C] of each recording.
+    Where they change nothing, the channel with the largest misfit of the nominal model. ``before`` and ``after``:
+    residuals [T, C] of each recording, simulated minus recorded, without and with the effects.
     """
     change = [np.nanmean((b - a) ** 2) for b, a in zip(before, after, strict=True)]
     for r in np.argsort(change)[::-1][:most]:

@@ -1,11 +1,11 @@
-"""The missing load, inferred from the responses of the tracks to unit loads: Bayesian linear inversion.
+"""Infer the missing load from the responses of the tracks to unit loads, by Bayesian linear inversion.
 
-A recording is y = H w + S g + noise: y recorded minus simulated by the nominal model, H the responses to unit loads (a
-:class:`wingfit.sim.effects.probe.Probe`), w the load's sizes under this condition, S the sensitivities to the nominal
-genes and g their errors, the same for all recordings. Tracks identify well when a load acts and its moment about the
-root, but hardly its distribution along the span. So several kinds of load are considered, smooth and localised, with
-free time courses. The evidence (MacKay, Neural Computation 4, 1992, Eqs. 2.8-2.14) gives the probability of each kind
-and the strength of the load under each condition; results are averaged over the kinds.
+The model of a recording is y = H w + S g + noise: y recorded minus simulated by the nominal model; H the responses to
+unit loads (a :class:`wingfit.sim.effects.probe.Probe`); w the sizes of these loads under this condition; S the
+sensitivities to the nominal genes and g their errors, the same for all recordings. Tracks identify well when a load
+acts and its moment about the root, but hardly its distribution along the span. So several kinds of load are considered,
+smooth and localised, with free time courses. The evidence (MacKay, Neural Computation 4, 1992, Eqs. 2.8-2.14) gives the
+probability of each kind and the strength of the load under each condition; results are averaged over the kinds.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ MIN_EVIDENCE = 5.0  # log evidence relative to no load; below it there is none
 _STRENGTHS = 10.0 ** np.arange(-3.0, 4.01, 0.125)  # N/m, or the unit of the responses
 _MIN_RELATIVE_PROBABILITY = 0.005  # relative to the most probable kind; less probable kinds are ignored
 _MAX_KINDS = 60  # that are averaged
-RESPONSE_ERROR = 0.002  # of the evidence: error that the model's responses may cause, and so favour one kind of load
+RESPONSE_ERROR = 0.002  # of the evidence: error by inexact responses of the model, which may favour one kind of load
 _DRAWS = 400
 _SPAN = np.linspace(0.0, 1.0, 41)
 MIN_PHASE_CONCENTRATION = 0.3  # length of the mean phase vector; below it the load is spread over the beat
@@ -36,13 +36,13 @@ MIN_PHASE_CONCENTRATION = 0.3  # length of the mean phase vector; below it the l
 
 @dataclass(frozen=True)
 class Case:
-    """One whitened recording: D numbers, each in standard deviations of its noise.
+    """One whitened recording: D Fourier coefficients, each divided by the standard deviation of its noise.
 
     Attributes:
         name: of the recording.
         residual: [D] recorded minus simulated by the refitted nominal model.
         responses: [D, P] change by a unit value of each of the P genes of the probe (unknown loads).
-        sensitivities: [D, F] to the F nominal genes in unit coordinates.
+        sensitivities: [D, F] to the F nominal genes in unit coordinates (bounds at 0 and 1).
         crossing: drive phase (beats) at which the recorded beat starts.
     """
 
@@ -54,7 +54,7 @@ class Case:
 
 
 def whitened(values: Float[Array, "N C"], place: Int[Index, " N"], lag1: float) -> Float[Array, "N C"]:
-    """Whiten rows [N, C] at sample indices ``place``, whose noise has autocorrelation lag1^distance."""
+    """Return ``values`` [N, C] without the correlation of their noise: lag1^d for rows whose ``place`` differs by d."""
     if not len(values):
         return values
     kept = lag1 ** np.diff(place)[:, None]
@@ -63,10 +63,11 @@ def whitened(values: Float[Array, "N C"], place: Int[Index, " N"], lag1: float) 
 
 @dataclass(frozen=True)
 class LoadKind:
-    """A kind of load and its posterior: ``probability``, mean sizes [R, P], covariance [R, P, P].
+    """A kind of load (a shape along the span), its ``probability``, and the posterior under each of R conditions.
 
-    ``centre``, ``width`` (standard deviation) and ``chord`` (0 to 1) of localised loads; None for smooth loads, and
-    ``chord`` for a probe without moments. ``drive_error``: turns of the rods instead.
+    ``sizes`` [R, P] and ``covariance`` [R, P, P] of the P genes of the probe. ``centre``, ``width`` (standard
+    deviation) and ``chord`` (0 to 1) of localised loads; None for smooth loads, and ``chord`` for a probe without
+    moments. ``drive_error``: additional rotations of the drive rods instead of a load.
     """
 
     probability: float
@@ -85,7 +86,7 @@ class InferredLoads:
     Attributes:
         probe: its unit loads.
         names: of the recordings.
-        crossings: of the recordings, :attr:`Case.crossing`.
+        crossings: drive phase (beats) at which each recorded beat starts.
         kinds: of load, the most probable first.
         evidence: [R] log evidence for a load in this recording relative to none.
         floor: [R] factor by which the noise was raised to the residual that no load explains.
@@ -100,15 +101,15 @@ class InferredLoads:
 
     @property
     def drive_error(self) -> bool:
-        """Whether the drive rods are in error, and no load acts."""
+        """Whether an error of the drive rods, and no load, is inferred."""
         return self.kinds[0].drive_error
 
     def fields(
         self, span: Float[Array, " J"], phase: Float[Array, " N"]
     ) -> tuple[Float[Array, "R K N"], Float[Array, "R K N"]]:
-        """Forces and standard errors [R, span, phase] at ``span`` (0 to 1) and ``phase`` (beats).
+        """Return forces (N/m) and standard errors, both [R, span, phase], at ``span`` (0 to 1) and ``phase`` (beats).
 
-        For errors of the drive, the rods' turns, deg, [R, 2, phase].
+        For errors of the drive, the rotations of front and rear rod, deg, [R, 2, phase].
         """
         values, errors = [], []
         weight = np.array([kind.probability for kind in self.kinds])
@@ -126,7 +127,7 @@ class InferredLoads:
 
     @property
     def reported(self) -> slice:
-        """The sizes that are reported: forces, or turns of the rods."""
+        """Which of the P genes of the probe are reported: forces, or rotations of the rods."""
         return slice(self.probe.loads, None) if self.drive_error else slice(0, self.probe.forces)
 
     @property
@@ -137,12 +138,15 @@ class InferredLoads:
 
 @dataclass(frozen=True)
 class LoadPlace:
-    """Where and when the missing load acts: centres with 90 % intervals (None where not known), and extents.
+    """Where and when the missing load acts. Errors of the drive have a phase only.
 
-    ``span`` and ``extent``, which holds 90 % of the load, from 0 to 1; ``phase`` in beats from the start of the beat,
-    None where the load is spread over the beat; ``duration``, which holds 90 % of the load above half of its maximum
-    (it may start below 0 or end beyond 1); ``chord`` from the leading edge, None for a smooth load or a probe without
-    moments. Errors of the drive have a phase only.
+    Attributes:
+        span: centre (0 to 1) with 90 % interval; None where not known.
+        extent: part of the span that holds 90 % of the load.
+        phase: centre in the beat (0 to 1) with 90 % interval; None where the load is spread over the beat.
+        duration: part of the beat that holds 90 % of the load above half of its maximum; may start below 0 or end
+            beyond 1.
+        chord: centre from the leading edge (0 to 1); None for a smooth load or a probe without moments.
     """
 
     span: Interval | None = None
@@ -153,7 +157,7 @@ class LoadPlace:
 
 
 class _NormalEquations:
-    """Normal equations of one recording, with the noise raised to the residual that no load and no gene explains."""
+    """Normal equations of one recording, its noise raised by ``floor`` to what loads and genes cannot explain."""
 
     def __init__(self, case: Case) -> None:
         H, S, y = case.responses, case.sensitivities, case.residual
@@ -170,10 +174,10 @@ class _NormalEquations:
         self.load_score = self.h - self.B @ genes @ self.s
 
     def evidence(self, shapes: Sequence[Array], spread: Array) -> Array:
-        """Log evidence relative to no load, [K, strengths].
+        """Return the log evidence of K kinds of load relative to no load, [K, strengths], for each of _STRENGTHS.
 
-        A load is the sum of one of K ``shapes``, [Z, stations] each, times independent normal numbers for each of M
-        terms, with standard deviations ``spread`` [M] times the strength.
+        ``shapes``: of each kind, [Z, stations]. A load of this kind is the sum of its Z shapes times independent normal
+        numbers for each of M terms of the beat, with standard deviations ``spread`` [M] times the strength.
         """
         return np.concatenate(
             [self._evidence(np.array(list(alike)), spread) for _, alike in groupby(shapes, key=len)]
@@ -203,8 +207,9 @@ def infer(
 ) -> InferredLoads:
     """Infer the loads of ``cases``, which share the nominal genes; ValueError where there is none.
 
-    Averages over kinds of load; errors of the drive are reported where no load explains as much. ``chord`` [stations]
-    (m) of the wing, for a probe with moments; ``response_error``: uncertainty of the evidence by the model's responses.
+    Averages over kinds of load; errors of the drive are reported only where no load explains as much. ``chord``
+    [stations] (m) of the wing, for a probe with moments; ``response_error``: fraction of the evidence that errors of
+    the simulated responses may produce.
     """
     if not cases:
         raise ValueError("no recording to infer a load from; give at least one")
@@ -246,7 +251,10 @@ def infer(
 
 
 def _posterior(normals: Sequence[_NormalEquations], roots: Sequence[Array]) -> tuple[Array, Array]:
-    """Loads [R, P] and their covariance [R, P, P] with free genes; the loads are eliminated first."""
+    """Return the loads [R, P] of R recordings and their covariance [R, P, P], with free genes.
+
+    ``roots``: for each recording a square root [P, Q] of the prior covariance of its loads, which are eliminated first.
+    """
     F = len(normals[0].s)
     precision, slope = np.eye(F) / GENE_ERROR_SD**2, np.zeros(F)
     inner = []
@@ -263,9 +271,9 @@ def _posterior(normals: Sequence[_NormalEquations], roots: Sequence[Array]) -> t
 
 
 def missing_loads(inferred: InferredLoads) -> tuple[MissingLoad, ...]:
-    """The load under each condition at the probe's stations and PHASES instants from the start of the beat.
+    """Return the load in each recording at the probe's stations and PHASES instants from the start of the beat.
 
-    For errors of the drive, the additional turn of each rod, rad.
+    For errors of the drive, the additional rotation of each rod, rad.
     """
     phase, stations = np.arange(PHASES) / PHASES, inferred.probe.stations
     values, errors = inferred.fields(np.array(stations), phase)
@@ -283,9 +291,10 @@ def missing_loads(inferred: InferredLoads) -> tuple[MissingLoad, ...]:
 
 
 def locate_load(inferred: InferredLoads, seed: int = 0) -> LoadPlace | None:
-    """Where and when the load acts, over all recordings with one; None where there is none.
+    """Return where and when the load acts, over all recordings with a load (MIN_EVIDENCE); None where there is none.
 
-    From posterior draws. The centre in the beat is that of the load above half of its maximum.
+    Computed from posterior draws with the random ``seed``. The centre in the beat is that of the load above half of its
+    maximum.
     """
     shown = np.flatnonzero(inferred.evidence > MIN_EVIDENCE)
     if not len(shown):
@@ -318,7 +327,7 @@ def locate_load(inferred: InferredLoads, seed: int = 0) -> LoadPlace | None:
 
 
 def _with_interval(value: float | None, draws: Interval) -> Interval:
-    """``value`` with the interval of the draws, extended to contain it."""
+    """Return ``value`` with the interval of ``draws``, extended to contain it; ``draws`` where there is no value."""
     if value is None or draws.low is None or draws.high is None:
         return draws
     return Interval(value, min(draws.low, value), max(draws.high, value))
@@ -332,9 +341,9 @@ def _posterior_draws(
     count: int,
     rng: np.random.Generator,
 ) -> Array:
-    """Draws of the loads [shown, count, span, phase], divided by each recording's root mean square.
+    """Return ``count`` draws of the loads [shown, count, span, phase] in the recordings ``shown``.
 
-    For errors of the drive [shown, count, 2, phase].
+    Each is divided by its root mean square. For errors of the drive the shape is [shown, count, 2, phase].
     """
     places, found = np.eye(2) if kind.drive_error else inferred.probe.hats(_SPAN), []
     for r in shown:
@@ -348,7 +357,7 @@ def _posterior_draws(
 
 
 def _span_location(size: Array) -> tuple[Interval, tuple[float, float]]:
-    """Centre with interval of loads of sizes [draws, span], and the range that holds 90 % of them."""
+    """Return the centre, with 90 % interval, of loads of ``size`` [draws, span], and the range of 90 % of them."""
     share = size / size.sum(axis=1, keepdims=True)
     centre = np.quantile(share @ _SPAN, [0.5, 0.05, 0.95])
     total = np.cumsum(share.mean(axis=0))
@@ -357,7 +366,10 @@ def _span_location(size: Array) -> tuple[Interval, tuple[float, float]]:
 
 
 def _phase_location(phase: Array, size: Array) -> tuple[Interval | None, tuple[float, float]]:
-    """The same in the beat, for sizes [draws, phase]."""
+    """Return the centre in the beat, with 90 % interval, of loads of ``size`` [draws, phase], and the range of 90 %.
+
+    The centre is None, and the range the whole beat, for loads that are spread over the beat.
+    """
     peak = np.where(size > 0.5 * size.max(axis=1, keepdims=True), size, 0.0)
     turns = peak @ np.exp(2j * np.pi * phase) / peak.sum(axis=1)
     middle = turns.mean()

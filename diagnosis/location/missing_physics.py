@@ -1,4 +1,4 @@
-"""The missing load, or error of the drive, of the nominal model: where it acts, and a free-form law for a load."""
+"""Infer the load that the nominal model is missing, or its drive's error, and fit a free-form law to a load."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ MAX_RECORDINGS = 3  # that are probed: those with the largest misfit
 
 @dataclass(frozen=True)
 class MissingPhysics:
-    """The missing loads by recording, their location, and a law; empty where the rig cannot be probed.
+    """The missing loads by recording, where they act (``place``), and a ``law``; empty where the rig cannot be probed.
 
     ``drive_error``: the drive rods are in error, and no load acts.
     """
@@ -55,14 +55,18 @@ class LoadEstimate:
 
 
 def largest_residuals(data: WhitenedData, nominal: Refit) -> list[int]:
-    """Indices of the recordings that are probed."""
+    """Return the indices of the MAX_RECORDINGS recordings with the largest misfit, which are probed."""
     return [int(r) for r in np.argsort(-data.excess_by_recording(nominal.fit.coefficients))[:MAX_RECORDINGS]]
 
 
 def load_estimates(
     models: Sequence[tuple[Subject, Refit]], data: WhitenedData, which: Sequence[int]
 ) -> Iterator[tuple[str, LoadEstimate | None]]:
-    """The load that each of the fitted ``models`` is missing; yields the name of each recording before it is probed."""
+    """Infer the load that each of the fitted ``models`` is missing, from the recordings ``which``.
+
+    Yields the name of each recording and None before it is probed, then the last name and the estimate, if there is
+    one.
+    """
     for subject, nominal in models:
         found = []
         for r in which:
@@ -76,9 +80,9 @@ def load_estimates(
 
 
 def missing_physics(found: Sequence[LoadEstimate], *, law: bool) -> MissingPhysics:
-    """Result for the best-fitting model among those probed on the most recordings.
+    """Return the result for the best-fitting model among those probed on the most recordings.
 
-    ``law``: also fit a free-form law.
+    ``found``: an estimate for each model; ``law``: also fit a free-form law. Empty where the load is implausibly large.
     """
     if not found:
         return MissingPhysics()
@@ -93,7 +97,7 @@ def missing_physics(found: Sequence[LoadEstimate], *, law: bool) -> MissingPhysi
 
 
 def _plausible(loads: Sequence[MissingLoad], motions: Sequence[StationMotion]) -> bool:
-    """Whether the loads are at most MAX_INERTIA_RATIO times the wing's inertia; larger ones are no loads."""
+    """Return whether the loads are at most MAX_INERTIA_RATIO times the wing's inertia; larger ones are no loads."""
     size = np.sqrt(np.mean([np.mean(np.square(load.values)) for load in loads]))
     own = np.sqrt(np.mean([np.mean((motion.mass[:, None] * motion.acceleration) ** 2) for motion in motions]))
     return bool(size <= MAX_INERTIA_RATIO * own)
@@ -113,7 +117,7 @@ def _case(data: WhitenedData, nominal: Refit, r: int, probed: Probed) -> Case:
 
 
 def missing_forces(context: FitContext, nominal: Refit) -> tuple[MissingLoad, ...]:
-    """For recordings of forces, the missing force along the axis with the largest residual."""
+    """Return the missing force along the axis with the largest residual, for each recording of forces."""
     data, found = context.data, []
     for recording, beat_fit, residuals in zip(data.recordings, data.beat_fits, nominal.fit.residuals, strict=True):
         power = np.where(beat_fit.used, np.nansum(np.nan_to_num(residuals) ** 2, axis=0), 0.0)
@@ -129,10 +133,10 @@ def missing_forces(context: FitContext, nominal: Refit) -> tuple[MissingLoad, ..
 def missing_force(
     name: str, residuals: Float[Array, " T"], phase: Float[Array, " T"], noise: float, lag1: float, harmonics: int = 8
 ) -> MissingLoad:
-    """For a recording of forces, the missing force: the mean beat of one axis' residual, N.
+    """Return the missing force in a recording of forces: the mean beat of one axis' residual, N.
 
     ``residuals`` [T] simulated minus recorded (N, NaN where missing) at ``phase`` [T] (beats from the start of the
-    beat); ``noise`` its standard deviation (N) with lag-1 autocorrelation ``lag1``.
+    beat); ``noise`` its standard deviation (N) with lag-1 autocorrelation ``lag1``. At most ``harmonics`` of the beat.
     """
     seen = np.isfinite(residuals)
     series = Probe((0.0, 1.0), harmonics).terms

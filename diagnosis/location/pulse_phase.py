@@ -1,10 +1,11 @@
-"""The instant of a missing force: the pulse that explains most of the residual, the nominal genes free.
+"""Estimate the instant of a missing force: that of the pulse that best explains the residual, the nominal genes free.
 
-The residual of a fit is not the missing force: genes have absorbed what they can, and a low-pass has spread the rest.
-So a short pulse is placed at every instant of the beat, with an independent size in every channel of every recording;
-the force acts where the pulse explains most, after the genes are projected out of both. A matched filter (Turin, IRE
-Transactions on Information Theory 6, 311, 1960) would low-pass the pulse as well; it would equally fit the ringing of
-the filter, and its error is twice as large. The significance of the pulse is tested with a low-passed one.
+The residual of a fit is not the missing force: genes have absorbed a part, and a low-pass has spread the rest over the
+beat. So a short pulse is placed at every instant of the beat, with an independent size in every channel of every
+recording; the force acts where the pulse explains most, after the part that the genes can explain is projected out of
+both. A matched filter (Turin, IRE Transactions on Information Theory 6, 311, 1960) would low-pass the pulse as well; it
+would equally fit the ringing of the filter, and its error is twice as large. The significance of the pulse is tested
+with a low-passed one.
 """
 
 from __future__ import annotations
@@ -28,9 +29,9 @@ FALSE_ALARM_PROBABILITY = 0.01  # that noise alone explains as much at any insta
 
 
 def locate_pulse(context: FitContext, fit: Fit) -> Interval | None:
-    """Instant (beats) of the pulse that explains most of the residual of ``fit``; None where none is significant.
+    """Return the instant (beats) of the pulse that explains most of the residual of ``fit``; None if not significant.
 
-    Its interval contains the instants at which it would explain nearly as much, given the model error.
+    The interval contains the instants at which the pulse would explain nearly as much, given the model error.
     """
     data, nuisance = context.data, Nuisance(context.data, fit)
     residual, whitened = nuisance.residual, fit.coefficients / data.scale
@@ -50,16 +51,19 @@ def locate_pulse(context: FitContext, fit: Fit) -> Interval | None:
 
 
 def _extent(near: Mask, distance: Array, sign: int) -> float:
-    """Distance to which the instants ``near`` extend on one side without a gap, plus half an instant."""
+    """Return how far (beats) the instants ``near`` [N] extend to one side without a gap, plus half an instant.
+
+    ``distance`` [N] (beats) from the best instant; ``sign``: 1 for the later side, -1 for the earlier.
+    """
     order = np.argsort(np.where(sign * distance >= 0, sign * distance, np.inf))[: INSTANTS // 2]
     ends = np.flatnonzero(~near[order])
     return float(sign * distance[order[(ends[0] if len(ends) else len(order)) - 1]]) + 0.5 / INSTANTS
 
 
 def _pulses(context: FitContext, at: float, *, low_passed: bool = False) -> Array:
-    """Coefficients [channels, D] of a pulse ``at`` an instant (beats) in each channel of each recording separately.
+    """Return the coefficients [channels, D] of a pulse at phase ``at`` (beats), a row for each recorded channel.
 
-    Sharp, or ``low_passed`` like the recording.
+    Each pulse is in one channel of one recording only; it is sharp, or ``low_passed`` like the recording.
     """
     data, rows = context.data, []
     for recording, beat_fit, part in zip(data.recordings, data.beat_fits, data.recording_slices, strict=True):

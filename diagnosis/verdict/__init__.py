@@ -1,1 +1,1 @@
-"""From fitted hypotheses to probabilities, a verdict, its validation, and the next experiment."""
+"""Weigh the fitted hypotheses, decide the verdict, validate it, and propose the next experiment."""

@@ -1,4 +1,4 @@
-"""From a finished search to a finding: verdict, location, validation, and the next experiment."""
+"""Build the finding from a finished search: verdict, location, validation, and the next experiment."""
 
 from __future__ import annotations
 
@@ -49,7 +49,10 @@ WORSE_FACTOR = 1.1  # times the misfit before: recordings that fit worse than th
 
 
 def build_finding(state: SearchState, name: str, held_out: Sequence[Recording]) -> Iterator[Step]:
-    """Build the finding of a finished search; yields the fraction of the work done, the stage, and the finding last."""
+    """Build the finding of a finished search; yields the fraction of the work done, the stage, and the finding last.
+
+    ``name``: of the dataset; ``held_out``: recordings with which the result is validated.
+    """
     nominal, weights = state.fitted_nominal.refit, state.final_weights
     decision = decide(weights)
     best = nominal if decision.verdict == "adequate" else decision.best
@@ -75,13 +78,16 @@ def build_finding(state: SearchState, name: str, held_out: Sequence[Recording]) 
 
 
 def _is_load(decision: Decision, best: Refit) -> bool:
-    """Whether the named effects act as loads: faults of a drive or camera move markers without a load."""
+    """Return whether the named effects act as loads: faults of a drive or camera move markers without a load."""
     families = {trial.suspect.family for trial in best.trials}
     return decision.verdict in ("named", "ambiguous") and not families & {"actuation", "measurement"}
 
 
 def _locate(state: SearchState, *, unnamed: bool) -> Iterator[tuple[float, str, MissingPhysics]]:
-    """Locate the missing physics recording by recording; where it is ``unnamed``, also with a finer model and a law."""
+    """Locate the missing physics; yields the fraction done, the stage, and the result, which is empty until the last.
+
+    If no effect was named (``unnamed``), a finer model is probed too, and a free-form law is fitted.
+    """
     data, nominal = state.data, state.fitted_nominal.refit
     if data.recordings[0].kind == "forces":
         when = locate_pulse(state.context, nominal.fit) if unnamed else None
@@ -101,7 +107,7 @@ def _locate(state: SearchState, *, unnamed: bool) -> Iterator[tuple[float, str, 
 
 
 def _where(state: SearchState, decision: Decision, best: Refit, missing: MissingPhysics) -> Where:
-    """Where the misfit lies; for a named effect, where the effect acts: a fit spreads a misfit over the beat."""
+    """Return where the misfit lies or, for a named effect, where the effect acts (a fit spreads a misfit in time)."""
     data, coefficients = state.data, state.fitted_nominal.refit.fit.coefficients
     if decision.verdict in ("named", "measurement fault"):
         acts = contribution(state.context, best)
@@ -122,7 +128,7 @@ def _where(state: SearchState, decision: Decision, best: Refit, missing: Missing
 
 
 def _effect_location(best: Refit, genes: Mapping[str, Interval], along: Literal["span", "chord"]) -> Interval | None:
-    """Location of the effect by its own ``genes``; None where it has none."""
+    """Return the location ``along`` the wing from the effect's own ``genes`` (by name); None where it has none."""
     named = (trial.suspect.location_genes for trial in best.trials)
     return next((genes[one[along]] for one in named if along in one), None)
 
@@ -188,10 +194,7 @@ def _finding(
 
 
 def _discretisation_error(state: SearchState) -> float:
-    """Misfit by the discretisation, from a finer one, at most the residual of the best hypothesis.
-
-    Zero where a finer discretisation fits no better.
-    """
+    """Return the misfit (m or N) by the discretisation: at most the best residual, 0 if a finer one fits no better."""
     nominal = state.fitted_nominal
     if nominal.discretisation_error is None or nominal.tried_finer:
         return 0.0
@@ -210,7 +213,7 @@ def _floors(state: SearchState, discretisation: float) -> Floors:
 def _summary_texts(
     data: WhitenedData, nominal: Refit, best: Refit, place: str, proved: Proof | None
 ) -> Mapping[str, str]:
-    """The parts of the summary as text."""
+    """Return the parts of the summary as text, by the names that :func:`summary` uses; ``place``: of the misfit."""
     unit = "m" if data.recordings[0].kind == "tracks" else "N"
     before, after = (np.sqrt(data.noise**2 + max(one.excess, 0.0)) for one in (nominal, best))
     return {
@@ -245,14 +248,14 @@ def _noise_remarks(data: WhitenedData) -> tuple[str, ...]:
 
 
 def _unidentified_sizes(genes: Sequence[GeneValue], best: Refit) -> tuple[str, ...]:
-    """Remark on sizes of added effects that the data do not bound."""
+    """Return a remark on size genes of added effects whose interval is not bounded; empty if there are none."""
     sizes = {name for trial in best.trials for name in trial.suspect.size_genes}
     open_ = [one.name for one in genes if one.name in sizes and one.value.low is None and one.value.high is None]
     return (f"these recordings do not identify {', '.join(open_)}: its interval is not bounded",) if open_ else ()
 
 
 def _worsened(rows: Sequence[RecordingMisfit], best: Refit, unit: str) -> tuple[str, ...]:
-    """Remark on recordings that fit worse with the added effects."""
+    """Return a remark on recordings that fit worse with the added effects; empty if there are none."""
     worse = [
         f"{row.name} from {1e3 * row.before.value:.3g} to {in_milli(row.after.value, unit)}"
         for row in rows

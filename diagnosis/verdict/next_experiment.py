@@ -1,4 +1,4 @@
-"""The next experiment: the condition under which the remaining hypotheses differ most."""
+"""Propose the next experiment: the condition under which the remaining hypotheses differ most."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ MAX_CONDITIONS_IF_CERTAIN = 8  # conditions
 
 
 def rival_refits(weights: HypothesisWeights) -> list[Refit]:
-    """The probable hypotheses, most probable first; a single one together with the next one; empty if none is."""
+    """Return the probable hypotheses, most probable first; if it is a single one, also the next; empty if none is."""
     order = np.argsort(-weights.probabilities, kind="stable")
     rivals = [k for k in order if weights.probabilities[k] >= MIN_PROBABILITY]
     return [weights.refits[k] for k in (order[:2] if len(rivals) == 1 else rivals)[:MAX_RIVALS]]
@@ -35,11 +35,11 @@ def rival_refits(weights: HypothesisWeights) -> list[Refit]:
 def separations(
     context: FitContext, weights: HypothesisWeights
 ) -> Iterator[tuple[float, tuple[float, Condition] | None]]:
-    """Separation of the hypotheses under candidate conditions; yields the fraction done and each result.
+    """Compute by how much the predictions of the hypotheses differ under candidate conditions (:func:`separation`).
 
-    Conditions are ordered by the separation with fixed genes, an upper bound; then rivals may adapt their genes, until
-    no other condition can be among the best MAX_ADVICE. Yields nothing where there are no two hypotheses or no
-    conditions.
+    Yields the fraction done and, where there is one, a result (separation, condition). Conditions are ordered by the
+    separation with fixed genes, an upper bound. Then the rivals of the first hypothesis may adapt their genes, until no
+    other condition can be among the best MAX_ADVICE. Yields nothing where there are no two hypotheses or no conditions.
     """
     rivals, conditions = rival_refits(weights), context.subject.candidate_conditions()
     if len(rivals) < 2:
@@ -66,7 +66,7 @@ def separations(
 def rank_conditions(
     data: WhitenedData, weights: HypothesisWeights, apart: Sequence[tuple[float, Condition]]
 ) -> tuple[Advice, ...]:
-    """Conditions to record next, best first, from :func:`separations`."""
+    """Return conditions to record next, best first, from ``apart``, the results of :func:`separations`."""
     best, rivals = sorted(apart, key=lambda pair: -pair[0])[:MAX_ADVICE], rival_refits(weights)
     return tuple(_advice(data, weights, rivals, size, condition) for size, condition in best)
 
@@ -74,7 +74,10 @@ def rank_conditions(
 def _least_separation(
     context: FitContext, first: Refit, recording: Recording, others: Sequence[Refit], *, adapt: bool
 ) -> float | None:
-    """Smallest separation of the rivals ``others``; None where one of them cannot be simulated."""
+    """Return the smallest separation of the rivals ``others`` from ``recording``, the prediction of ``first``.
+
+    None where one of them cannot be simulated.
+    """
     values = [separation(context, first.fit.genome, recording, one.fit, adapt=adapt) for one in others]
     known = [one for one in values if one is not None]
     return min(known) if len(known) == len(others) else None
@@ -83,13 +86,12 @@ def _least_separation(
 def separation(
     context: FitContext, genome: Float[Array, " G"], recording: Recording, rival: Fit, *, adapt: bool
 ) -> float | None:
-    """Root mean square difference (in noises) of a rival from the ``recording`` that the first hypothesis predicts.
+    """Return the root mean square difference of a rival's prediction from ``recording``, in noise standard deviations.
 
-    ``genome`` [G] is that of the first hypothesis.
-
-    With ``adapt`` the rival's genes adapt as far as the existing recordings allow. A difference that the genes
-    can compensate would not distinguish the hypotheses (T-optimality: Atkinson and Fedorov 1975, with the posterior of
-    the genes). None where the rival cannot be simulated.
+    ``recording`` is the prediction of the first hypothesis, whose genes are ``genome`` [G]. With ``adapt`` the rival's
+    genes adapt as far as the existing recordings allow. A difference that the genes can compensate would not
+    distinguish the hypotheses (T-optimality: Atkinson and Fedorov 1975, with the posterior of the genes). None where
+    the rival cannot be simulated.
     """
     model, data = context.subject.with_initial_motion(rival.problem.model, genome), context.data
     problem = replace(rival.problem, model=model, recordings=(recording,))
@@ -112,7 +114,10 @@ def separation(
 
 
 def _explained_by_genes(data: WhitenedData, rival: Fit, difference: Array, slopes: Array) -> float:
-    """Part of the square of ``difference`` [n] (in noises) that genes with ``slopes`` [F, n] explain, less its cost."""
+    """Return the part of the square of ``difference`` [n] that the rival's genes explain, minus the penalty for that.
+
+    ``difference`` is divided by the noise, as are the ``slopes`` [F, n], its derivatives with respect to the genes.
+    """
     lag1 = float(np.clip(np.mean([beat_fit.lag1 for beat_fit in data.beat_fits]), 0.0, 0.99))
     weight = data.likelihood_weight(rival.coefficients)
     counts = weight * (1.0 - lag1) / (1.0 + lag1)  # weight of a sample, less for correlated noise

@@ -1,4 +1,4 @@
-"""Misfits to recordings, fitted and held out, before and after, with intervals."""
+"""Compute misfits to recordings, fitted and held out, before and after effects are added, with intervals."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ MIN_MARKERS = 4  # for a bootstrap over markers
 
 @dataclass(frozen=True)
 class ResidualPair:
-    """Residuals [T, C] of each recording of ``data``, with the nominal model and with the added effects.
+    """Residuals [T, C] of each recording of ``data``, without (``before``) and with (``after``) the added effects.
 
     ``incomplete``: the model with the effects could not be simulated for every recording; those are not in ``data``.
     """
@@ -41,10 +41,10 @@ class ResidualPair:
 def predict_held_out(
     recordings: Sequence[Recording], context: FitContext, before: Fit, after: Fit
 ) -> tuple[ResidualPair | None, tuple[str, ...]]:
-    """Residuals of recordings that neither model was fitted to, and remarks on those that cannot be simulated.
+    """Return residuals of recordings that neither model was fitted to, and remarks on those that cannot be simulated.
 
-    ``context`` is that of the fits, whose force axes and thresholds are used here too. None where no recording can be
-    simulated with both models.
+    ``before``: fit of the nominal model; ``after``: fit with effects added; ``context``: of both, whose force axes and
+    thresholds are used here too. None where no recording can be simulated with both models.
     """
     fitted = context.data
     kept, pairs, failed, incomplete = list[Recording](), list[tuple[Array, Array]](), list[str](), False
@@ -70,7 +70,7 @@ def predict_held_out(
 
 
 def recording_misfits(predicted: ResidualPair, *, held_out: bool, floor: float) -> tuple[RecordingMisfit, ...]:
-    """Misfit to each recording; ``floor`` (m or N) is the discretisation error."""
+    """Return the misfit to each recording; ``floor`` (m or N) is the discretisation error."""
     rows = []
     for r, recording in enumerate(predicted.data.recordings):
         beat_fit, condition = predicted.data.beat_fits[r], recording.condition
@@ -94,9 +94,9 @@ def recording_misfits(predicted: ResidualPair, *, held_out: bool, floor: float) 
 
 
 def proof(predicted: ResidualPair, floor: float, unit: str, *, effects_added: bool) -> Proof:
-    """Misfit of both models over all held-out recordings; ``floor`` as in :func:`recording_misfits`.
+    """Return the misfit of both models over all held-out recordings, relative to the misfit to be expected.
 
-    ``effects_added``: whether effects were added, so that the models differ.
+    ``floor`` (m or N): discretisation error; ``effects_added``: whether effects were added, so that the models differ.
     """
     data = predicted.data
     before, after, better = _misfits(predicted)
@@ -118,7 +118,7 @@ def _relative_to_floor(interval: Interval, floor: float) -> Interval:
 
 
 def _misfits(predicted: ResidualPair) -> tuple[Interval, Interval, bool]:
-    """Root mean squares before and after with intervals, and whether the decrease is significant."""
+    """Return root mean squares (m or N) before and after with intervals, and if the decrease is significant."""
     kind, groups = predicted.data.recordings[0].kind, list[Array]()
     for squares in predicted.squares:
         count = np.isfinite(squares[0]).sum(axis=0)
@@ -139,7 +139,7 @@ def _misfits(predicted: ResidualPair) -> tuple[Interval, Interval, bool]:
 
 
 def _time_blocks(predicted: ResidualPair, count: int = 12) -> Array:
-    """Sums of squares before and after and counts [3, N] over blocks of time."""
+    """Return sums of squares before and after, and numbers of samples, [3, N] over ``count`` blocks per recording."""
     rows = []
     for squares in predicted.squares:
         for before, after in zip(*(np.array_split(one, count) for one in squares), strict=True):

@@ -1,4 +1,4 @@
-"""From the probabilities of hypotheses to a verdict, its summary and its genes."""
+"""Decide the verdict from the probabilities of the hypotheses, and describe it."""
 
 from __future__ import annotations
 
@@ -20,7 +20,11 @@ MAX_SCREENED_LISTED = 12  # suspects that were only score-tested and are still l
 
 @dataclass(frozen=True)
 class Decision:
-    """The verdict, the probabilities of all verdicts, named effects, ``alternatives``, and the best refit."""
+    """The verdict and the probabilities of all verdicts.
+
+    ``named``: names of the effects that the verdict names; ``alternatives``: the effects of each possible hypothesis,
+    if there are several; ``best``: the fit of the model called "after".
+    """
 
     verdict: Verdict
     probabilities: dict[str, float]
@@ -30,7 +34,7 @@ class Decision:
 
 
 def decide(weights: HypothesisWeights) -> Decision:
-    """The verdict that the probabilities of the hypotheses imply."""
+    """Return the verdict that the probabilities of the hypotheses imply."""
     policy = weights.policy
     nominal, effects = float(weights.probabilities[0]), weights.probabilities[1:]
     refits = weights.refits[1:]
@@ -68,14 +72,14 @@ def decide(weights: HypothesisWeights) -> Decision:
 
 
 def _common_subset(possible: Sequence[Refit]) -> Refit | None:
-    """The hypothesis whose effects all other ``possible`` hypotheses include as well; None if there is none."""
+    """Return the hypothesis in ``possible`` whose effects all others include as well; None if there is none."""
     return next((one for one in possible if all(set(one.names) <= set(other.names) for other in possible)), None)
 
 
 def hypotheses(
     data: WhitenedData, weights: HypothesisWeights, trials: Sequence[Sequence[Trial]]
 ) -> tuple[Hypothesis, ...]:
-    """All weighed hypotheses, most probable first, then those that were only score-tested, by score."""
+    """Return all weighed hypotheses, most probable first, then suspects that were only score-tested (``trials``)."""
     order = np.argsort(-weights.probabilities, kind="stable")
     gains = {one[0].suspect.name: one[0] for one in trials if one}
     refitted = [_refitted_hypothesis(data, weights, int(k), gains) for k in order]
@@ -113,7 +117,7 @@ def _refitted_hypothesis(
 
 
 def _explained_fraction(remaining: float, before: float) -> float:
-    """Fraction of the excess ``before`` that is removed; zero where there was none."""
+    """Return the fraction of the excess ``before`` that is removed; zero where there was none."""
     return float(np.clip(1.0 - max(remaining, 0.0) / before, -1.0, 1.0)) if before > 0.0 else 0.0
 
 
@@ -146,7 +150,11 @@ def _is_measurement_fault(refit: Refit) -> bool:
 
 
 def summary(decision: Decision, suspects: Mapping[str, Suspect], texts: Mapping[str, str]) -> str:
-    """The verdict in a few sentences; ``texts`` has "before", "after", "noise", "where" and "held_out"."""
+    """Return the verdict in a few sentences.
+
+    ``suspects``: by name; ``texts``: the misfits "before" and "after" and the "noise" with units, "where" the misfit
+    lies, and a sentence on the recordings "held_out".
+    """
     names, nearest = (_titles(suspects, found) for found in (decision.named, decision.best.names))
     start = f"The misfit of the refitted nominal model is {texts['before']}; the noise is {texts['noise']}."
     if decision.verdict == "adequate":

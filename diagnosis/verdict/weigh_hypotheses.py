@@ -1,16 +1,16 @@
-"""Probabilities of the fitted hypotheses.
+"""Compute the probabilities of the fitted hypotheses.
 
-Recordings have so many samples that noise decides nothing: thousands of units of chi-squared refute a law of the right
-kind in a slightly different form. The fraction of the residual that a hypothesis explains decides instead. Hypotheses
-are weighed by their excess above a floor tau that no model is required to undercut, the residual of a right law in
-another form being noise of unknown size:
+With thousands of samples, chi-squared would reject even a law of the right kind in a slightly different form. So the
+residual of a right law in another form counts as noise of unknown size, and the fraction of the residual that a
+hypothesis explains decides. Its probability p, up to a common factor, is
 
-    ln p = -nu/2 ln(tau^2 + E) - genes c,
+    ln p = -nu/2 ln(tau^2 + E) - genes c - effects ln(suspects),
 
-E the excess divided by the noise variance, from the fit and cross-validated, and nu the effective number of samples.
-The prior probability of each effect is one over the number of suspects. Two hypotheses always compete with the effects:
-*no physics is missing*, and *physics outside the library*, which is assumed to explain all but a fraction of the
-residual (`Policy.unknown_residual`) at the cost of the genes of a new law.
+E the excess divided by the noise variance, from the fit and cross-validated; tau^2 the excess that a right hypothesis
+may have (:func:`tolerated_excess`), likewise divided; nu the effective number of samples; c the cost of a gene
+(`Policy.gene_cost`). The prior probability of each effect is one over the number of suspects. Two hypotheses always
+compete with the effects: *no physics is missing*, and *physics outside the library*, which is assumed to explain all
+but a fraction of the residual (`Policy.unknown_residual`) at the cost of the genes of a new law.
 """
 
 from __future__ import annotations
@@ -28,9 +28,10 @@ from wingfit.records.array_types import Array, Float
 
 @dataclass(frozen=True)
 class HypothesisWeights:
-    """Evidence and probability of each refit (the nominal model first), and probability of an ``unknown`` law.
+    """Evidence and probability of each of H hypotheses, the nominal model first.
 
-    ``excess``: excess of each divided by the noise variance.
+    ``evidence``: natural logarithm, relative to the nominal model; ``unknown``: probability of a law outside the
+    library; ``excess``: mean square beyond the noise, fitted and cross-validated, divided by the noise variance.
     """
 
     refits: tuple[Refit, ...]
@@ -46,8 +47,7 @@ def weigh(
 ) -> HypothesisWeights:
     """Weigh ``refits`` against the nominal model.
 
-    ``floor`` (m or N) is the discretisation error; ``suspects`` the number of effects considered, which sets their
-    prior.
+    ``floor`` (m or N): discretisation error; ``suspects``: number of effects considered, which sets their prior.
     """
     policy = data.policy
     hypotheses = (nominal, *refits)
@@ -72,16 +72,16 @@ def weigh(
 
 
 def nominal_refuted(data: WhitenedData, excess: float, floor: float) -> bool:
-    """Whether the nominal excess is too large for noise and discretisation error (``floor``, m or N) alone.
+    """Return whether the nominal ``excess`` is too large for noise and discretisation error (``floor``, m or N) alone.
 
-    It does not depend on the number of samples: physics is missing then, even if it is not known which.
+    Then physics is missing, even if it is not known which. The criterion does not depend on the number of samples.
     """
     explainable = (data.policy.negligible * data.noise) ** 2 + floor**2
     return excess - explainable > data.policy.refuting_excess * data.excess_standard_error
 
 
 def _evidence(data: WhitenedData, excess: Array, genes: Array, effects: Array, suspects: int) -> Array:
-    """Log evidence for mean squares ``excess`` divided by the noise variance, floor included."""
+    """Return the log evidence [H] for ``excess`` [H], which is over the noise variance and includes what is tolerated."""
     return np.asarray(
         -0.5 * data.effective_samples * np.log(excess)
         - data.policy.gene_cost * genes
@@ -90,7 +90,7 @@ def _evidence(data: WhitenedData, excess: Array, genes: Array, effects: Array, s
 
 
 def nominal_suffices(data: WhitenedData, nominal: Refit, suspects: int) -> bool:
-    """Whether the nominal excess is too small for any effect to be worth its genes, even a perfect one."""
+    """Return whether the nominal excess is too small for any effect to be worth its genes, even a perfect one."""
     if nominal_refuted(data, nominal.excess, 0.0):
         return False
     tau = tolerated_excess(data, nominal.excess, 0.0)
@@ -100,7 +100,10 @@ def nominal_suffices(data: WhitenedData, nominal: Refit, suspects: int) -> bool:
 
 
 def tolerated_excess(data: WhitenedData, excess: float, floor: float) -> float:
-    """Mean square (m^2 or N^2) that a right hypothesis may leave of the nominal model's ``excess``."""
+    """Return the mean square (m^2 or N^2) beyond the noise that a right hypothesis may have.
+
+    ``excess``: of the nominal model; ``floor`` (m or N): discretisation error.
+    """
     policy = data.policy
     return (
         (policy.negligible * data.noise) ** 2
@@ -111,9 +114,9 @@ def tolerated_excess(data: WhitenedData, excess: float, floor: float) -> float:
 
 
 def _misfit(data: WhitenedData, refit: Refit, tau: float) -> float:
-    """Excess, fitted and cross-validated, averaged in the logarithm (`Policy.predicted_weight`).
+    """Return the excess, fitted and cross-validated, averaged in the logarithm (`Policy.predicted_weight`).
 
-    A cross-validation by a linearised model may be wrong by any factor.
+    ``tau`` (m^2 or N^2) is added to both before. A cross-validation by a linearised model may be wrong by any factor.
     """
     policy = data.policy
     fitted = max(refit.excess, 0.0)
