@@ -81,7 +81,7 @@ def nominal_refuted(data: WhitenedData, excess: float, floor: float) -> bool:
 
 
 def _evidence(data: WhitenedData, excess: Array, genes: Array, effects: Array, suspects: int) -> Array:
-    """Return the log evidence [H] for ``excess`` [H], which is over the noise variance and includes what is tolerated."""
+    """Return the log evidence [H] for ``excess`` [H], a multiple of the noise variance, with the tolerated part."""
     return np.asarray(
         -0.5 * data.effective_samples * np.log(excess)
         - data.policy.gene_cost * genes

@@ -1,4 +1,4 @@
-"""Responses of a flexible wing to known loads, and its motion where they act, from which missing loads are estimated."""
+"""Responses of a flexible wing to known loads, and its motion where they act, to estimate missing loads from."""
 
 from __future__ import annotations
 
@@ -194,7 +194,7 @@ def _strips(structure: Structure, motion: State) -> tuple[Array, Array, Array, A
 
 
 def _between(middles: Array, stations: Array) -> Array:
-    """Weights [J, S] for linear interpolation from the ``middles`` [S] of strips to ``stations`` [J], fractions of span."""
+    """Weights [J, S] to interpolate from ``middles`` [S] of strips to ``stations`` [J], fractions of span."""
     inner = np.clip(np.searchsorted(middles, stations) - 1, 0, len(middles) - 2)
     part = (stations - middles[inner]) / (middles[inner + 1] - middles[inner])
     weights = np.zeros((len(stations), len(middles)))

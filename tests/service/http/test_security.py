@@ -266,7 +266,7 @@ def test_the_documented_limits_are_those_of_the_code() -> None:
         "generations of a stage": highest(run, "max_generations"),
         "items on a page": responses.LARGEST_PAGE,
         "generations on a page of a history": responses.LARGEST_HISTORY_PAGE,
-        "coordinates in an answer": views.MOST_COORDINATES,
+        "recorded coordinates in an answer": views.MOST_COORDINATES,
         "concurrent simulations": concurrency_limit.SIMULATIONS,
         "concurrent uploads": concurrency_limit.UPLOADS,
         "concurrent NetCDF exports": concurrency_limit.EXPORTS,
