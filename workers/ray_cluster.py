@@ -2,7 +2,7 @@
 
 Arrays in Ray's shared memory are read-only, another type for compiled kernels; so a problem is sent as pickled bytes.
 A call to Ray costs milliseconds, so units of work are sent in batches, a few per processor. Ray's default strategy
-sends all batches to the node that had the previous ones; so Ray is told to spread them over the nodes.
+sends all batches to the node that had the previous ones; so the strategy "SPREAD" is given.
 """
 
 from __future__ import annotations
