@@ -291,7 +291,7 @@ def _refits_from_estimates(state: SearchState) -> Steps:
 
 
 def _restart_trials(data: WhitenedData, found: Sequence[list[Trial]]) -> list[Trial]:
-    """Return the strongest trials in ``found``, and, since few locations were tested, the best of each local suspect."""
+    """The strongest trials in ``found``, and, since few locations were tested, the best of each local suspect."""
     strongest = strongest_trials(data, found, MAX_RESTARTED)
     others = [trials[0] for trials in found if trials and all(trials[0] is not one for one in strongest)]
     return strongest + [one for one in others if one.suspect.location_genes and not one.suspect.candidate_shapes]
