@@ -65,7 +65,8 @@ def drawn(state: Distribution, seed: int, stage: str, size: int) -> Array:
         draw = random.Random(f"{seed}/{stage}/cma/{generation}/{slot}")  # noqa: S311  (a search, not a secret)
         rows.append([draw.gauss(0.0, 1.0) for _ in state.centroid])
     strategy = _strategy(state, size)
-    unit = np.array(state.centroid) + state.sigma * np.array(rows) @ strategy.BD.T
+    # By the symmetric root of the covariance: eigenvectors alone depend, in sign and order, on the library of algebra.
+    unit = np.array(state.centroid) + state.sigma * np.array(rows) @ (strategy.B @ strategy.BD.T)
     if generation == 0:
         unit[0] = state.centroid
     return np.array([[reflected(float(u)) for u in row] for row in unit])

@@ -92,6 +92,10 @@ CASES: dict[str, Callable[[], Array]] = {
     "Gauss-Newton on the vehicle": search(DELFLY, 2),
 }
 
+# Compared only where the golden file knows the machine: Gauss-Newton takes its steps from differences of simulations,
+# which multiply the rounding of the last bits, and two iterations leave badly determined genes anywhere in their range.
+KNOWN_MACHINES_ONLY = {"Gauss-Newton on the wing"}
+
 
 def entry(values: Array) -> dict[str, Any]:
     """What is stored of a case: the digest of all values, and some of them."""

@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 
-from tests.golden.numbers import CASES, FILE, entry, machine
+from tests.golden.numbers import CASES, FILE, KNOWN_MACHINES_ONLY, entry, machine
 
 GOLDEN = json.loads(FILE.read_text())
 
@@ -16,7 +16,9 @@ GOLDEN = json.loads(FILE.read_text())
 def test_numbers_are_those_of_the_golden_file(name: str) -> None:
     now = entry(CASES[name]())
     for known, cases in GOLDEN.items():
-        assert now["count"] == cases[name]["count"]
-        np.testing.assert_allclose(now["values"], cases[name]["values"], rtol=1e-7, atol=1e-12, err_msg=known)
-    if machine() in GOLDEN:
-        assert now["sha256"] == GOLDEN[machine()][name]["sha256"]
+        if name in cases and name not in KNOWN_MACHINES_ONLY:
+            assert now["count"] == cases[name]["count"]
+            np.testing.assert_allclose(now["values"], cases[name]["values"], rtol=1e-7, atol=1e-12, err_msg=known)
+    here = GOLDEN.get(machine(), {})
+    if name in here:
+        assert now["sha256"] == here[name]["sha256"]
