@@ -28,9 +28,9 @@ _MAX_SPEED = 100.0  # m/s, as in a dataset
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """The rigid body: positions of its ``markers`` [M, 3] and its ``centre`` of mass [3] in body axes (m), mass (kg).
+    """A rigid body: positions of its ``markers`` [M, 3] and its ``centre`` of mass [3] in body axes (m), ``mass`` (kg).
 
-    ``inertia`` [3, 3] about the centre of mass in body axes, kg m^2, where moments are wanted.
+    ``inertia`` [3, 3] about the centre of mass in body axes, kg m^2; None: no moments are computed.
     """
 
     markers: Array
@@ -43,8 +43,9 @@ class Body:
 class MarkerNoise:
     """Noise of one coordinate of one marker, m, estimated from the residuals of the rigid-body fit.
 
-    ``correlation`` [L] is the autocorrelation at lags of 0, 1, ... frames. ``common``, at least 1, is the ratio of the
-    scatter of the centre of mass above the cut-off to that of independent markers; it scales the standard deviations.
+    ``deviation``: standard deviation, m; ``correlation`` [L]: autocorrelation at lags of 0, 1, ... frames; ``common``,
+    at least 1: RMS scatter of the centre of mass above the cut-off, divided by that expected of independent markers.
+    ``common`` scales the standard deviations of force and moment.
     """
 
     deviation: float
@@ -57,8 +58,9 @@ class FreeFlight:
     """Motion of the body and the loads on it at T frames; NaN near ends and gaps.
 
     ``force`` and ``moment`` [T, 3] in body axes (N, N m; moment None without inertia), with the standard deviations
-    at every instant that result from marker noise; ``position``, ``velocity`` [T, 3] of the centre of mass in tracking
-    axes; ``rotation`` [T, 3, 3] body to tracking axes, smoothed; ``rate`` [T, 3] angular velocity in body axes, rad/s.
+    at every instant that result from marker noise; ``position`` (m), ``velocity`` (m/s) [T, 3] of the centre of mass in
+    tracking axes; ``rotation`` [T, 3, 3] body to tracking axes, smoothed; ``rate`` [T, 3] angular velocity in body
+    axes, rad/s; ``poses``: unsmoothed.
     """
 
     times: Array
@@ -88,8 +90,9 @@ def free_flight(
 ) -> FreeFlight:
     """Forces on ``body`` from ``tracks`` [T, M, 3] (m, tracking axes, NaN where not seen) at even ``times`` [T] (s).
 
-    Gaps up to a quarter period of the cut-off are interpolated by cubics. On either side of longer gaps, and at the
-    ends, the results are NaN for half the length of the filter. ValueError if no frame remains.
+    The force is m (a - g), with ``gravity`` in m/s^2. Gaps up to a quarter period of the cut-off are
+    interpolated by cubic splines. On either side of longer gaps, and at the ends, the results are NaN for half the
+    length of the filter. ValueError if times or units are wrong, or if no frame remains.
     """
     step = _even_step(times)
     windows = kernels(low_pass, 1 / step)
@@ -141,11 +144,12 @@ def free_flight(
 def recording(
     flight: FreeFlight, name: str, flap_frequency: float, beat_start: float, pressure: float, temperature: float
 ) -> Recording:
-    """Forces x and z of ``flight`` as a recording in level flight.
+    """Forces along body x and z (N) of ``flight`` as a recording called ``name``, in level flight through still air.
 
-    ``beat_start`` is a time (s, clock of the tracks) at which a beat starts; the recording's times count from the last
-    start of a beat before the first force. Airspeed (in still air) and body pitch are means over the flight. The
-    standard deviation is the RMS over the instants.
+    ``flap_frequency`` in Hz; ``pressure`` (Pa), ``temperature`` (K) of the air. ``beat_start`` is a time (s, clock of
+    the tracks) at which a beat starts; the recording's times count from the last start of a beat before the first
+    force. The airspeed is the magnitude of the mean velocity, the angle of attack the mean body pitch, the standard
+    deviation the RMS over the instants.
     """
     known = np.isfinite(flight.force).all(axis=1)
     first, last = np.flatnonzero(known)[[0, -1]]
@@ -185,7 +189,7 @@ def _even_step(times: Array) -> float:
 
 
 def _about(found: Poses) -> list[str]:
-    """Remarks for the user on frames without a pose and on outliers."""
+    """Remarks for the user: numbers, if not zero, of frames without a pose and of samples excluded as outliers."""
     frames, missing, rejected = len(found.position), int(np.isnan(found.position[:, 0]).sum()), found.rejected
     remarks = {
         f"{missing} of {frames} frames have no pose: fewer than 3 markers, or markers on one line": missing,
@@ -196,7 +200,7 @@ def _about(found: Poses) -> list[str]:
 
 @dataclass(frozen=True, eq=False)
 class _Bridge:
-    """A frame without a pose, interpolated from the frames ``near`` with ``weights``."""
+    """Index of a ``frame`` without a pose, interpolated from the frames ``near`` [K] with ``weights`` [K]."""
 
     frame: int
     near: Index
@@ -204,7 +208,10 @@ class _Bridge:
 
 
 def _bridges(known: Mask, longest: int) -> list[_Bridge]:
-    """Cubic interpolation of each frame in gaps of at most ``longest`` frames; ``known`` [T]: the frame has a pose."""
+    """Cubic-spline weights for each frame in gaps of at most ``longest`` frames; ``known`` [T]: the frame has a pose.
+
+    A gap with fewer than four known frames near it is not interpolated.
+    """
     rows, found = np.flatnonzero(known), []
     for before, after in pairwise(rows.tolist()):
         if 1 < after - before <= longest + 1:
@@ -217,9 +224,10 @@ def _bridges(known: Mask, longest: int) -> list[_Bridge]:
 
 
 def _spread_over(taps: Array, rows: Index, bridges: list[_Bridge]) -> Array:
-    """Filter weights [rows, 2 n + 1] at frames ``rows``, applied to the frames that have a pose.
+    """Filter weights [R, 2 n + 1] of the result at each of the R frames ``rows``, on measured frames only.
 
-    The weights ``taps`` [2 n + 1] of interpolated frames are moved to the frames they are interpolated from.
+    They are ``taps`` [2 n + 1], except that the weight of each interpolated frame in ``bridges`` is distributed over
+    the frames from which it is interpolated.
     """
     n, spread = len(taps) // 2, np.tile(taps, (len(rows), 1))
     for bridge in bridges:
@@ -233,9 +241,9 @@ def _spread_over(taps: Array, rows: Index, bridges: list[_Bridge]) -> Array:
 
 
 def _attitude(smooth: list[Array]) -> tuple[Array, Array, Array]:
-    """Rotation [T, 3, 3], angular velocity and acceleration [T, 3] in body axes from quaternions.
+    """Rotation [T, 3, 3], angular velocity (rad/s) and acceleration (rad/s^2) [T, 3] in body axes from quaternions.
 
-    ``smooth``: smoothed pose [T, 7] (position, quaternion w, x, y, z) and its first two derivatives.
+    ``smooth``: smoothed pose [T, 7] (position, quaternion w, x, y, z) and its first two derivatives by time (s).
     """
     size = np.linalg.norm(smooth[0][:, 3:], axis=1, keepdims=True)
     q, dq, ddq = (s[:, 3:] / size for s in smooth)
@@ -248,7 +256,11 @@ def _attitude(smooth: list[Array]) -> tuple[Array, Array, Array]:
 
 
 def _noise(found: Poses, centre: Array, body: Body, step: float, low_pass: LowPass) -> MarkerNoise:
-    """Noise per marker from the rigid-body residuals; common factor from the centre of mass above the cut-off."""
+    """Noise of a marker from the residuals of the rigid-body fit; common factor from the centre of mass.
+
+    ``centre`` [T, 3]: measured centre of mass, m, whose scatter above the cut-off is noise; ``step``: time between
+    frames, s.
+    """
     used = np.isfinite(found.position[:, 0])
     free = 3 * found.seen[used].sum() - 6 * used.sum()
     deviation = float(np.sqrt(np.nansum(found.residuals[used] ** 2) / free))
@@ -268,7 +280,7 @@ def _noise(found: Poses, centre: Array, body: Body, step: float, low_pass: LowPa
 
 
 def _of_centre(found: Poses, body: Body) -> Array:
-    """Derivative [T, 6, 3 M] of centre of mass (m) and rotation (rad) by the markers' displacements, in body axes."""
+    """Derivative [T, 6, 3 M] of centre of mass (m) and rotation (rad) by markers' displacements (m), in body axes."""
     G = found.sensitivity
     moved = G.copy()
     moved[:, :3] -= cross_matrices(body.centre) @ G[:, 3:]
@@ -276,7 +288,11 @@ def _of_centre(found: Poses, body: Body) -> Array:
 
 
 def _correlation(residuals: Array, lags: int) -> Array:
-    """Autocorrelation [lags] of the residuals in time, cut at the first value that is not significant."""
+    """Autocorrelation [L] in time of ``residuals`` [T, M, 3] at lags of 0, 1, ... frames, 1 at lag 0.
+
+    It is estimated at ``lags`` lags at most, up to the first value that is not significant, then made valid by
+    :func:`_admissible`, which appends lags.
+    """
     r = residuals.reshape(len(residuals), -1)
     r = r - np.nanmean(r, axis=0)
     variance = float(np.nanmean(r**2))
@@ -291,7 +307,10 @@ def _correlation(residuals: Array, lags: int) -> Array:
 
 
 def _admissible(values: Array) -> Array:
-    """The nearest valid autocorrelation: that with negative values of the spectrum set to zero."""
+    """Valid autocorrelation [2 L + 2] close to ``values`` [L], padded with zeros: negative spectral values set to zero.
+
+    It is divided by its value at lag 0.
+    """
     size = 4 * len(values) + 4
     wrapped = np.zeros(size)
     wrapped[: len(values)] = values
@@ -302,7 +321,7 @@ def _admissible(values: Array) -> Array:
 
 
 def _toeplitz(correlation: Array, size: int) -> Array:
-    """Correlation matrix [size, size] of samples in sequence, from the autocorrelation [L]; zero beyond."""
+    """Correlation matrix [size, size] of successive samples from the autocorrelation [L], taken as zero from lag L."""
     return np.asarray(scipy.linalg.toeplitz(np.pad(correlation, (0, size))[:size]))
 
 
@@ -316,7 +335,7 @@ def _deviation(
     force: Array,
     inertia: Array | None,
 ) -> Array:
-    """Standard deviation [T, 3] of force (or of moment, with ``inertia``) from the noise of the markers.
+    """Standard deviation [T, 3] of force (N), or with ``inertia`` of moment (N m), from the noise of the markers.
 
     The error is, to first order in the noise, a weighted sum over all markers and the frames of the filter window; its
     variance follows from the weights and from the autocorrelation of the noise.

@@ -1,6 +1,6 @@
-"""Noise of tracked quantities, white and coloured, and least squares with it.
+"""Least squares for tracked quantities with white and coloured noise, and estimates of that noise.
 
-Estimates are ordinary least squares; their covariance is computed for the noise estimated from the residuals.
+Coefficients are ordinary least squares; their covariance is computed for the noise estimated from the residuals.
 """
 
 from __future__ import annotations
@@ -20,7 +20,10 @@ _SHARES = (0.0, 0.2, 0.5, 0.8, 0.95, 0.99)
 
 @dataclass(frozen=True)
 class Noise:
-    """Stationary noise with covariance white^2 at lag 0 plus coloured^2 exp(-|lag| / time); lag and ``time`` in s."""
+    """Stationary noise with covariance white^2 at lag 0 plus coloured^2 exp(-|lag| / time); lag and ``time`` in s.
+
+    ``white`` and ``coloured`` are standard deviations in the unit of the samples.
+    """
 
     white: float
     coloured: float
@@ -28,7 +31,7 @@ class Noise:
 
     @property
     def deviation(self) -> float:
-        """Standard deviation of one sample."""
+        """Standard deviation of one sample, white and coloured noise together."""
         return float(np.hypot(self.white, self.coloured))
 
 
@@ -58,7 +61,7 @@ def least_squares(times: Array, design: Array, values: Array, noise: Noise | Non
 
 
 def products(a: Array, b: Array) -> Array:
-    """a^T b of tall matrices [N, p], [N, q].
+    """Matrix product a^T b [p, q] of tall matrices ``a`` [N, p] and ``b`` [N, q].
 
     BLAS is not used: on busy cores, synchronising its threads takes a hundred times longer than so small a product.
     """
@@ -66,7 +69,7 @@ def products(a: Array, b: Array) -> Array:
 
 
 def correlated(noise: Noise, times: Array, columns: Array) -> Array:
-    """The covariance matrix of the noise at ``times``, multiplied by ``columns`` [N, p]; linear in N."""
+    """Covariance matrix [N, N] of ``noise`` at ``times`` [N] (s) times ``columns`` [N, p], computed in O(N) time."""
     decay = np.exp(-np.diff(times) / noise.time)
     total = columns.copy()
     for order in (slice(None), slice(None, None, -1)):
@@ -80,10 +83,11 @@ def correlated(noise: Noise, times: Array, columns: Array) -> Array:
 
 
 def estimate(times: Array, design: Array, values: Array) -> Noise:
-    """Noise of ``values`` [N] in a linear model with the ``design`` [N, p], by restricted maximum likelihood.
+    """Noise of ``values`` [N] at ``times`` [N] (s) in a linear model with the ``design`` matrix [N, p].
 
-    Patterson and Thompson (1971, Biometrika 58): unlike the variance of the residuals it is not biased by the degrees
-    of freedom of the fit. At most ``BLOCKS`` blocks of ``BLOCK`` samples are used.
+    By restricted maximum likelihood (Patterson and Thompson 1971, Biometrika 58), which, unlike the variance of the
+    residuals, is not biased by the degrees of freedom of the fit. At most ``BLOCKS`` blocks of ``BLOCK`` samples are
+    used.
     """
     blocks = _blocks(times, design, values)
     step = float(np.median(np.diff(times)))
@@ -115,9 +119,10 @@ def _blocks(times: Array, design: Array, values: Array) -> list[Block]:
 
 
 def _restricted(blocks: list[Block], share: float, time: float, scale: float) -> tuple[float, float]:
-    """Minus twice the restricted log-likelihood of the noise up to a constant, at the best variance; that variance.
+    """Minus twice the restricted log-likelihood (up to a constant) at the most likely variance, and that variance.
 
-    ``share`` of the variance is coloured, with the correlation time ``time`` (s); values are divided by ``scale``.
+    The fraction ``share`` of the variance is coloured, with the correlation time ``time`` (s). Values are divided by
+    ``scale`` in the computation; the variance is that of the undivided values.
     """
     shape = Noise(float(np.sqrt(1 - share)), float(np.sqrt(share)), time)
     columns = blocks[0][1].shape[1]
@@ -136,9 +141,9 @@ def _restricted(blocks: list[Block], share: float, time: float, scale: float) ->
 
 
 def _whitened(noise: Noise, times: Array, columns: Array) -> tuple[Array, float]:
-    """``columns`` [N, p] whitened for ``noise``, and the logarithm of the determinant of its covariance.
+    """``columns`` [N, p] whitened for ``noise`` at ``times`` [N] (s), and log of the determinant of its covariance.
 
-    By the Kalman filter of the exponentially correlated part (Jones 1981): exact, and linear in N.
+    By the Kalman filter of the exponentially correlated part (Jones 1981): exact, and in O(N) time.
     """
     decay = np.exp(-np.diff(times, prepend=times[0]) / noise.time)
     power, nugget = noise.coloured**2, noise.white**2

@@ -1,4 +1,4 @@
-"""Pose of a rigid body from its markers in each frame, and the sensitivity of the pose to every marker."""
+"""Pose of a rigid body in each frame from its tracked markers, and the derivatives of the pose by every marker."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ _LARGEST = 10.0
 
 @dataclass(frozen=True, eq=False)
 class Poses:
-    """Pose per frame; NaN where too few markers were seen.
+    """Pose of a body with M markers in each of T frames; NaN where fewer than 3 markers, or collinear ones, were used.
 
     Attributes:
         rotation: [T, 3, 3] from body to tracking axes.
         position: [T, 3] of the body's origin in tracking axes, m.
-        seen: [T, M] whether a marker was used.
+        seen: [T, M] whether a marker was used: seen and no outlier.
         residuals: [T, M, 3] measured minus fitted position of each marker in body axes, m; NaN where not used.
         shape: [M, 3] positions of the markers in body axes, m, refined from the tracks.
         rejected: number of samples excluded as outliers.
@@ -43,7 +43,8 @@ class Poses:
     def sensitivity(self) -> Array:
         """Derivative [T, 6, 3 M] of the pose by the markers' displacements (m), all in body axes.
 
-        Rows: displacement of the body's origin (m), then small rotation (rad), of the linearised least-squares fit.
+        Rows: displacement of the body's origin (m), then small rotation (rad), of the linearised least-squares fit. NaN
+        in frames without a pose.
         """
         M = len(self.shape)
         J = np.zeros((M, 3, 6))
@@ -58,9 +59,10 @@ class Poses:
 
 
 def scale_remarks(tracks: Array, shape: Array) -> list[str]:
-    """Check that ``tracks`` [T, M, 3] and ``shape`` [M, 3] have the same scale; returns remarks on a small difference.
+    """Check that ``tracks`` [T, M, 3] and ``shape`` [M, 3] (m) have the same scale; return remarks on a difference.
 
-    ValueError if they are in different units, or both in a wrong one.
+    A remark is made above a factor of 1.05. ValueError above a factor of 1.3, or if ``shape`` spreads over more than
+    10 m: the units are wrong.
     """
     size = float(np.linalg.norm(np.ptp(shape, axis=0)))
     if size > _LARGEST:
@@ -86,9 +88,9 @@ def scale_remarks(tracks: Array, shape: Array) -> list[str]:
 
 
 def _scale(tracks: Array, shape: Array) -> float:
-    """Ratio of the distances between markers in the tracks to those in ``shape``; NaN if no two are seen together.
+    """Ratio of the distances between markers in ``tracks`` to those in ``shape``; NaN if no two are seen together.
 
-    It is the median over pairs and frames, which is robust to swapped markers.
+    The median over pairs and frames is used, which is robust to swapped markers.
     """
     first, second = np.triu_indices(len(shape), 1)
     expected = np.linalg.norm(shape[first] - shape[second], axis=-1)
@@ -103,7 +105,7 @@ def poses(tracks: Array, shape: Array) -> Poses:
 
     ``shape`` [M, 3] are the markers' positions in body axes, m. It is refined to the mean measured positions, aligned
     with the given ones by least squares, so that an error of the shape does not make the pose jump when a marker
-    vanishes. Samples far from the rigid body (swapped markers) are excluded.
+    vanishes. Samples far from the rigid body (swapped markers) are excluded. ValueError if all markers are collinear.
     """
     if np.linalg.matrix_rank(shape - shape.mean(axis=0), tol=_FLAT * float(np.ptp(shape, axis=0).max())) < 2:
         raise ValueError(f"the {len(shape)} markers lie on one line; a pose needs 3 that do not")
@@ -136,7 +138,10 @@ def _fit(tracks: Array, shape: Array, seen: Mask) -> Poses:
 
 
 def _align(body: Array, world: Array, seen: Mask) -> tuple[Array, Array]:
-    """Rotation [T, 3, 3] and origin [T, 3] of the least-squares map from ``body`` to ``world`` [T, M, 3]."""
+    """Rotation [T, 3, 3] and origin [T, 3] of the least-squares rigid map from ``body`` to ``world`` [T, M, 3].
+
+    Only markers in ``seen`` [T, M] count; NaN in frames with fewer than three of them, or with collinear ones.
+    """
     w = seen[..., None].astype(np.float64)
     count = np.maximum(w.sum(axis=1), 1.0)
     world = np.where(seen[..., None], world, 0.0)
@@ -153,7 +158,10 @@ def _align(body: Array, world: Array, seen: Mask) -> tuple[Array, Array]:
 
 
 def _outlying(found: Poses) -> Mask:
-    """True [T, M] for the worst marker of a frame if its residual is far above the median and four others remain."""
+    """True [T, M] for the marker with the largest residual in its frame, if it is an outlier and four others remain.
+
+    An outlier has a residual above 8 times the median over all frames and markers.
+    """
     size = np.linalg.norm(found.residuals, axis=-1)
     usual = float(np.nanmedian(size)) if np.isfinite(size).any() else 0.0
     worst = np.where(np.isfinite(size), size, -1.0)
@@ -162,7 +170,7 @@ def _outlying(found: Poses) -> Mask:
 
 
 def cross_matrices(v: Array) -> Array:
-    """Matrices [..., 3, 3] with ``cross_matrices(a) @ b`` equal to a x b."""
+    """Matrices [..., 3, 3] of ``v`` [..., 3] such that ``cross_matrices(a) @ b`` is the cross product a x b."""
     return np.cross(np.eye(3), v[..., None, :])
 
 

@@ -1,7 +1,7 @@
 """A periodic motion as a Fourier series, with the errors of its value and of its derivatives.
 
-There are two errors: the noise that the series passes, and the motion beyond its last harmonic. More harmonics reduce
-the second and increase the first, the more so the higher the derivative (its noise grows as k^d).
+There are two errors: the noise that the fit passes to the series, and the motion beyond the last harmonic. More
+harmonics reduce the truncation error and increase the noise; harmonic k adds noise to the d-th derivative as k^d.
 """
 
 from __future__ import annotations
@@ -32,11 +32,11 @@ class PeriodicFit:
     Attributes:
         frequency: of the beat, Hz; ``start``: a time at which t* = 0, s.
         coefficients: [1 + 2 K] mean, cosine_1, sine_1, cosine_2, ...; ``covariance``: of these, under coloured noise.
-        noise: of one sample.
+        noise: white and coloured noise of the samples.
         lost: [4] bound on the RMS over the beat of the harmonics beyond K, for value and derivatives (unit / s^d);
             infinite if the amplitudes decrease too slowly for the derivative to be square integrable.
         scores: [K_max] RMS error of cross-validation for 1, 2, ... harmonics; empty if K was given.
-        beats: number of beats with samples; ``samples`` their number.
+        beats: number of beats with samples; ``samples``: number of samples; ``remarks``: warnings about the fit.
     """
 
     frequency: float
@@ -57,7 +57,7 @@ class PeriodicFit:
 
     @one_blas_thread
     def at(self, phase: Array, derivative: int = 0) -> Array:
-        """Value, or a derivative in time (unit / s^d), at ``phase`` t* [...]."""
+        """Value of the series at ``phase`` t* [...], or its d-th time derivative, d = ``derivative`` (unit / s^d)."""
         return basis(phase, self.harmonics, derivative, self.frequency) @ self.coefficients
 
     @one_blas_thread
@@ -68,18 +68,18 @@ class PeriodicFit:
 
     @property
     def passed(self) -> Array:
-        """RMS over the beat of the noise in the value and its first three derivatives [4], unit / s^d."""
+        """RMS over the beat of the standard error by noise of value and first three derivatives [4], unit / s^d."""
         errors = np.stack([self.error_at(_phases(), d) for d in range(DERIVATIVES + 1)])
         return np.asarray(np.sqrt(np.mean(errors**2, axis=1)))
 
     @property
     def error(self) -> Array:
-        """RMS over the beat of noise and truncation error together, of the value and three derivatives [4]."""
+        """RMS over the beat of noise and truncation error together, of value and three derivatives [4], unit / s^d."""
         return np.hypot(self.passed, self.lost)
 
     @property
     def amplitude(self) -> Array:
-        """RMS over the beat of the signal about its mean, and of its three derivatives [4]."""
+        """RMS over the beat of the series about its mean, and of its first three derivatives [4], unit / s^d."""
         return np.array([float(np.std(self.at(_phases(), d))) for d in range(DERIVATIVES + 1)])
 
     @property
@@ -103,11 +103,12 @@ class PeriodicFit:
 def fit_periodic(
     times: Array, values: Array, frequency: float, harmonics: int | None = None, start: float = 0.0
 ) -> PeriodicFit:
-    """Fit a periodic series to samples of several beats.
+    """Fit a periodic series of known ``frequency`` (Hz) to ``values`` [N] at ``times`` [N] (s) over several beats.
 
-    ``times`` [N] in s increase, evenly or not; NaN in ``values`` [N] is a gap. Without ``harmonics`` their number is
-    chosen by cross-validation over beats (Stone 1974). With fewer than three beats it is over samples, and correlated
-    noise may be mistaken for motion. ValueError if the samples are too few for a series.
+    ``times`` increase, evenly or not; NaN in ``values`` is a gap; the phase is zero at ``start`` (s). Without
+    ``harmonics`` their number is chosen by cross-validation over beats (Stone 1974); with fewer than three beats, over
+    samples, so that correlated noise may be mistaken for motion. ValueError if the samples are too few for a series, or
+    for that many ``harmonics``.
     """
     seen = np.isfinite(values)
     times, values = times[seen], values[seen]
@@ -136,7 +137,10 @@ def fit_periodic(
 
 
 def basis(phase: Array, harmonics: int, derivative: int = 0, frequency: float = 1.0) -> Array:
-    """Factors [..., 1 + 2 K] (1, cos, sin, ...) of the coefficients at ``phase`` t* [...], or of a time derivative."""
+    """Values at ``phase`` t* [...] of 1, cos 2 pi t*, sin 2 pi t*, ... up to K = ``harmonics``: [..., 1 + 2 K].
+
+    With ``derivative`` d above 0: their d-th derivatives by time (1 / s^d) at ``frequency`` (Hz).
+    """
     k = np.arange(1, harmonics + 1)
     angle = 2 * np.pi * np.multiply.outer(phase, k)
     factor = (2 * np.pi * frequency * k) ** derivative
@@ -155,7 +159,10 @@ def _turn(harmonics: int, phase: float) -> Array:
 
 
 def _most_harmonics(phase: Array) -> int:
-    """Largest number of harmonics: three samples per coefficient, no gap in phase above half a wavelength."""
+    """Largest number of harmonics that samples at ``phase`` [N] (beats) determine; ValueError if none.
+
+    Each coefficient needs three samples, and no gap in phase may exceed half a wavelength of the last harmonic.
+    """
     folded = np.sort(phase % 1.0)
     gap = float(np.max(np.diff(np.append(folded, folded[0] + 1)))) if len(folded) else 1.0
     most = min(MAX_HARMONICS, (len(folded) // 3 - 1) // 2, int(0.5 / gap - 1e-6))
@@ -168,7 +175,10 @@ def _most_harmonics(phase: Array) -> int:
 
 
 def _predictions(phase: Array, values: Array, groups: Index, most: int) -> tuple[float, ...]:
-    """RMS error of predicting each group of samples from the other groups, for 1 to ``most`` harmonics."""
+    """RMS error of predicting each group of samples from the other groups, for 1 to ``most`` harmonics.
+
+    It is infinite where the other groups do not determine the series. ``groups`` [N]: group of each sample.
+    """
     X, y = basis(phase, most), values - values.mean()
     parts = [(X[groups == g], y[groups == g]) for g in np.unique(groups)]
     squares = np.stack([products(x, x) for x, _ in parts])
@@ -189,10 +199,11 @@ def _predictions(phase: Array, values: Array, groups: Index, most: int) -> tuple
 
 
 def _between_beats(phase: Array, linear: LinearFit, group: Index, beats: int) -> tuple[Array, tuple[str, ...]]:
-    """Covariance of the coefficients, raised for harmonics that vary between beats more than the noise, and remarks.
+    """Covariance of the coefficients, raised for harmonics that vary between beats by more than noise, and remarks.
 
-    A motion that varies from beat to beat scatters at the harmonics themselves, which stationary noise does not
-    describe; the clustered covariance of Liang and Zeger (1986) does.
+    ``group`` [N]: beat of each sample, of ``beats``. If the motion varies from beat to beat, its scatter is at the
+    harmonics themselves; stationary noise does not describe this, but the clustered covariance of Liang and Zeger
+    (1986) does.
     """
     covariance = linear.covariance
     if beats < 4:
@@ -219,7 +230,8 @@ def _lost(wide: LinearFit, used: int, frequency: float) -> Array:
     """RMS [4] over the beat of the harmonics beyond the first ``used``, for the value and its derivatives.
 
     The amplitude of each such harmonic is its estimate in the longer series ``wide``, but at least the envelope C k^-q
-    of the significant harmonics; beyond the longer series it is the envelope.
+    of the significant harmonics; beyond the longer series it is the envelope. If there is no envelope, two standard
+    errors replace it within the longer series, and zero beyond.
     """
     c, variance = wide.coefficients, np.diag(wide.covariance)
     k = np.arange(1, len(c) // 2 + 1)
@@ -240,7 +252,7 @@ def _lost(wide: LinearFit, used: int, frequency: float) -> Array:
 
 
 def _fall_off(k: Index, amplitude: Array, error: Array) -> tuple[float, float] | None:
-    """C and q of the envelope C k^-q of the significant harmonics beyond the first; None with fewer than three.
+    """C and q of the envelope C k^-q of significant amplitudes [K] of harmonics k > 1; None with fewer than three.
 
     q is at least 3: the rate of a wing with mass cannot jump, and a jump of the acceleration decreases as k^-3.
     """

@@ -19,14 +19,14 @@ _NAMED = 6
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """Columns [N] by name; ``file`` names the table in messages; ``labels`` [N] are the names in the first column."""
+    """Columns [N] of numbers by name; ``file`` names the table in messages; ``labels`` [N]: names in column one."""
 
     file: str
     columns: dict[str, Array]
     labels: tuple[str, ...] = ()
 
     def column(self, name: str) -> Array:
-        """The column called ``name``; DatasetError names the nearest one."""
+        """The column ``name`` [N]; DatasetError, with the nearest name that exists, if there is none."""
         if name not in self.columns:
             message = f"there is no column {name!r}; {nearest(name, self.columns)}"
             raise fail(f"{self.file}, line 1", name, message)
@@ -37,7 +37,7 @@ class Table:
         return np.stack([self.column(f"{marker}_{axis}_m") for axis in "xyz"], axis=-1)
 
     def times(self, name: str = "time_s") -> Array:
-        """A column of times [N]; DatasetError unless it is complete and increases."""
+        """The column ``name`` [N] of times; DatasetError unless it is complete and strictly increases."""
         times = self.column(name)
         wrong = np.flatnonzero(~(np.diff(times) > 0))
         if len(wrong) or not np.isfinite(times[:1]).all():
@@ -48,13 +48,13 @@ class Table:
 
 
 def header_of(raw: bytes, file: str) -> list[str]:
-    """Names of the columns, without reading the numbers; empty for an empty file."""
+    """Names of the columns of the CSV text ``raw``, whose numbers are not read; empty for an empty file."""
     rows = csv.reader(io.StringIO(decode(raw, file), newline=""))
     return [name.strip() for name in next((row for row in rows if row), [])]
 
 
 def require(header: Sequence[str], names: Sequence[str], file: str) -> None:
-    """Raise DatasetError that lists all ``names`` missing in ``header``."""
+    """Raise DatasetError, which lists up to 6 of the ``names`` that are missing in ``header``, if any is."""
     missing = [name for name in names if name not in header]
     if missing:
         which = ", no ".join(map(repr, missing[:_NAMED])) + (", ..." if len(missing) > _NAMED else "")
@@ -62,9 +62,9 @@ def require(header: Sequence[str], names: Sequence[str], file: str) -> None:
 
 
 def read_table(raw: bytes, file: str, label: str | None = None) -> Table:
-    """Read CSV text. With ``label``, the first column must have that name and holds names instead of numbers.
+    """Read the CSV text ``raw``. With ``label``, the first column must have that name and holds names, not numbers.
 
-    DatasetError lists the errors.
+    DatasetError if the text is not such a table, or if cells are not numbers; it lists several such cells.
     """
     rows = [row for row in csv.reader(io.StringIO(decode(raw, file), newline="")) if row]
     if len(rows) < 2:

@@ -58,9 +58,10 @@ class Frequency:
 
 @dataclass(frozen=True, eq=False)
 class PitchLaw:
-    """Eq. 17 fitted to wing pitch: ``errors`` [4] and ``correlation`` [4, 4] in the order of PassivePitch's fields.
+    """Law of wing pitch (Armanini et al. 2016, Eq. 17) fitted to measured pitch.
 
-    ``misfit`` is the RMS difference from the measured pitch, rad.
+    ``errors`` [4] are the standard errors of the fields of ``pitch`` in their order, ``correlation`` [4, 4] that of the
+    errors. ``misfit`` is the RMS difference from the measured pitch, rad.
     """
 
     pitch: PassivePitch
@@ -71,7 +72,7 @@ class PitchLaw:
 
 @dataclass(frozen=True, eq=False)
 class WingKinematics:
-    """The estimated motion, the series it is based on, and remarks.
+    """Estimated motion of a wing over its beat, the Fourier series on which it is based, and remarks.
 
     ``angles`` are those to which the series were fitted, the flap angle counted from the closed position.
     ``start`` is a time (s, clock of the recording) at which a beat starts; ``start_error`` its standard error.
@@ -102,7 +103,8 @@ def from_markers(
         hinge: y and z (m) of the flapping axis, where known.
 
     Frames in which a marker is missing are NaN, so that the angles do not jump when markers appear and disappear.
-    Without a dihedral the flap angle has an unknown offset, which :func:`wing_motion` removes.
+    Without a dihedral the flap angle has an unknown offset, which :func:`wing_motion` removes with ``closed=None``.
+    ValueError for too few markers.
     """
     points = leading_edge[..., 1:]
     if hinge is not None:
@@ -136,7 +138,7 @@ def wing_motion(
     start: float | None = None,
     closed: float | None = 0.0,
 ) -> WingKinematics:
-    """Motion of the wing over its beat, from ``angles``.
+    """Fit the motion of a wing over its beat to ``angles`` measured over several beats.
 
     Args:
         angles: flap angle and pitch; ValueError without pitch.
@@ -186,8 +188,8 @@ def flap_frequency(times: Array, flap: Array) -> Frequency:
     """Flap frequency from the flap angle [N] (rad) at ``times`` [N] (s): the peak of the spectrum, then refined.
 
     The refinement is a least-squares fit of a series and its frequency, whose standard error accounts for coloured
-    noise. ValueError if the period is not significant: the Wald statistic of the series under that noise, with
-    Bonferroni's correction for as many trials as samples.
+    noise. ValueError if samples or beats are too few, or if the period is not significant by the Wald statistic of the
+    series under that noise, with Bonferroni's correction for as many trials as samples.
     """
     _refuse_still(flap)
     seen = np.isfinite(flap)
@@ -259,7 +261,10 @@ def _unexplained(angles: Angles, flap: PeriodicFit) -> list[str]:
 
 
 def _strongest(times: Array, values: Array) -> float:
-    """Frequency, Hz, of the largest amplitude, to about a tenth of the resolution; gaps are interpolated linearly."""
+    """Frequency (Hz) of the largest amplitude of ``values`` [N] at ``times`` [N] (s), in steps of 1 / (8 x duration).
+
+    Gaps are interpolated linearly. Frequencies below one period per record are excluded.
+    """
     step = float(np.median(np.diff(times)))
     count = int((times[-1] - times[0]) / step) + 1
     even = np.interp(times[0] + step * np.arange(count), times, values - values.mean())
@@ -272,7 +277,8 @@ def _strongest(times: Array, values: Array) -> float:
 def closest(flap: PeriodicFit) -> tuple[float, float]:
     """Phase t* in [0, 1) at which the wings are closest and begin to open, and its standard error in beats.
 
-    The error comes from the noise of the rate at that phase and from the truncation of the series.
+    It is the minimum of the flap angle. The error results from the noise of the flap rate at that phase and from the
+    truncation of the series.
     """
     grid = np.arange(720) / 720
     guess = float(grid[int(np.argmin(flap.at(grid)))])
@@ -291,7 +297,8 @@ def closest(flap: PeriodicFit) -> tuple[float, float]:
 def pitch_law(times: Array, pitch: Array, flap: PeriodicFit) -> PitchLaw:
     """Fit Eq. 17, theta_w = pi/2 + c + c_zeta zeta + c_rate zeta' + c_square zeta'^2, to ``pitch`` [N] in rad.
 
-    The errors account for the coloured noise of the pitch and, to first order, for that of the flap angle.
+    zeta is the flap angle of the series ``flap`` at ``times`` [N] (s). The errors account for the coloured noise of the
+    pitch and, to first order, for that of the flap angle.
     """
     seen = np.isfinite(pitch)
     t, y = times[seen], pitch[seen] - np.pi / 2
@@ -311,7 +318,10 @@ def pitch_law(times: Array, pitch: Array, flap: PeriodicFit) -> PitchLaw:
 
 
 def beats_of(t_star: Array) -> Array:
-    """Phase [N] in beats that increases throughout, from phases ``t_star`` [N] that may restart at 0 in every beat."""
+    """Phase [N] in beats that increases throughout, from phases ``t_star`` [N] that may restart at 0 in every beat.
+
+    ValueError if a phase is missing (NaN).
+    """
     if not np.isfinite(t_star).all():
         raise ValueError("t_star has empty cells; give every row its phase")
     return np.asarray(t_star + np.concatenate([[0.0], np.cumsum(np.ceil(np.maximum(-np.diff(t_star), 0)))]))
@@ -328,7 +338,7 @@ def _direction(points: Array) -> Array:
 
 
 def _unwrapped(angles: Array) -> Array:
-    """Angles without jumps of 2 pi, also across gaps."""
+    """``angles`` [N] (rad) with multiples of 2 pi added so that they do not jump, also across gaps (NaN)."""
     unwrapped = angles.copy()
     seen = np.isfinite(angles)
     unwrapped[seen] = np.unwrap(angles[seen])

@@ -20,20 +20,23 @@ _TAIL = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class Kernels:
-    """Windows of 2 n + 1 samples: row d of ``taps`` [3, 2 n + 1] gives the d-th derivative (per s^d).
+    """Weights of 2 n + 1 samples: row d of ``taps`` [3, 2 n + 1] gives the d-th derivative (per s^d), filtered.
 
-    ``taps[d] @ x[i - n : i + n + 1]`` is the derivative at sample i.
+    ``taps[d] @ x[i - n : i + n + 1]`` is the derivative of the filtered signal x at sample i.
     """
 
     taps: Array
 
     @property
     def reach(self) -> int:
-        """n: number of samples lost at each end and on each side of a gap."""
+        """Half the width n of the windows: number of samples without a result at each end and on each side of a gap."""
         return int(self.taps.shape[1]) // 2
 
     def apply(self, values: Array, derivative: int) -> Array:
-        """Derivative of ``values`` [T, ...]; NaN within ``reach`` of an end or of a missing sample."""
+        """Derivative (order 0 to 2, per s^d) by time of the filtered ``values`` [T, ...].
+
+        NaN within ``reach`` samples of an end or of a missing sample.
+        """
         n = self.reach
         result = np.full(values.shape, np.nan)
         if len(values) > 2 * n:
@@ -43,10 +46,10 @@ class Kernels:
 
 
 def kernels(low_pass: LowPass, rate: float) -> Kernels:
-    """Kernels for samples at ``rate`` Hz; ValueError if the cut-off is too high for that rate.
+    """Kernels of ``low_pass`` for samples at ``rate`` Hz; ValueError unless the cut-off is in (0, 0.45 ``rate``].
 
-    Truncated where they have decreased to 1e-4 of their largest value, then corrected by the least change (in least
-    squares) that makes them exact for cubic polynomials.
+    They are truncated where all have decreased to 1e-4 of their largest value, then corrected by the least change (in
+    least squares) that makes them exact for cubic polynomials.
     """
     if not 0 < low_pass.cutoff <= 0.45 * rate:
         rule = f"with samples at {rate:g} Hz it must be above 0 and at most {0.45 * rate:g} Hz"

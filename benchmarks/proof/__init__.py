@@ -1,4 +1,4 @@
 """The two case studies that motivated the project: data with hidden physics are simulated, diagnosed and reported.
 
-``python -m benchmarks.proof``.
+Run both with ``python -m benchmarks.proof``.
 """

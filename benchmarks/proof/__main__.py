@@ -1,8 +1,8 @@
 """Both case studies in one command: ``python -m benchmarks.proof`` (or ``make proof``), under 15 minutes on 2 cores.
 
 The data come from "the plant", a simulator that shares no code with wingfit's own and contains hidden physics. The
-files are diagnosed, and each study ends with a report. Claims about the result are checked; the exit status is 1 if one
-does not hold.
+files are diagnosed, and each study ends with a report. Claims about the result are checked; the exit status is 1 if any
+claim does not hold.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ def main(words: list[str] | None = None) -> int:
 
 
 def show(story: Story, seconds: float, *, browser: bool) -> None:
-    """Print a study, its claims and the path of its report; open the report if there is a browser."""
+    """Print a study, its claims, the path of its report and its duration; with ``browser``, open the report."""
     for line in story.lines:
         say(line)
     for claim in story.claims:

@@ -31,7 +31,7 @@ from wingfit.workers import make_evaluator
 BASELINE = "berman_wang"
 FLING = "clap_and_peel"
 ALSO_RIGHT = ("varying_coefficients",)
-"""Correct if named in addition to the fling: the true coefficients differ from test to test."""
+"""Effects that are correct if named in addition to FLING: the true coefficients differ from test to test."""
 AXES = ("x", "z")
 FLING_ENDS = 0.4  # t*
 AS_IN_TABLE_7 = float(np.mean(LIFT_CORRELATION))
@@ -84,9 +84,9 @@ def located(
 
 
 def lifts(dataset: Dataset, finding: Finding, evaluator: Evaluator) -> tuple[Lift, ...]:
-    """Correlation of modelled with recorded lift in each test, for nominal and diagnosed model.
+    """Correlation of modelled with recorded lift in each test, for the nominal and for the diagnosed model.
 
-    The nominal model is calibrated on all fitted tests.
+    The nominal model is calibrated here on all fitted tests together; the diagnosed one has the genes of ``finding``.
     """
     spec = CalibrationSpec(preset=BASELINE, mode="joint", axes=AXES)
     *_, last = calibrate(spec, dataset, evaluator)
@@ -112,7 +112,7 @@ def _lift(dataset: Dataset, spec: CalibrationSpec, values: Mapping[str, float]) 
 
 
 def play(folder: Path, seed: int, workers: int) -> Story:
-    """Run the study: simulate recordings, diagnose them, locate the misfit; dataset and report go to ``folder``."""
+    """Run the study: simulate recordings, diagnose them, locate the misfit; write dataset and report to ``folder``."""
     dataset = campaign(seed)
     finding, page = diagnosed(saved(dataset, folder), {"preset": BASELINE}, workers)
     evaluator = make_evaluator("in_process")

@@ -1,8 +1,8 @@
 """The Robird study: data of a wing whose drive axis and linkage differ from their description.
 
 van der Grinten's search stalled at a mean distance of about 2 cm between simulated and recorded markers, and he named
-the place of the drive's axis as a likely cause. Here the plant's axis is displaced and its linkage has a longer frame;
-both are hidden.
+the place of the drive's axis as a likely cause. In the plant (the simulator that makes the data) the axis is displaced
+and the linkage has a longer frame; the diagnosed model contains neither.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ HIDDEN: Concealed = {
     "hinge_offset": {"strength": 0.055, "direction": -0.8},  # m, rad from y to z
     "drive_harmonics": {"strength": 0.06},  # relative increase of the linkage's frame
 }
-"""They displace the markers by 2 cm on average, as in the thesis."""
+"""Hidden effects of the plant; together they displace the markers by 2 cm on average, as in the thesis."""
 FITTED: tuple[Condition, ...] = (
     chamber(THIN_PA, LAGS[0], 2.0),
     chamber(THIN_PA, LAGS[1], 3.5),
@@ -53,7 +53,7 @@ FITTED: tuple[Condition, ...] = (
     tunnel(LAGS[0], 4.0, 7.5),
 )
 HELD_OUT: tuple[Condition, ...] = (chamber(THIN_PA, LAGS[2], 2.5), tunnel(LAGS[2], 2.5, 5.0))
-"""Combinations of frequency, lag and airspeed that no fitted recording has."""
+"""Conditions used for validation only: combinations of frequency, lag and airspeed that no fitted recording has."""
 
 SEARCH_S = 240.0  # time limit of the thesis's search, if it has not stalled before
 RECENT, LITTLE = (
@@ -66,9 +66,10 @@ AT_FLOOR = 1.15  # ratio to the floor below which a held-out misfit counts as at
 
 @dataclass(frozen=True)
 class Campaign:
-    """A dataset with its true values.
+    """A simulated dataset with the true values of its parameters.
 
-    ``genome``: nominal genes; ``truth``: genes of the diagnosis's own effects that mean the same as the hidden effects.
+    ``genome``: true genes of the nominal model; ``truth``: values of the genes with which the effects of the diagnosis
+    represent the hidden effects.
     """
 
     dataset: Dataset
@@ -76,10 +77,10 @@ class Campaign:
     truth: Mapping[str, float]
 
     def left_by_truth(self) -> float:
-        """RMS misfit (m) on the held-out recordings of the diagnosis's own effects with the true gene values.
+        """RMS misfit (m) to the held-out recordings of the model with the effects of the diagnosis at the true values.
 
-        It exceeds the noise, because the diagnosis's effect changes three harmonics of the drive, the plant's changes
-        all.
+        It exceeds the noise, because the effect of the diagnosis changes three harmonics of the drive only, whereas
+        that of the plant changes all.
         """
         spec = CalibrationSpec(division=DIVISION, effects=tuple({name.partition(".")[0] for name in self.truth}))
         model = wing_model(self.dataset, spec)
@@ -91,9 +92,10 @@ class Campaign:
 
 @dataclass(frozen=True)
 class Stall:
-    """Result of van der Grinten's genetic search: it ``stalled``, or was stopped at the time limit.
+    """Result of van der Grinten's genetic search, which ended by itself (``stalled``) or was stopped at the time limit.
 
-    ``gain`` is the relative decrease of the best misfit over the last RECENT generations of its last stage.
+    ``gain`` is the relative decrease of the best mean distance over the last RECENT generations of the last stage;
+    ``seconds``: duration of search and final assessment.
     """
 
     result: Result
@@ -144,13 +146,19 @@ def stall(
 
 
 def gained(stages: Sequence[str], best: Sequence[float]) -> float:
-    """Relative decrease of ``best`` over the last RECENT generations of the last of ``stages``."""
+    """Relative decrease of ``best`` over the last RECENT generations of the last stage.
+
+    ``stages`` and ``best`` hold the stage and the best mean distance (m) of each generation.
+    """
     recent = [one for stage, one in zip(stages, best, strict=True) if stage == stages[-1]][-RECENT - 1 :]
     return 1.0 - recent[-1] / recent[0]
 
 
 def play(folder: Path, seed: int, workers: int, seconds: float = SEARCH_S) -> Story:
-    """Run the study: simulate recordings, search as in the thesis, diagnose; dataset and report go to ``folder``."""
+    """Run the study: simulate recordings, search as in the thesis, diagnose; write dataset and report to ``folder``.
+
+    ``seconds``: time limit of the search.
+    """
     made = campaign(seed)
     path = saved(made.dataset, folder)
     evaluator = make_evaluator("processes", workers)
@@ -163,7 +171,7 @@ def play(folder: Path, seed: int, workers: int, seconds: float = SEARCH_S) -> St
 
 
 def story_of(made: Campaign, search: Stall, finding: Finding, page: Path) -> Story:
-    """Figures, text and claims of the study; ``page``: path of the report."""
+    """Figures, text and claims of the study from campaign, search and diagnosis; ``page``: path of the report."""
     best, kinds, floors = leader(finding), families(finding), over_floor(finding)
     rows = beside_truth({gene.name: gene for gene in finding.genes}, made.truth)
     after, truth = floors["heldout_over_floor"], made.left_by_truth()

@@ -1,4 +1,4 @@
-"""Common parts of both case studies: save the dataset, diagnose it as a user would, write the report, check claims."""
+"""Common parts of both case studies: save and diagnose a dataset, write the report, take figures from the finding."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ IN_A_TERMINAL = ("www-browser", "links", "elinks", "lynx", "w3m")
 
 @dataclass(frozen=True)
 class Claim:
-    """One statement of a study, and whether it holds."""
+    """A statement about the result of a study (``words``), and whether it holds."""
 
     words: str
     holds: bool
@@ -44,7 +44,7 @@ class Story:
 
 
 def saved(dataset: Dataset, folder: Path) -> Path:
-    """Write ``dataset`` into ``folder``, replacing the dataset of an earlier run."""
+    """Write ``dataset`` to a folder of its name in ``folder``, replacing that of an earlier run; return its path."""
     path = folder / dataset.name
     if (path / "dataset.yaml").is_file():
         shutil.rmtree(path)
@@ -53,9 +53,10 @@ def saved(dataset: Dataset, folder: Path) -> Path:
 
 
 def diagnosed(path: Path, options: Mapping[str, Any], workers: int) -> tuple[Finding, Path]:
-    """Diagnose the dataset at ``path`` as ``wingfit diagnose --local`` does, and write the report beside it.
+    """Diagnose the dataset at ``path`` as ``wingfit diagnose --local`` does; return the finding and the report's path.
 
-    The diagnosis receives only the files and ``options`` (those of that command).
+    The diagnosis receives only the files and ``options``, a request of that command. The report is written beside the
+    dataset.
     """
     with progress(f"{path.name}: diagnosing") as tell:
         finding = diagnose(path, dict(options), workers, tell)
@@ -84,7 +85,8 @@ def families(finding: Finding) -> tuple[str, ...]:
 def beside_truth(genes: Mapping[str, GeneValue], truth: Mapping[str, float]) -> list[dict[str, Any]]:
     """One row per true value: gene, true value, estimate, bounds of the 90 % interval, and whether it covers the truth.
 
-    Entries are None if the effect was not named.
+    Estimate and bounds are None if ``genes`` has no such gene, a bound also if the data do not bound the gene;
+    ``covered`` is None if a bound is.
     """
     rows = []
     for name, true in truth.items():
@@ -104,7 +106,10 @@ def beside_truth(genes: Mapping[str, GeneValue], truth: Mapping[str, float]) -> 
 
 
 def over_floor(finding: Finding) -> dict[str, float | None]:
-    """Held-out misfit divided by the smallest misfit that can be expected, before and after the diagnosis."""
+    """Held-out misfit divided by the smallest misfit that can be expected, before and after the diagnosis.
+
+    After it also with the bounds of the 90 % interval; None without held-out recordings.
+    """
     proof = finding.proof
     return {
         "heldout_before_over_floor": None if proof is None else proof.before.value,
@@ -115,7 +120,7 @@ def over_floor(finding: Finding) -> dict[str, float | None]:
 
 
 def opened(page: Path) -> bool:
-    """Open a page in a graphical browser; False if there is none."""
+    """Open the HTML file ``page`` in a graphical browser; return whether that succeeded."""
     try:
         browser = webbrowser.get()
     except webbrowser.Error:

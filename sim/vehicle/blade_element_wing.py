@@ -1,4 +1,4 @@
-"""A flapping vehicle as a model: from genomes to forces of its wings, sampled and filtered like a recording.
+"""Model of a flapping vehicle: it computes the forces of the wings from genomes, sampled and filtered like a recording.
 
 Quasi-steady blade elements with clap-and-peel (Armanini et al. 2016). Forces are sums of coefficients times terms that
 depend on the motion alone, so that a search over coefficients computes these terms only once.
@@ -37,10 +37,10 @@ _DEFINITION = ("vehicle", "terms", "elements", "instants", "peel_width", "effect
 
 @dataclass(frozen=True)
 class BladeElementWing:
-    """Vehicle with prescribed motion of the wings, for forces on a balance or in flight.
+    """Model of the forces of a vehicle's wings, on a balance or in flight, with prescribed motion of the wings.
 
     ``terms`` are names of :data:`wingfit.sim.vehicle.terms.TERMS`. A beat is computed at ``instants`` equal steps with
-    ``elements`` along each wing. ``peel_width`` in beats smooths the end of the peel (0: a step, as printed).
+    ``elements`` along each wing. The peel ends smoothly within ``peel_width`` beats (0: in one step, as printed).
     ``effects`` are names of :data:`wingfit.sim.effects.registry.EFFECTS` whose genes are appended.
     """
 
@@ -70,9 +70,9 @@ class BladeElementWing:
 
     @cached_property
     def genes(self) -> tuple[Gene, ...]:
-        """Coefficients of the terms, parameters of the wings' motion, then genes of the effects.
+        """Genes of a genome: coefficients of the terms, parameters of the wings' motion, then genes of the effects.
 
-        EstimateError for an invalid estimate.
+        EstimateError if the vehicle has an invalid estimate.
         """
         coefficients = [gene for name in TERMS for gene in TERMS[name].genes if name in self.terms]
         if not self.vehicle.claps:
@@ -84,18 +84,18 @@ class BladeElementWing:
 
     @cached_property
     def chosen(self) -> tuple[Effect, ...]:
-        """The effects, in the order in which they act."""
+        """The effects named in ``effects``, in the order in which they act."""
         return registry.chosen(self.effects, self.vehicle)
 
     def with_effects(self, *names: str) -> BladeElementWing:
-        """The same vehicle with more effects; their genes are appended, switched off."""
+        """Copy of this model with the effects ``names`` added; their genes are appended, nominally switched off."""
         return replace(self, effects=(*self.effects, *names))
 
     @cached_property
     def searched(self) -> tuple[str, ...]:
-        """Names of the genes that a search estimates by default: lift, rotational and fling coefficients, and effects'.
+        """Names of the model's genes that a search estimates by default: C_l, C_r, C_F, K_l, K_d and those of effects.
 
-        As in Armanini et al. (2016), drag and motion are fixed.
+        The coefficients of viscous drag and the motion are fixed, as in Armanini et al. (2016).
         """
         added = {gene.name for effect in self.chosen for gene in effect.genes(self.vehicle)}
         return tuple(gene.name for gene in self.genes if gene.name in added.union(SEARCHED))
@@ -118,7 +118,10 @@ class BladeElementWing:
         return out.transpose(0, 2, 1)
 
     def term_forces(self, genome: ArrayLike, recording: Recording) -> dict[str, Array]:
-        """Forces [n, 2] of each term (N), and of the effects; their sum is :meth:`beat`."""
+        """Forces [n, 2] (N) by name of the term, for one ``genome`` [G]; they add up to those of :meth:`beat`.
+
+        The entry "effects" holds the forces that effects add; it is absent if no effect is on.
+        """
         batch = genome_batch(self.genes, np.asarray(genome, float)[None])
         ((effects, _),) = self._by_active_effects(batch)
         parts = dict[str, Array]()
@@ -135,7 +138,10 @@ class BladeElementWing:
 
     @one_blas_thread
     def observe(self, genomes: ArrayLike, recording: Recording) -> Observation:
-        """Forces [B, T, C] of ``genomes`` [B, G] at the recording's instants and along its axes, low-passed like it."""
+        """Forces [B, T, C] (N) of ``genomes`` [B, G] at the recording's instants, along its axes, low-passed like it.
+
+        ValueError for a recording of tracks.
+        """
         if recording.kind != "forces":
             raise ValueError(f"recording {recording.name!r} holds tracks; a vehicle is compared with forces")
         batch = genome_batch(self.genes, genomes)
@@ -158,13 +164,16 @@ class BladeElementWing:
     # -- effects -----------------------------------------------------------------------------------------------
 
     def _by_active_effects(self, batch: Array) -> list[tuple[tuple[Effect, ...], list[int]]]:
-        """Sets of effects on the vehicle, each with the indices in ``batch`` [B, G] where just these are on."""
+        """Sets of effects on the vehicle, each with the indices in ``batch`` [B, G] where exactly these are on."""
         return by_active([effect for effect in self.chosen if effect.vehicle], self.genes, batch)
 
     def _rows_with_effects(
         self, effects: tuple[Effect, ...], batch: Array, recording: Recording
     ) -> tuple[Array, Array, Array]:
-        """With ``effects`` on: weights [B, rows] and forces [B, rows, 2, n] of the terms; added forces [B, 2, n], N."""
+        """Weights [B, rows], forces [B, rows, 2, n] that they multiply, and added forces [B, 2, n], N, for ``effects``.
+
+        The force of the vehicle is the sum over the rows of weights times forces, plus the added forces.
+        """
         moving = {} if recording.motion else self._values(batch, self._motion_names)
         scene = self._scene(moving | self._values(batch, _COEFFICIENTS), len(batch), recording)
         for effect in effects:
@@ -174,7 +183,10 @@ class BladeElementWing:
         return self._weights(scene.genes, len(batch)), self._wings(scene), scene.finish()
 
     def _observed(self, batch: Array, beat: Array, recording: Recording) -> tuple[Index, Sampling]:
-        """Indices in ``batch`` where an effect on the observation is on, and the observation of their ``beat``."""
+        """Indices in ``batch`` [B, G] of individuals with an effect on the observation, and their changed sampling.
+
+        ``beat`` [B, n, 2]: forces of all individuals over one beat, N.
+        """
         changed = affected(self.chosen, self.genes, batch)
         times, added = (np.zeros((len(changed), *shape)) for shape in (recording.times.shape, recording.values.shape))
         sampling = Sampling(self.vehicle, recording, beat[changed], times + recording.times, added)
@@ -184,7 +196,7 @@ class BladeElementWing:
     # -- rows: forces of each term for a coefficient of one ----------------------------------------------------
 
     def _values(self, batch: Array, names: Set[str]) -> dict[str, Array]:
-        """Genes [B] called ``names`` of ``batch`` [B, G], in the order of the model."""
+        """Values [B] in ``batch`` [B, G] by name of the gene, for the genes called ``names``, in the model's order."""
         return {gene.name: batch[:, k] for k, gene in enumerate(self.genes) if gene.name in names}
 
     def _weights(self, coefficients: Mapping[str, Array], count: int) -> Array:
@@ -209,7 +221,7 @@ class BladeElementWing:
         return frozenset(gene.name for gene in motion_genes(self.vehicle.motion))
 
     def _cached_rows(self, batch: Array, recording: Recording) -> list[Array]:
-        """As :meth:`_rows`, one array [rows, 2, n] for each individual; those of recent motions are cached."""
+        """Forces as of :meth:`_rows`, one array [rows, 2, n] per individual; those of recent motions are cached."""
         cached = self._cache.setdefault(recording, OrderedDict())
         motions = np.stack(list(self._values(batch, self._motion_names).values()) or [np.zeros(len(batch))], axis=1)
         keys = [motion.tobytes() for motion in motions]
@@ -228,13 +240,16 @@ class BladeElementWing:
         return np.repeat(found, len(batch), axis=0) if len(found) < len(batch) else found
 
     def _scene(self, genes: dict[str, Array], count: int, recording: Recording) -> VehicleScene:
-        """``count`` vehicles in the recording's condition; ``genes`` [count] are those on which the scene depends."""
+        """Scene of ``count`` individuals in the recording's condition, from the values [count] by name in ``genes``."""
         motion, r = recording.motion or self.vehicle.motion, self._span[0]
         setting = Setting(self.vehicle, self.terms, motion, recording.condition, self.instants, self.peel_width, r)
         return VehicleScene.of(setting, genes, count)
 
     def _wings(self, scene: VehicleScene) -> Array:
-        """Forces [B, rows, 2, n] of each active row for a coefficient of one (N), all wings of ``scene`` together."""
+        """Forces [B, rows, 2, n] of each active row for a coefficient of one (N), all wings of ``scene`` together.
+
+        The force of the fling circulation that effects add is added to ``scene.added``.
+        """
         vehicle, n, motion = self.vehicle, self.instants, scene.setting.motion
         r, chord, mass, width = self._span
         first, step = np.array([r[0], width]) / (motion.pitch_station * vehicle.span)
@@ -292,7 +307,7 @@ _COEFFICIENTS = {name for _, name in _ROWS.values() if name}
 
 
 def _check_effects(model: BladeElementWing) -> None:
-    """ValueError for effects that are unknown, already terms of the model, or need wings that meet."""
+    """Raise ValueError if an effect is unknown, already a term of ``model``, or needs wings that meet where none do."""
     for effect in registry.chosen(model.effects, model.vehicle):
         if effect.name in model.terms:
             raise ValueError(f"effect {effect.name!r} is a term of this model already; remove the effect, or the term")
@@ -301,7 +316,10 @@ def _check_effects(model: BladeElementWing) -> None:
 
 
 def _check_estimates(vehicle: Vehicle, genes: tuple[Gene, ...]) -> None:
-    """EstimateError for estimates that no model of ``vehicle`` admits, those for inactive terms included."""
+    """Raise EstimateError if an estimate of ``vehicle`` is outside its gene's bounds or names an unknown gene.
+
+    Known are ``genes`` and the coefficients of all terms, active or not.
+    """
     known = {gene.name: gene for term in TERMS.values() for gene in term.genes} | {gene.name: gene for gene in genes}
     remedy = "change vehicle.estimates in dataset.yaml"
     for name, value in vehicle.estimates.items():
@@ -316,7 +334,7 @@ def _check_estimates(vehicle: Vehicle, genes: tuple[Gene, ...]) -> None:
 
 
 def _sum(weights: Array, rows: Array) -> Array:
-    """Sum over the first axis of ``rows`` [rows, ...] times ``weights``, in a fixed order for any size of the batch."""
+    """Sum over the first axis of ``rows`` [R, ...] times ``weights`` [R], always in the same order of summation."""
     total = np.zeros(rows.shape[1:])
     for weight, row in zip(weights, rows, strict=True):
         if weight != 0.0:

@@ -1,4 +1,4 @@
-"""The forces of all blade elements, instant by instant, by physical term (Armanini et al. 2016, Eqs. 1-15, 18-19).
+"""Forces of the blade elements of a wing at each instant, by physical term (Armanini et al. 2016, Eqs. 1-15, 18-19).
 
 Each term is computed for a coefficient of one, so that forces are weighted sums of these rows (ROWS, CURVE_ROWS).
 Instants are independent of each other; eight of them are computed at a time, in the vector registers of the processor.
@@ -40,13 +40,13 @@ DEGREE = math.pi / 180
 
 
 class Side(NamedTuple):
-    """The stream relative to the wings of one side, in axes mirrored at the body's plane for the upper side.
+    """Factors on stream and force of the lower or upper wings; axes of upper ones are mirrored at the body's plane.
 
     Attributes:
-        stream: sign of the stream along the chord.
+        stream: 1, or -1 where the stream along the chord is reversed (upper wings, Eq. 18 as printed).
         printed: 1 if the whole normal component of the stream is multiplied by the cosine of the dihedral, as printed
-            (Eqs. 18-19); 0 if only the part from below is, which is consistent with the forces' power.
-        sign: of this side's z in body axes.
+            (Eqs. 18-19); 0 if only its part along body z is, so that a bound vortex does no work on its element.
+        sign: 1 if this side's z axis is that of the body (lower wings), -1 if it is opposite (upper wings).
     """
 
     stream: float
@@ -55,10 +55,11 @@ class Side(NamedTuple):
 
 
 class Constants(NamedTuple):
-    """Constants of all elements.
+    """Constants of all elements of a wing.
 
     ``thickness`` b and ``width`` dr of an element (m); ``twist`` of the first element and its increment ``twist_step``
-    to the next, as fractions of the twist at the pitch station; ``point``: d of the added mass (Eqs. 18-19), chords.
+    to the next, as fractions of the twist at the pitch station; ``point``: distance d (chords) behind the axis of pitch
+    of the point whose acceleration the added mass has (Armanini et al. 2016, Eqs. 18-19).
     """
 
     thickness: float
@@ -72,10 +73,11 @@ class Constants(NamedTuple):
 def velocities(
     ct: Vector, st: Vector, swing: Vector, u: Vector, w: Vector, whole: Vector, stream: float
 ) -> tuple[Vector, Vector]:
-    """Velocity of an element through the air along its chord and normal to it, m/s (Eqs. 18-19).
+    """Velocity of an element through the air along its chord and normal to it, m/s (Armanini et al. 2016, Eqs. 18-19).
 
-    ``ct``, ``st``: cosine and sine of its pitch; ``swing``: velocity by flapping; ``u``, ``w``: of the stream along
-    body x and this side's z (m/s); ``whole``: factor on the stream in the normal part; ``stream``: as in :class:`Side`.
+    ``ct``, ``st``: cosine and sine of its pitch; ``swing``: its velocity by flapping; ``u``: speed of the stream along
+    body x; ``w``: along the side's z, times the cosine of the dihedral unless :class:`Side` says ``printed`` (all m/s);
+    ``whole``: factor on the normal component of the stream; ``stream``: sign of its component along the chord.
     """
     vx = swing * ct + (u * st + w * ct) * stream
     vz = whole * (u * ct - w * st) - swing * st
@@ -87,9 +89,10 @@ def _element_forces(
     motion: Array, side: Side, r: Array, chord: Array, mass: Array, rho: float, loading: Array, constants: Constants,
     out: Array,
 ) -> None:  # fmt: skip
-    """Add to ``out`` [7, 2, n / 8, 8] the forces of ROWS along body x and z (N) of one wing at n instants.
+    """Add to ``out`` [7, 2, n / 8, 8] the forces (N, body x and z) of one wing at n instants, in the order of ROWS.
 
-    ``motion`` [14, n / 8, 8]: rows FLAP_RATE to DOWNWARD; others as in :func:`wing_forces`.
+    ``motion`` [14, n / 8, 8]: rows FLAP_RATE to DOWNWARD; ``rho``: density of the air, kg/m^3; ``mass`` [E] and
+    ``loading`` [E]: of this individual; others as in :func:`wing_forces`.
     """
     dr, d = constants.width, constants.point
     m11 = 0.25 * math.pi * rho * constants.thickness**2  # Eq. 10
@@ -158,7 +161,7 @@ def curve_lift(alpha: float) -> float:
 
 @inlined
 def curve_drag(alpha: float) -> float:
-    """C_D of the same wing at ``alpha`` degrees."""
+    """C_D of a revolving model wing at ``alpha`` degrees, 0 to 90 (Dickinson, Lehmann and Sane 1999)."""
     return 1.92 - 1.55 * math.cos((2.04 * alpha - 9.82) * DEGREE)
 
 
@@ -166,9 +169,10 @@ def curve_drag(alpha: float) -> float:
 def _curve_forces(
     motion: Array, side: Side, r: Array, chord: Array, rho: float, loading: Array, constants: Constants, out: Array
 ) -> None:
-    """Add to ``out`` [2, 2, n / 8, 8] lift and drag by measured steady curves, in the order of CURVE_ROWS.
+    """Add to ``out`` [2, 2, n / 8, 8] forces (N, body x and z) by measured steady curves, in the order of CURVE_ROWS.
 
-    Measured on a revolving wing; the angle of attack is folded into 0 to 90 degrees.
+    The curves of lift and drag were measured on a revolving wing; the angle of attack is folded into 0 to 90 degrees.
+    Arguments as in :func:`_element_forces`.
     """
     for g in range(motion.shape[1]):
         for k in range(LANES):
@@ -198,11 +202,12 @@ def wing_forces(
     motion: Array, side: Side, r: Array, chord: Array, mass: Array, density: Array, loading: Array,
     constants: Constants, out: Array,
 ) -> None:  # fmt: skip
-    """Add the forces of one wing of each of B individuals to ``out`` [B, 7 or 9, 2, n / 8, 8], body x and z, N.
+    """Add the forces of one wing of each of B individuals to ``out`` [B, 7 or 9, 2, n / 8, 8] along body x and z, N.
 
-    ``motion`` [B, 14, n / 8, 8]: rows as named above; ``r`` [E]: distances from the flapping axis in equal steps, m;
-    ``chord`` [E], m; ``mass`` [B, E] of the wing per length, kg/m; ``density`` [B] of the air, kg/m^3; ``loading``
-    [B, E]: factor on the circulation. ``out`` is in the order of ROWS, then CURVE_ROWS where there is room for them.
+    ``motion`` [B, 14, n / 8, 8]: rows FLAP_RATE to DOWNWARD; ``r`` [E]: distances of E elements from the flapping axis
+    in equal steps, m; ``chord`` [E], m; ``mass`` [B, E] of the wing per length, kg/m; ``density`` [B] of the air,
+    kg/m^3; ``loading`` [B, E]: factor on the circulation. ``out`` is in the order of ROWS, then of CURVE_ROWS if it has
+    9 rows.
     """
     for b in range(len(motion)):
         _element_forces(motion[b], side, r, chord, mass[b], density[b], loading[b], constants, out[b])
@@ -212,7 +217,7 @@ def wing_forces(
 
 @allocating
 def synthesise(basis: Array, series: Array, out: Array) -> None:
-    """Set ``out`` [B, T, A] to the sum over k of ``series`` [B, A, K] times ``basis`` [K, T], in a fixed order."""
+    """Set ``out`` [B, T, A] to the sum over k of ``series`` [B, A, K] times ``basis`` [K, T], in the order of k."""
     K, T = basis.shape
     total = np.empty(CHUNK)
     for start in range(0, T, CHUNK):
@@ -232,7 +237,7 @@ def synthesise_at(psi: Array, series: Array, out: Array) -> None:
     """Set ``out`` [T, A] to the values of A Fourier series of one individual at the phases ``psi`` [T], rad.
 
     A row of ``series`` [A, 2 K + 1] is the mean, K cosine coefficients and K sine coefficients of one series. Sines and
-    cosines are computed by recurrence over the harmonics, which is much faster than computing each.
+    cosines of the harmonics are computed by recurrence, which is much faster than computing each.
     """
     A, K = len(series), (series.shape[1] - 1) // 2
     dc, ds, c, s = np.empty((4, CHUNK))

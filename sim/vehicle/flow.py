@@ -1,4 +1,4 @@
-"""The wings of a batch at eight stations each: relative flow and the resulting forces."""
+"""The flow at eight stations along each wing of a batch of individuals, and the resulting forces."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from wingfit.sim.vehicle.stations import Stations
 class Flow:
     """The flow at eight stations of the lower wings, then of the upper ones where there are any: [sides, B, n, 8].
 
-    Axes of each side are those of the wing, mirrored at the body's plane for the upper one (Armanini et al. 2016,
-    Eqs. 2, 8, 18).
+    B individuals, n instants. Axes of each side are those of the wing, mirrored at the body's plane for the upper one
+    (Armanini et al. 2016, Eqs. 2, 8, 18).
 
     Attributes:
         along, normal: velocity of the wing through the air along its chord and normal to it, m/s.
-        speed: m/s, never zero.
-        circulation: m^2/s, without that of fling, which is added later; its force per length is
-            -rho Gamma (normal, -along).
+        speed: magnitude of this velocity, m/s, never zero.
+        circulation: Gamma, m^2/s, without that of fling (:meth:`StationedWings.forces` adds it); its force per length
+            is -rho Gamma (normal, -along), rho being the density of the air.
     """
 
     along: Array
@@ -36,19 +36,19 @@ class Flow:
 
 @dataclass(frozen=True)
 class StationedWings:
-    """Wings of B individuals with prescribed motion, at n instants.
+    """Wings of B individuals with prescribed motion, at eight stations and n instants (Armanini et al. 2016).
 
     Attributes:
         places: the stations.
-        sides: for each side that is computed, motion [B, 14, n] (rows as in :mod:`wingfit.sim.vehicle.elements`) and
-            the stream relative to it.
-        turning: [B, n], rad/s: C_R theta_w' of Eq. 2, or what replaces it, at the pitch station of a single wing.
-        fling: [B, n], rad/s: the contribution of wings that peel apart (Eq. 7).
+        sides: for each side that is computed (lower, upper), the motion [B, 14, n] of its wings (rows as in
+            :mod:`wingfit.sim.vehicle.elements`) and the stream relative to them.
+        turning: [B, n], rad/s: C_R theta_w' of Eq. 2 at the pitch station, for a wing without another one near it.
+        fling: [B, n], rad/s: rate to add to ``turning`` while two wings peel apart (Eq. 7).
         loading: [B, 8]: factor on the circulation.
         density: [B] of the air, kg/m^3.
-        lift: [B, 2]: C_l of the sine law and the factor on the measured curve.
-        drag: [B, 3]: C_D0, C_Dpi2 and the factor on the measured curve.
-        alike: number of wings per computed side.
+        lift: [B, 2]: C_l of the sine law and the factor on the measured lift curve.
+        drag: [B, 3]: C_D0, C_Dpi2 and the factor on the measured drag curve.
+        alike: number of wings per computed side, all with the same forces.
     """
 
     places: Stations
@@ -62,7 +62,7 @@ class StationedWings:
     alike: float
 
     def every(self, k: int) -> StationedWings:
-        """The same wings at every ``k``-th of their instants only."""
+        """The same wings at every ``k``-th instant only, starting with the first."""
         sides = tuple((rows[:, :, ::k].copy(), side) for rows, side in self.sides)
         return replace(self, sides=sides, turning=self.turning[:, ::k].copy(), fling=self.fling[:, ::k].copy())
 
@@ -75,11 +75,11 @@ class StationedWings:
 
     @cached_property
     def rotation(self) -> Array:
-        """Quasi-steady circulation [B, n, 8] due to pitching, m^2/s; included in that of the flow."""
+        """Quasi-steady circulation [B, n, 8] due to pitching, m^2/s, which :meth:`flow` includes in its circulation."""
         return self._turned(self.turning)
 
     def flow(self, forward: Array) -> Flow:
-        """Quasi-steady flow in a stream of ``forward`` [B, n] (m/s) along body x."""
+        """Quasi-steady flow at the stations in a stream of ``forward`` [B, n] (m/s) along body x, set in ``sides``."""
         flow = Flow(*np.empty((4, len(self.sides), *self.turning.shape, LANES)))
         for k, (rows, side) in enumerate(self.sides):
             rows[:, FORWARD] = forward
@@ -88,13 +88,13 @@ class StationedWings:
         return flow
 
     def gust(self, flow: Flow, air: Array) -> None:
-        """Update ``flow`` and its circulation for ``air`` [sides, B, n, 8] that moves along r zeta' (m/s)."""
+        """Update ``flow``, in place, for air that moves at ``air`` [sides, B, n, 8] (m/s) in the flapping direction."""
         for k, moved in enumerate(air):
             stations.station_gust(*self.turns, moved, flow.along[k], flow.normal[k])
         self._circulate(flow)
 
     def forces(self, flow: Flow) -> Array:
-        """Circulatory and viscous forces [B, 2, n] of all wings along body x and z, fling included, N."""
+        """Circulatory (fling included) and viscous forces [B, 2, n] (N) of all wings in ``flow`` along body x and z."""
         out = np.zeros((len(self.turning), 2, self.turning.shape[1]))
         circulation = flow.circulation + self._turned(self.fling)
         for k, (rows, side) in enumerate(self.sides):
@@ -104,12 +104,12 @@ class StationedWings:
         return out
 
     def _turned(self, rate: Array) -> Array:
-        """Circulation [B, n, 8] at the stations (m^2/s) for a ``rate`` [B, n] at the pitch station (Eq. 2)."""
+        """Circulation [B, n, 8] (m^2/s) at the stations by a ``rate`` [B, n] (rad/s) at the pitch station (Eq. 2)."""
         lever = 0.5 * self.places.chord**2 * self.places.twist * self.loading
         return np.asarray(rate[:, :, None] * lever[:, None])
 
     def _circulate(self, flow: Flow) -> None:
-        """Set speed and quasi-steady circulation of ``flow`` from its velocities ``along`` and ``normal``."""
+        """Set ``flow.speed`` and the quasi-steady ``flow.circulation`` from ``flow.along`` and ``flow.normal``."""
         places = self.places
         for k in range(len(self.sides)):
             velocity, wing = (flow.along[k], flow.normal[k]), (places.twist, places.chord, self.loading)

@@ -1,6 +1,6 @@
-"""The prescribed motion of the wings, measured or by formula: flap angle and pitch with their derivatives.
+"""The prescribed motion of the wings, measured or by formula: flap angle and pitch with their time derivatives.
 
-Every flap angle is converted to a Fourier series, so that its derivatives are consistent.
+Every flap angle is converted to a Fourier series, so that all its derivatives belong to one motion.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ class Angles:
     """Motion over one beat at n equal steps from t* = 0, for B individuals.
 
     ``flap`` [B, 3, n] and ``pitch`` [B, 3, n] (at the pitch station): angle (rad) and its first two derivatives by time
-    (s); ``peel`` [B, n] is 1 while the wings peel apart and 0 after, ``peeled`` [n] the fraction of the chord that has
-    come apart.
+    (s); ``peel`` [B, n] is 1 while the wings peel apart and 0 after; ``peeled`` [n] is the fraction of the chord over
+    which the wings have separated (1 for wings that do not touch).
     """
 
     flap: Array
@@ -47,7 +47,7 @@ class Angles:
 
 
 def motion_genes(motion: WingMotion) -> tuple[Gene, ...]:
-    """Genes of a motion given by formula; a motion given as a series has none."""
+    """Genes of the flap angle and the wing pitch of ``motion`` where given by formula; Fourier series have none."""
     laws = ((motion.flap, SplitCycleFlap, _FLAP_GENES), (motion.pitch, PassivePitch, _PITCH_GENES))
     return tuple(
         Gene(name, unit, getattr(law, field), getattr(law, field) - half, getattr(law, field) + half, "linear", text)
@@ -64,8 +64,9 @@ def angles_of(
     """Flap angle, pitch and peel over one beat of ``instants`` equal steps at ``frequency`` (Hz), for B individuals.
 
     The flap angle is a ``series`` [B, K + 1] (:func:`flap_series`). ``values`` are genes [B] of the motion; other
-    parameters have the motion's own values. ``peel_width`` is the time, in beats, in which rotational circulation
-    replaces fling circulation; at 0 it is one step, as printed (Eq. 7).
+    parameters have the motion's own values. Wings peel only if they touch at t* = 0 (``claps``). ``peel_width`` is the
+    time, in beats, in which rotational circulation replaces fling circulation; at 0 it is one step, as printed
+    (Armanini et al. 2016, Eq. 7).
     """
     flap = _derivatives(series, frequency, instants, 3)
     pitch = _pitch(motion.pitch, values, flap, frequency, instants)
@@ -79,7 +80,10 @@ def angles_of(
 
 
 def flap_series(flap: Flap, values: Mapping[str, Array], count: int, instants: int) -> Complex:
-    """Fourier series [B, K + 1] of the flap angle (rad): Re sum_k series_k exp(2 pi i k t*), for ``count`` = B."""
+    """Fourier series [B, K + 1] of the flap angle (rad), Re sum_k series_k exp(2 pi i k t*), for ``count`` = B.
+
+    ``values``: genes [B] by name that replace parameters of ``flap``. A split cycle has K < ``instants`` / 2.
+    """
     if isinstance(flap, FourierFlap):
         return np.tile(flap.series, (count, 1))
     k = np.arange(min(HARMONICS, (instants - 1) // 2) + 1)
@@ -91,15 +95,16 @@ def flap_series(flap: Flap, values: Mapping[str, Array], count: int, instants: i
 
 
 def _column(values: Mapping[str, Array], name: str, own: float) -> Array:
-    """The gene ``name`` of ``values`` as a column [B, 1]; without such a gene, ``own`` as [1, 1]."""
+    """Values [B] of the gene ``name`` as a column [B, 1], or ``own`` as [1, 1] if ``values`` has no such gene."""
     return np.asarray(values.get(name, np.array([own])), float)[:, None]
 
 
 def split_cycle_series(delta: Array, harmonics: int) -> Complex:
-    """Fourier series [B, harmonics + 1] of split cycles of unit amplitude and no bias (Eqs. 20-21), in closed form.
+    """Fourier series [B, harmonics + 1] of split-cycle flap angles of unit amplitude and zero bias, in closed form.
 
-    It opens as -cos((omega - delta) t*) until (omega - delta) t* = pi, and closes as -cos((omega + sigma) t* + xi),
-    with omega = 2 pi, sigma = delta omega / (omega - 2 delta), xi = -2 pi delta / (omega - 2 delta); ``delta`` [B, 1].
+    The wing opens as -cos((omega - delta) t*) until (omega - delta) t* = pi, and closes as -cos((omega + sigma) t* +
+    xi), with omega = 2 pi, sigma = delta omega / (omega - 2 delta), xi = -2 pi delta / (omega - 2 delta); ``delta``
+    [B, 1], rad per beat (Armanini et al. 2016, Eqs. 20-21). ValueError if it is outside SPLITS.
     """
     out = delta[~((SPLITS[0] <= delta) & (delta <= SPLITS[1]))]
     if len(out):
@@ -118,7 +123,10 @@ def split_cycle_series(delta: Array, harmonics: int) -> Complex:
 
 
 def _pitch(pitch: Pitch, values: Mapping[str, Array], flap: Array, frequency: float, instants: int) -> Array:
-    """theta_w at the pitch station and its first two derivatives [B, 3, n] (Eq. 17)."""
+    """Wing pitch theta_w (rad) at the pitch station and its first two derivatives by time (s): [B, 3, n] (Eq. 17).
+
+    ``flap`` [B, 4, n]: flap angle and its first three derivatives.
+    """
     if isinstance(pitch, FourierPitch):
         series = np.tile(pitch.series, (len(flap), 1))
         return _derivatives(series, frequency, instants, 2)
@@ -133,11 +141,11 @@ def _pitch(pitch: Pitch, values: Mapping[str, Array], flap: Array, frequency: fl
 
 
 def _peel(pitch_rate: Array, t_star: Array, width: float, latest: float) -> Array:
-    """1 while the wings peel, 0 after: t* >= 0 and theta_fling' = -theta_w' >= 0 (Eq. 7), ``pitch_rate`` being [B, n].
+    """Weight [B, n]: 1 while the wings peel, 0 after (Eq. 7: theta_fling' = -theta_w' > 0); ``pitch_rate`` is theta_w'.
 
-    It starts at the first instant with such a pitch rate, which must be before t* = ``latest``, and ends where the rate
-    changes sign. The end is a smooth step of ``width`` beats about that zero, which is interpolated between instants,
-    so that forces are smooth functions of the genes.
+    The peel starts at the first instant with such a pitch rate, if that is before t* = ``latest`` (else there is no
+    peel), and ends where the rate changes sign. The end is a smooth step of ``width`` beats about that zero, which is
+    interpolated between instants, so that forces are smooth functions of the genes.
     """
     n, rows = len(t_star), np.arange(len(pitch_rate))
     fling = pitch_rate < 0
@@ -157,7 +165,11 @@ def _peel(pitch_rate: Array, t_star: Array, width: float, latest: float) -> Arra
 
 
 def _derivatives(series: Complex, frequency: float, instants: int, orders: int) -> Array:
-    """Values and derivatives by time [B, orders + 1, n] of Re sum_k series_k exp(2 pi i k t*), given [B, K + 1]."""
+    """Values and derivatives by time (s) [B, orders + 1, n] over one beat of the Fourier ``series`` [B, K + 1].
+
+    The series is Re sum_k series_k exp(2 pi i k t*); ``frequency`` in Hz. ValueError if n = ``instants`` is below
+    2 K + 1.
+    """
     last = series.shape[1] - 1
     if 2 * last >= instants:
         raise ValueError(

@@ -1,4 +1,4 @@
-"""Inputs of the elements of all wings: rows of their motion, and the stream relative to each side."""
+"""Inputs of the blade elements: motion of the wings, and the stream relative to the lower and to the upper wings."""
 
 from __future__ import annotations
 
@@ -14,20 +14,21 @@ ROW_COUNT = 14
 
 
 def uppers(vehicle: Vehicle) -> tuple[bool, ...]:
-    """Whether each computed pair of wings is the upper one: (False, True) for the layout "x4", else (False,)."""
+    """For each side that is computed, whether it is the upper one: (False, True) for the layout "x4", else (False,)."""
     return (False, True) if vehicle.layout == "x4" else (False,)
 
 
 def mirrored(vehicle: Vehicle) -> float:
-    """Number of wings per computed side; left and right wings have the same motion."""
+    """Number of wings per computed side: 2 (left and right wings have the same motion), 1 for the layout "single"."""
     return 1.0 if vehicle.layout == "single" else 2.0
 
 
 def motion_rows(prescribed: Angles, forward: Array, root: float, half_step: float) -> Array:
-    """Motion [B, 14, n] for the kernels, without the rows that depend on the side (see :func:`set_side`).
+    """Motion [B, 14, n] of the wings, in rows of :mod:`wingfit.sim.vehicle.elements`; :func:`set_side` sets the others.
 
-    ``forward`` [B, n]: the stream along body x, m/s; ``root``: pitch at the wing's root, rad. ``half_step`` is the
-    twist of the first element as a fraction of that at the pitch station: half a step of the elements.
+    ``prescribed``: flap angle and pitch; ``forward`` [B, n]: speed of the stream along body x, m/s; ``root``: pitch at
+    the wing's root, rad; ``half_step``: twist (pitch less ``root``) of the first element as a fraction of that at the
+    pitch station, half the increment from one element to the next.
     """
     flap, pitch = prescribed.flap, prescribed.pitch
     rows = np.empty((len(flap), ROW_COUNT, flap.shape[2]))
@@ -40,9 +41,10 @@ def motion_rows(prescribed: Angles, forward: Array, root: float, half_step: floa
 
 
 def set_twist(rows: Array, pitch: Array, root: float, half_step: float) -> None:
-    """Set the pitch of the first element and the step between elements in ``rows`` [B, 14, n].
+    """Set cosine and sine of the first element's pitch and of the step between elements in ``rows`` [B, 14, n].
 
-    ``pitch`` [B, n]: at the pitch station, ``root``: at the root, rad.
+    ``pitch`` [B, n]: at the pitch station, ``root``: at the root, rad. ``half_step``: twist (pitch less ``root``) of
+    the first element as a fraction of that at the pitch station, half the increment between elements.
     """
     half = half_step * (pitch - root)
     c, s = np.cos(half), np.sin(half)
@@ -54,12 +56,12 @@ def set_twist(rows: Array, pitch: Array, root: float, half_step: float) -> None:
 
 
 def set_side(rows: Array, vehicle: Vehicle, flap: tuple[Array, Array, Array], below: Array, upper: bool) -> Side:
-    """Set the rows of the dihedral and of the stream for the lower wings, or for the upper ones.
+    """Set dihedral and stream in ``rows`` [B, 14, n] for lower or (``upper``) upper wings; return the side's factors.
 
     In axes mirrored at the body's plane the upper wing moves like the lower one, in a mirrored stream. As printed, Eq.
-    18 reverses the stream along the upper wing's chord (docs/decisions/0005). Wings of other layouts than "x4" are
-    computed as lower ones. ``flap`` is the cosine and the sine of the flap angle, and its rate, [B, n] each; ``below``
-    [B] is the speed of the stream along body z, m/s.
+    18 of Armanini et al. (2016) reverses the stream along the upper wing's chord (docs/decisions/0005). ``flap``:
+    cosine and sine of the flap angle, and its rate (rad/s), [B, n] each; ``below`` [B]: speed of the stream along body
+    z, m/s.
     """
     cosine, sine, rate = flap
     sign, printed = -1.0 if upper else 1.0, vehicle.velocities == "printed"

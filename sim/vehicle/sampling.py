@@ -1,4 +1,4 @@
-"""Samples of a recording from a periodic beat, with the recording's low-pass."""
+"""Forces of a simulated periodic beat, sampled at the instants of a recording and low-passed like it."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _NEGLIGIBLE = 1e-9  # gain below which a harmonic is omitted
 def series_of(forces: Array, harmonics: int, recording: Recording) -> Array:
     """Fourier series [..., 2 K + 1] of periodic ``forces`` [..., n], filtered like the recording; K is ``harmonics``.
 
-    Mean, then K cosine coefficients, then K sine coefficients.
+    Its entries are the mean, then K cosine coefficients, then K sine coefficients, in the unit of ``forces``.
     """
     spectrum = np.fft.rfft(forces)[..., : harmonics + 1] / forces.shape[-1]
     if recording.low_pass:
@@ -28,15 +28,15 @@ def series_of(forces: Array, harmonics: int, recording: Recording) -> Array:
 
 
 def phases(recording: Recording, times: Array) -> Array:
-    """Phase (rad) of the beat at ``times`` (s)."""
+    """Phase 2 pi f t (rad) of the beat at ``times`` t (s), with the recording's flap frequency f."""
     return np.asarray(2 * np.pi * recording.condition.flap_frequency * times)
 
 
 @lru_cache(maxsize=1)  # of the last recording only, since those of long recordings are large
 def basis_of(recording: Recording, harmonics: int) -> tuple[Array, Index]:
-    """Cosines, then sines of the harmonics that the recording's low-pass passes, at its T instants: array [K, T].
+    """Cosines, then sines, of the harmonics that the recording's low-pass passes, at its T instants: [R, T].
 
-    The second array [K] holds the index of each of these rows in the coefficients of :func:`series_of`.
+    The second array [R] holds the index of the coefficient of each of these R rows in the result of :func:`series_of`.
     """
     k = np.arange(harmonics + 1)
     if recording.low_pass:
@@ -48,9 +48,9 @@ def basis_of(recording: Recording, harmonics: int) -> tuple[Array, Index]:
 
 
 def passed(added: Array, recording: Recording) -> Array:
-    """Forces ``added`` [T, C] (N), errors that the balance adds, after the recording's low-pass.
+    """Errors ``added`` [T, C] (N) of a balance at the recording's T instants, filtered by the recording's low-pass.
 
-    Near the ends of a recording, where the low-pass gives no values and nothing is compared, they are unfiltered.
+    They stay unfiltered near the ends of a recording, where the low-pass gives no values.
     """
     if recording.low_pass is None or not added.any():
         return added

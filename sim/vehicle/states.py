@@ -1,4 +1,7 @@
-"""Periodic solutions, over a prescribed beat, of the differential equations of states such as the inflow."""
+"""States of the flow over a prescribed beat (lagged circulation, attachment, inflow) and their effect on the flow.
+
+A state is the periodic solution of a first-order differential equation.
+"""
 
 from __future__ import annotations
 
@@ -19,11 +22,11 @@ _SWEEPS = 6  # iterations with the correlation
 
 @inlined
 def _step(before: Vector, after: Vector) -> tuple[Vector, Vector, Vector]:
-    """(decay, w0, w1) of one step of x' = rate (y - x): x_after = decay x + w0 y0 + w1 y1, y being linear in between.
+    """Factors (decay, w0, w1) of a step of x' = rate (y - x): x_after = decay x + w0 y0 + w1 y1, y linear in the step.
 
-    ``before`` and ``after``: rate at the step's start and end times half the step; a is their sum. The decay is the
-    Pade approximant (1, 2) of exp(-a), with an error of a^4 / 72 and never above one; with these weights a constant
-    target is followed exactly.
+    ``before`` and ``after``: rate at the step's start and end, times half the step; a is their sum. The decay is the
+    Pade approximant (1, 2) of exp(-a), whose error is a^4 / 72 for small a and whose magnitude is below one. The
+    factors add up to one, so that x = y is an exact solution for constant y.
     """
     a = greatest(before + after, _MIN_DECAY)
     below = 1.0 / (a * (a * (1.0 / 6.0) + 2.0 / 3.0) + 1.0)
@@ -34,11 +37,11 @@ def _step(before: Vector, after: Vector) -> tuple[Vector, Vector, Vector]:
 
 @allocating
 def followed(speed: Array, share: Array, target: Array, step: float, out: Array) -> None:
-    """Periodic solution x of x' = share speed (target - x) over one beat.
+    """Set ``out`` to the periodic solution x of x' = share speed (target - x) over one beat of n steps of ``step`` s.
 
-    A sweep over the beat from x = 0 gives the periodic start, from which a second sweep starts. ``out`` is set to x;
-    ``speed`` (m/s; in a step the mean over its ends), ``target`` (linear over a step) and ``out`` [sides, B, n, 8];
-    ``share`` [B, 8], 1/m, not negative; ``step`` in s.
+    A sweep over the beat from x = 0 gives the periodic initial value, from which a second sweep starts. ``speed`` (m/s;
+    in a step the mean of its ends), ``target`` (linear in a step) and ``out``: [sides, B, n, 8], at eight stations of B
+    individuals. ``share`` [B, 8], 1/m, not negative.
     """
     n = speed.shape[2]
     start, kept = np.zeros(LANES), np.ones(LANES)
@@ -63,9 +66,10 @@ def followed(speed: Array, share: Array, target: Array, step: float, out: Array)
 
 @inlined
 def _angle(along: Vector, normal: Vector, speed: Vector) -> Vector:
-    """Angle of attack folded into 0 to pi / 2: twice the arc whose tangent is |normal| / (speed + |along|).
+    """Angle of attack (rad, folded into 0 to pi / 2) from the velocities along the chord and normal to it (m/s).
 
-    The arc by Abramowitz and Stegun (1964), 4.4.49, to 2e-8.
+    It is 2 arctan(|normal| / (speed + |along|)) with their magnitude ``speed``; the arc tangent by Abramowitz and
+    Stegun (1964), 4.4.49, to 2e-8.
     """
     t = magnitude(normal) / (speed + magnitude(along))
     q = t * t
@@ -77,7 +81,7 @@ def _angle(along: Vector, normal: Vector, speed: Vector) -> Vector:
 
 @inlined
 def _logistic(x: Vector) -> Vector:
-    """1 / (1 + exp x): the Pade approximant (4, 4) of exp(x / 64), squared six times."""
+    """1 / (1 + exp x), x limited to +-50, exp x being the Pade approximant (4, 4) of exp(x / 64), squared six times."""
     y = least(greatest(x, -50.0), 50.0) * (1.0 / 64.0)
     q = y * y
     even, odd = q * q * (1.0 / 1680.0) + q * (3.0 / 28.0) + 1.0, y * (q * (1.0 / 84.0) + 0.5)
@@ -91,10 +95,12 @@ def _logistic(x: Vector) -> Vector:
 def steady_attachment(
     along: Array, normal: Array, speed: Array, chord: Array, stall: Array, step: float, out: Array
 ) -> None:
-    """Attached fraction X_0 of the chord over a beat: 1 / (1 + exp((alpha - tau_2 alpha' - angle) / width)).
+    """Set ``out`` to the attached fraction of the chord 1 / (1 + exp((alpha - tau_2 c alpha' / V - angle) / width)).
 
-    ``out`` is set to X_0; ``along``, ``normal``, ``speed`` (m/s) and ``out`` [sides, B, n, 8]; ``chord`` [8], m;
-    ``stall`` [B, 3]: angle and width, rad, and tau_2 in chords travelled; ``step`` in s.
+    alpha is the angle of attack (rad, folded into 0 to pi / 2), alpha' its rate (rad/s), c the ``chord`` [8] (m) and V
+    the ``speed``. ``along``, ``normal`` (velocity along the chord and normal to it), ``speed`` (m/s) and ``out``
+    [sides, B, n, 8]; ``stall`` [B, 3]: angle and width (rad), and tau_2 in chords travelled; ``step`` between instants
+    in s.
     """
     n = speed.shape[2]
     for k in range(len(speed)):
@@ -114,10 +120,10 @@ def steady_attachment(
 
 @kernel
 def separate(attached: Array, share: Array, rotation: Array, circulation: Array) -> None:
-    """Reduce ``circulation``, in place, where the flow is ``attached`` on only a fraction X of the chord.
+    """Reduce ``circulation`` (m^2/s), in place, where the flow is attached on only the fraction X = ``attached``.
 
-    By Kirchhoff's law, the lift is then K = ((1 + sqrt X) / 2)^2 times that of attached flow. The law concerns the
-    angle of attack, so the part ``rotation`` of the circulation is kept, and the rest is multiplied by
+    By Kirchhoff's law, the lift due to the angle of attack is K = ((1 + sqrt X) / 2)^2 times that of attached flow. So
+    the part ``rotation`` of the circulation, due to pitching, does not change, and the rest is multiplied by
     1 - share (1 - K). ``attached`` and ``circulation`` [sides, B, n, 8]; ``rotation`` [B, n, 8]; ``share`` [B].
     """
     for k in range(len(attached)):
@@ -133,8 +139,8 @@ def separate(attached: Array, share: Array, rotation: Array, circulation: Array)
 def overtake(wing: Array, share: Array, wake: Array) -> None:
     """Replace the velocity w of the air in ``wake`` by ``share`` (w - w limited to the interval between 0 and u).
 
-    u is the velocity of ``wing`` along the same line: only the excess of the air over the wing's velocity acts. Both
-    [sides, B, n, 8] in m/s, ``share`` [B].
+    u in ``wing`` is the wing's velocity along the same line: air that moves in the same direction as the wing acts only
+    with its excess over u. ``wake`` and ``wing`` [sides, B, n, 8] in m/s; ``share`` [B].
     """
     for k in range(len(wake)):
         for b in range(len(share)):
@@ -150,10 +156,11 @@ def overtake(wing: Array, share: Array, wake: Array) -> None:
 def settled_inflow(
     force: Array, slope: Array, flux: Array, mass: Array, stream: Array, step: float, out: Array
 ) -> None:
-    """Periodic inflow v of m v' + F V_T v = force - slope v, V_T^2 = (U_x + mean v)^2 + U_z^2, by the trapezoidal rule.
+    """Set ``out`` [B, n] to the periodic inflow v (m/s) through the disc that the wings sweep, by the trapezoidal rule.
 
-    ``out`` [B, n] is set to v, m/s; ``force`` [B, n], N; ``slope`` [B, n], N s/m; ``flux`` [B]: F = 2 rho A, kg/m;
-    ``mass`` [B]: m, kg; ``stream`` [B, 2]: U through the disc and along it, m/s; ``step`` in s.
+    v solves m v' + F V_T v = force - slope v, V_T^2 = (U_x + mean v)^2 + U_z^2. ``force`` [B, n], N: thrust without
+    inflow; ``slope`` [B, n], N s/m: its decrease per inflow; ``flux`` [B]: F = 2 rho A, kg/m; ``mass`` [B]: apparent
+    mass m of the air, kg; ``stream`` [B, 2]: U_x through the disc and U_z along it, m/s; ``step`` in s.
     """
     n = force.shape[1]
     for b in range(len(force)):
@@ -173,9 +180,9 @@ def settled_inflow(
 
 @inlined
 def _settle(force: Array, slope: Array, through: float, inertia: float, out: Array) -> float:
-    """Set ``out`` [n] to the periodic v of :func:`settled_inflow` for a mass flow ``through``, kg/s; returns its mean.
+    """Set ``out`` [n] to the periodic v (m/s) of :func:`settled_inflow` for one individual; return its mean.
 
-    ``inertia``: m / step, kg/s.
+    ``through``: mass flow F V_T, kg/s; ``inertia``: m / step, kg/s; ``force`` [n], N; ``slope`` [n], N s/m.
     """
     n, start, total = len(force), 0.0, 0.0
     for again in range(2):

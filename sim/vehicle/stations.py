@@ -1,4 +1,4 @@
-"""The flow at eight stations along each wing over the beat, for effects that act on it, and the resulting forces.
+"""The flow at eight stations along each wing over the beat, for effects that change the flow, and the resulting forces.
 
 Eight stations fill a vector register of the processor, so that states which depend on the flow are integrated for all
 stations at the same time. The laws are those of the elements (Armanini et al. 2016, Eqs. 2-8, 11, 15, 18-19).
@@ -27,8 +27,8 @@ class Stations(NamedTuple):
         r: [8] distances from the flapping axis, m.
         chord: [8], m.
         weight: [8], m: quadrature weights along the span.
-        twist: [8] as fractions of that at the pitch station.
-        mass: [8] of the wing per length, as a fraction of its mass, 1/m.
+        twist: [8] wing pitch less that at the root, as a fraction of its value at the pitch station.
+        mass: [8] mass of the wing per length, as a fraction of the wing's mass, 1/m.
     """
 
     r: Array
@@ -39,7 +39,7 @@ class Stations(NamedTuple):
 
 
 def _weights() -> Array:
-    """Weights [8] at the middles of eighths that integrate cubics over 0 to 1 exactly; the most equal ones."""
+    """Quadrature weights [8] at the middles of eighths of 0 to 1: exact for cubics, else as equal as possible."""
     powers = _MIDDLES ** np.arange(4)[:, None]
     defect = 1.0 / np.arange(1, 5) - powers.mean(axis=1)
     return 1.0 / LANES + powers.T @ np.linalg.solve(powers @ powers.T, defect)
@@ -50,7 +50,7 @@ _WEIGHTS = _weights()
 
 
 def stations(vehicle: Vehicle, motion: WingMotion) -> Stations:
-    """The eight stations of each wing of ``vehicle``, with the pitch station of ``motion``."""
+    """The eight stations of each wing of ``vehicle``; twists are relative to the pitch station of ``motion``."""
     r, at, chords = _MIDDLES * vehicle.span, [s.r for s in vehicle.stations], [s.chord for s in vehicle.stations]
     chord = np.asarray(np.interp(r, at, chords))
     twist = r / (motion.pitch_station * vehicle.span)
@@ -59,7 +59,7 @@ def stations(vehicle: Vehicle, motion: WingMotion) -> Stations:
 
 @kernel
 def span_sums(values: Array, weight: Array, out: Array) -> None:
-    """Sum ``values`` [B, n, 8] times ``weight`` [8] into ``out`` [B, n]."""
+    """Set ``out`` [B, n] to the sum over eight stations of ``values`` [B, n, 8] times ``weight`` [8]."""
     for b in range(len(values)):
         for t in range(values.shape[1]):
             total = 0.0
@@ -70,7 +70,10 @@ def span_sums(values: Array, weight: Array, out: Array) -> None:
 
 @kernel
 def station_turns(motion: Array, cosine: Array, sine: Array) -> None:
-    """Set ``cosine`` and ``sine`` [B, n, 8] of the wing's pitch at the stations, from ``motion`` [B, 14, n]."""
+    """Set ``cosine`` and ``sine`` [B, n, 8] of the wing's pitch at the stations, from ``motion`` [B, 14, n].
+
+    The rows of ``motion`` are those of :mod:`wingfit.sim.vehicle.elements`, the stations being the elements.
+    """
     for b in range(len(motion)):
         for t in range(motion.shape[2]):
             c, s = motion[b, elements.COSINE, t], motion[b, elements.SINE, t]
@@ -84,7 +87,11 @@ def station_turns(motion: Array, cosine: Array, sine: Array) -> None:
 def station_velocities(
     motion: Array, side: Side, r: Array, cosine: Array, sine: Array, along: Array, normal: Array
 ) -> None:
-    """Set ``along`` and ``normal`` [B, n, 8], velocities through the air along the chord and normal to it (m/s)."""
+    """Set ``along``, ``normal`` [B, n, 8]: the wing's velocity through the air along its chord and normal to it, m/s.
+
+    ``motion`` [B, 14, n]: rows as in :mod:`wingfit.sim.vehicle.elements`; ``r`` [8]: distances from the flapping axis,
+    m; ``cosine`` and ``sine`` [B, n, 8]: of the wing's pitch.
+    """
     for b in range(len(motion)):
         for t in range(motion.shape[2]):
             ct, st = load1(cosine[b], t), load1(sine[b], t)
@@ -102,7 +109,10 @@ def station_velocities(
 
 @kernel
 def station_gust(cosine: Array, sine: Array, air: Array, along: Array, normal: Array) -> None:
-    """Correct ``along``, ``normal`` [B, n, 8] for air that moves in the flapping direction at ``air`` (m/s)."""
+    """Correct the wing's velocities ``along`` and ``normal`` for air moving at ``air`` in the flapping direction.
+
+    All [B, n, 8]: velocities in m/s, along the chord and normal to it; ``cosine`` and ``sine`` of the wing's pitch.
+    """
     for b in range(len(air)):
         for t in range(air.shape[1]):
             moved = load1(air[b], t)
@@ -112,7 +122,7 @@ def station_gust(cosine: Array, sine: Array, air: Array, along: Array, normal: A
 
 @inlined
 def _attack(along: float, normal: float) -> float:
-    """Angle of attack in degrees, folded into 0 to 90."""
+    """Angle of attack (degrees, folded into 0 to 90) of a velocity ``along`` the chord and ``normal`` to it."""
     return math.atan2(abs(normal), abs(along)) / DEGREE
 
 
@@ -121,11 +131,12 @@ def station_circulation(
     along: Array, normal: Array, turning: Array, coefficient: Array, twist: Array, chord: Array, loading: Array,
     speed: Array, circulation: Array,
 ) -> None:  # fmt: skip
-    """Set ``speed`` (m/s) and quasi-steady ``circulation`` (m^2/s, positive as in Eq. 8), [B, n, 8] (Eqs. 2-4, 7).
+    """Set ``speed`` (m/s) and quasi-steady ``circulation`` (m^2/s), [B, n, 8] (Armanini et al. 2016, Eqs. 2-4, 7-8).
 
-    ``along`` and ``normal`` [B, n, 8], m/s; ``turning`` [B, n]: C_R theta_w' at the pitch station, or the term that
-    replaces it in Eq. 2, rad/s; ``coefficient`` [B, 2]: C_l of the sine law and the factor on the measured curve;
-    ``twist`` [8]: fractions of ``turning``; ``chord`` [8], m; ``loading`` [B, 8]: factor on the circulation.
+    ``along`` and ``normal`` [B, n, 8]: the wing's velocity through the air along its chord and normal to it, m/s;
+    ``turning`` [B, n]: C_R theta_w' at the pitch station, or the term that replaces it in Eq. 2, rad/s; ``coefficient``
+    [B, 2]: C_l of the sine law and the factor on the measured lift curve; ``twist`` [8]: fractions of ``turning``;
+    ``chord`` [8], m; ``loading`` [B, 8]: factor on the circulation.
     """
     for b in range(len(along)):
         C_l, K_l = coefficient[b, 0], coefficient[b, 1]
@@ -151,8 +162,10 @@ def station_forces(
 ) -> None:  # fmt: skip
     """Add the circulatory and viscous forces of one wing (N) to ``out`` [B, 2, n] along body x and z (Eqs. 8, 11, 15).
 
-    ``density`` [B], kg/m^3; ``drag`` [B, 3]: C_D0, C_Dpi2 and the factor on the measured curve; others as in the
-    functions above.
+    ``cosine`` and ``sine`` (of the wing's pitch), ``along`` and ``normal`` (the wing's velocity through the air along
+    its chord and normal to it, m/s), ``speed`` (m/s) and ``circulation`` (m^2/s): [B, n, 8]. ``motion`` [B, 14, n]:
+    rows as in :mod:`wingfit.sim.vehicle.elements`; ``density`` [B] of the air, kg/m^3; ``drag`` [B, 3]: C_D0, C_Dpi2
+    and the factor on the measured drag curve.
     """
     part = np.empty((2, LANES))
     curve = np.empty(LANES)

@@ -14,7 +14,7 @@ SANE = "Sane and Dickinson, Journal of Experimental Biology 205, 1087 (2002)"
 
 @dataclass(frozen=True)
 class Term:
-    """One term: the genes that scale it, its equation and source, and a description."""
+    """A physical term of the wing's force: the genes that are its coefficients, equation, source and description."""
 
     name: str
     genes: tuple[Gene, ...]
@@ -79,7 +79,7 @@ SEARCHED = ("C_l", "C_r", "C_F", "K_l", "K_d")
 
 @dataclass(frozen=True)
 class Preset:
-    """A published model: its terms and its source."""
+    """A published model: names of its terms (keys of TERMS), its source and a description."""
 
     name: str
     terms: tuple[str, ...]
@@ -106,7 +106,7 @@ PRESETS = {
 
 
 def chosen(preset: str, without: tuple[str, ...] = ()) -> tuple[str, ...]:
-    """Terms of the model called ``preset`` less those in ``without``; ValueError for an unknown name."""
+    """Names of the terms of the published model ``preset`` less those in ``without``; ValueError for unknown names."""
     if preset not in PRESETS:
         raise ValueError(f"unknown model {preset!r}; there are {', '.join(PRESETS)}")
     terms = PRESETS[preset].terms
