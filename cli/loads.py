@@ -66,7 +66,7 @@ def summary(outputs: a.Outputs) -> list[list[str]]:
         ("transferred to the air", f"{means['to_air_w']:.4g} W"),
         (
             "closing error",
-            f"{means['closing_error_w']:.2g} W, {means['closing_error_percent']:.2g} % of the power that enters the wing",
+            f"{means['closing_error_w']:.2g} W, {means['closing_error_percent']:.2g} % of the power entering the wing",
         ),
     ]
     if "numerics" in outputs:

@@ -60,7 +60,7 @@ async function load() {
   }
   const off = Math.abs(loads.outputs.averages.closing_error_percent);
   $("loads-note").textContent = `${recording}, ${genome} genome, one periodic beat; phase 0 is where the wing crosses the horizontal `
-    + `upwards. The energy balance closes to ${rounded(off, 2)} % of the energy that enters the wing.`;
+    + `upwards. The energy balance closes to ${rounded(off, 2)} % of the energy entering the wing.`;
   $("loads").hidden = false;
   drawAverages(loads.outputs.averages);
   draw();
