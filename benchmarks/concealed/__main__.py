@@ -18,11 +18,11 @@ from benchmarks.concealed.table import side_by_side
 from benchmarks.concealed.trials import plan
 
 DEVELOPMENT = 500_000
-"""Seeds from this one on are for development datasets; those of a suite are smaller."""
+"""Smallest seed of development datasets; those of the blind test are smaller."""
 
 
 def main() -> None:
-    """Command line."""
+    """Run the blind test and print its table, or write development datasets, as the command line requests."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.concealed", description=__doc__)
     parser.add_argument("--json", action="store_true", help="print one JSON object as the last line")
     parser.add_argument("--quick", action="store_true", help="run a sample of the trials; at most 8 minutes")

@@ -21,7 +21,7 @@ class Secret:
     """One effect that was hidden in a dataset.
 
     Attributes:
-        name: of the effect in the library; for an effect that the library does not have, the plant's own name.
+        name: of the effect in the library of the diagnosis; for one that the library does not have, the plant's own.
         listed: whether the library has the effect.
         side: "physics", or "measurement" for a fault of the measurement.
         strength: size of the effect, in the unit that the plant uses for it.
@@ -51,19 +51,19 @@ class Answer:
         trial: its name.
         group: the group of trials it is counted in, from GROUPS.
         rig: "wing" or "vehicle".
-        division: discretisation (bodies of the wing) of the model to be diagnosed.
-        plant: discretisation of the plant.
+        division: discretisation (bodies of the wing) of the model to be diagnosed; "" for a vehicle.
+        plant: discretisation of the plant (the simulator that produced the dataset); "" for a vehicle.
         secrets: what was hidden; empty in a null trial.
-        genome: true values of the nominal genes.
+        genome: true values of the nominal model's genes (parameters), by name.
         target: strength d aimed at: RMS misfit of the refitted nominal model, divided by the RMS noise.
         strength: strength d that the refit of :mod:`.strength` measured.
-        strength_of_division: misfit / noise after the nominal model is refitted to a plant with nothing hidden; caused
-            by the coarser discretisation of the model and by the differences between two solvers.
+        strength_of_division: misfit / noise of the nominal model to a plant with nothing hidden, after a refit if the
+            plant is discretised more finely; caused by discretisation and by the differences between two solvers.
         noise: RMS noise of one channel in the fitted recordings, m or N.
         noise_held_out: the same in the held-out recordings.
         conditions: condition of each recording, by the recording's name.
         seed: random seed of the trial.
-        attempt: number of the random draw, the first that the plant could simulate.
+        attempt: number of the random draw that was recorded, from 0: the first that the plant could simulate.
         level: factor on the drawn noise. With seed, attempt and level the rig can be recorded again.
     """
 
@@ -95,12 +95,12 @@ class Answer:
         return self.division != self.plant
 
     def as_json(self) -> dict[str, Any]:
-        """A dictionary that ``json`` can write."""
+        """The answer as a dictionary that ``json`` can write."""
         return asdict(self)
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> Answer:
-        """The inverse of :meth:`as_json`."""
+        """The answer that :meth:`as_json` converted to the dictionary ``data``."""
         secrets = tuple(Secret(**secret) for secret in data["secrets"])
         conditions = {name: Condition(**condition) for name, condition in data["conditions"].items()}
         return cls(**{**data, "secrets": secrets, "conditions": conditions})

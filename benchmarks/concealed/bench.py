@@ -73,7 +73,7 @@ class Bench(ABC, Generic[Motion, Quality]):
     @property
     @abstractmethod
     def rig(self) -> Wing | Vehicle:
-        """The rig as described in the dataset, with estimates of the nominal model's parameters (genes)."""
+        """Description of the rig in the dataset, with estimates of the nominal model's parameters (genes)."""
 
     @property
     @abstractmethod
@@ -87,23 +87,23 @@ class Bench(ABC, Generic[Motion, Quality]):
 
     @abstractmethod
     def quality(self, rng: np.random.Generator) -> Quality:
-        """Random settings of cameras or balance."""
+        """Settings of cameras or balance, drawn from ``rng``."""
 
     @abstractmethod
     def quieter(self, quality: Quality, level: float) -> Quality:
-        """The same settings with the noise multiplied by ``level``."""
+        """Copy of the settings ``quality`` with the noise multiplied by ``level``."""
 
     @abstractmethod
     def least(self, quality: Quality) -> float:
-        """The smallest ``level`` that real equipment reaches."""
+        """Smallest factor on the noise of ``quality`` that real equipment reaches, for :meth:`quieter`."""
 
     @abstractmethod
     def ideal(self, quality: Quality) -> Quality:
-        """The same settings without noise and without gaps."""
+        """Copy of the settings ``quality`` without noise and gaps."""
 
     @abstractmethod
     def fitted(self, recording: Recording) -> Recording:
-        """The recording after the filtering that precedes every fit; strengths and noise are measured on the result."""
+        """Apply the filter that precedes every fit; strengths of effects and noise are measured on the result."""
 
     @abstractmethod
     def simulated(self, condition: Condition, genome: Mapping[str, float], hidden: Concealed) -> Motion:
@@ -113,7 +113,7 @@ class Bench(ABC, Generic[Motion, Quality]):
     def shown(
         self, beat: Motion, condition: Condition, hidden: Concealed, quality: Quality, rng: np.random.Generator
     ) -> Made:
-        """A recording of ``beat`` by cameras or balance, with the faults ``hidden`` in the measurement."""
+        """Record ``beat`` with cameras or balance of settings ``quality``, with the measurement faults ``hidden``."""
 
     @cached_property
     def laws(self) -> dict[str, Law]:
@@ -129,33 +129,33 @@ class Bench(ABC, Generic[Motion, Quality]):
         return model_for(Dataset("nominal", self.rig, ()), spec)
 
     def model_beside(self, genome: Mapping[str, float]) -> Model:  # noqa: ARG002
-        """The same model, set up to simulate parameter values near ``genome`` faster, if the rig allows it."""
+        """The nominal :attr:`model`, set up to simulate parameters near ``genome`` faster, if the rig allows it."""
         return self.model
 
     def phase(self, beat: Motion, name: str, parameters: Parameters) -> float | None:  # noqa: ARG002
-        """Phase (beats) at which an effect acts, from the start of the beat as a dataset defines it.
+        """Phase (beats) at which the effect ``name`` acts, from the start of the beat as a dataset defines it.
 
-        None if it always acts.
+        None if the effect acts at all phases.
         """
         return parameters.get("phase")
 
     def limits(self, name: str) -> tuple[float, float]:
-        """Smallest and largest strength of an effect, as multiples of its typical strength."""
+        """Smallest and largest strength of the effect ``name``, as multiples of its typical strength."""
         return SMALLEST, MOST.get(name, LARGEST)
 
     def coarse(self) -> Bench[Motion, Quality]:
-        """The same bench with the plant discretised like the model; itself if it already is."""
+        """A bench whose plant is discretised like the model; this bench if its plant already is."""
         if self.build.plant == self.build.division:
             return self
         return type(self)(replace(self.build, plant=self.build.division))
 
     def genome(self, rng: np.random.Generator) -> dict[str, float]:
-        """Random true values of the model's parameters, by name; those that it does not fit keep their estimates."""
+        """Random true values of the model's parameters by name; parameters that are not fitted keep their estimates."""
         drawn = {gene.name: float(gene.nominal * SPREAD ** rng.uniform(-1.0, 1.0)) for gene in self.model.genes}
         return {g.name: drawn[g.name] if g.name in self.model.searched else g.nominal for g in self.model.genes}
 
     def beat(self, condition: Condition, genome: Mapping[str, float], hidden: Concealed) -> Motion:
-        """As :meth:`simulated`, but cached, and faults of the measurement in ``hidden`` are ignored."""
+        """One beat by :meth:`simulated`, cached; measurement faults in ``hidden`` are ignored."""
         inside = {name: values for name, values in hidden.items() if name in self.physics}
         key = (condition, tuple(genome.items()), tuple((n, tuple(v.items())) for n, v in inside.items()))
         if key not in self.beats:
@@ -185,11 +185,11 @@ class Filmset(NamedTuple):
 
 
 class WingBench(Bench[Beat, Filmset]):
-    """The flexible wing, filmed by two cameras."""
+    """Bench of the flexible wing: its plant, filmed by two cameras."""
 
     @cached_property
     def rig(self) -> Wing:
-        """The Robird's wing."""
+        """Description of a wing like the Robird's, with 49 markers."""
         return robird_wing()
 
     def model_beside(self, genome: Mapping[str, float]) -> FlexibleWing:
@@ -211,14 +211,14 @@ class WingBench(Bench[Beat, Filmset]):
         return {name: _law(kind, self.rig) for name, kind in KINDS.items()}
 
     def limits(self, name: str) -> tuple[float, float]:
-        """Limits as multiples of the typical strength; for physics the upper one is :attr:`Kind.largest`."""
+        """Smallest and largest strength / typical strength; for physics the largest is from :attr:`Kind.largest`."""
         low, high = super().limits(name)
         return low, KINDS[name].largest / KINDS[name].typical if name in KINDS else high
 
     def phase(self, beat: Beat, name: str, parameters: Parameters) -> float | None:
         """Phase (beats) at which an effect acts, from the start of the beat as a dataset defines it; None if always.
 
-        Plant and cameras count phases from drive phase 0 instead.
+        ``parameters`` hold phases from drive phase 0 instead, as plant and cameras use them.
         """
         if name in beat.turns:
             return beat.phase(beat.turns[name])
@@ -227,29 +227,29 @@ class WingBench(Bench[Beat, Filmset]):
         return beat.phase(2 * np.pi * parameters["phase"]) if "phase" in parameters else None
 
     def quality(self, rng: np.random.Generator) -> Filmset:
-        """Random noise, gaps and cameras; two to four apparent beats."""
+        """Settings drawn from ``rng``: noise, gaps, poses of the cameras, and two to four beats."""
         return Filmset(draw_filming(rng), draw_cameras(self.rig, rng))
 
     def quieter(self, quality: Filmset, level: float) -> Filmset:
-        """The same settings with the noise of the tracks multiplied by ``level``."""
+        """Copy of the settings ``quality`` with the noise of the tracks multiplied by ``level``."""
         noise = level * quality.filming.noise.level
         return quality._replace(filming=with_noise(quality.filming, noise))
 
     def least(self, quality: Filmset) -> float:
-        """The ``level`` at which the noise is LEAST_NOISE_M, that of the best trackers; at most 1."""
+        """Factor by which the noise must be multiplied to be LEAST_NOISE_M, that of the best trackers; at most 1."""
         return min(1.0, LEAST_NOISE_M / quality.filming.noise.level)
 
     def ideal(self, quality: Filmset) -> Filmset:
-        """The same settings without noise, and with all markers visible in all frames."""
+        """Copy of the settings ``quality`` without noise, and with all markers visible in all frames."""
         perfect = replace(with_noise(quality.filming, 0.0), lost=0, gap_rate=0.0)
         return quality._replace(filming=perfect)
 
     def fitted(self, recording: Recording) -> Recording:
-        """The recording unchanged: tracks are fitted unfiltered."""
+        """Return the recording unchanged, because tracks are fitted unfiltered."""
         return recording
 
     def simulated(self, condition: Condition, genome: Mapping[str, float], hidden: Concealed) -> Beat:
-        """One beat with the true tracks of all markers."""
+        """One periodic beat of the plant, with the true tracks of all markers, m."""
         effects = tuple(
             Effect(name, values["strength"], {key: value for key, value in values.items() if key != "strength"})
             for name, values in hidden.items()
@@ -276,11 +276,11 @@ def _law(kind: Kind, wing: Wing) -> Law:
 
 
 class VehicleBench(Bench[Array, Weighing]):
-    """The DelFly on a balance."""
+    """Bench of the DelFly: its plant, on a force balance."""
 
     @cached_property
     def rig(self) -> Vehicle:
-        """The vehicle of Armanini et al. (2016)."""
+        """Description of the vehicle of Armanini et al. (2016)."""
         return delfly()
 
     @property
@@ -294,24 +294,24 @@ class VehicleBench(Bench[Array, Weighing]):
         return VEHICLE_LAWS
 
     def quality(self, rng: np.random.Generator) -> Weighing:
-        """Settings of a random balance that records BALANCE_BEATS beats."""
+        """Settings of a balance drawn from ``rng``, which records BALANCE_BEATS beats."""
         return replace(draw_weighing(rng), beats=BALANCE_BEATS)
 
     def quieter(self, quality: Weighing, level: float) -> Weighing:
-        """The same settings with noise, drift and variation between beats multiplied by ``level``."""
+        """Copy of the settings ``quality`` with noise, drift and variation between beats multiplied by ``level``."""
         smaller = {name: level * getattr(quality, name) for name in ("sensor", "rattle", "wander", "scatter", "jitter")}
         return replace(quality, **smaller)
 
     def least(self, quality: Weighing) -> float:  # noqa: ARG002
-        """1/3: the mean over nine times as many beats would have a third of the noise."""
+        """Factor 1/3 on the noise, because the mean over nine times as many beats has a third of the noise."""
         return 1 / 3
 
     def ideal(self, quality: Weighing) -> Weighing:
-        """The same balance without noise, drift and variation between beats."""
+        """Copy of the settings ``quality`` without noise, drift and variation between beats."""
         return silent(quality)
 
     def fitted(self, recording: Recording) -> Recording:
-        """Recording low-passed at the multiple of the flap frequency used by Armanini et al. (2016), section 3.4."""
+        """Low-pass the recording at the multiple of the flap frequency used by Armanini et al. (2016), section 3.4."""
         return as_fitted(CalibrationSpec(), recording)
 
     def simulated(self, condition: Condition, genome: Mapping[str, float], hidden: Concealed) -> Array:
@@ -322,7 +322,7 @@ class VehicleBench(Bench[Array, Weighing]):
     def shown(
         self, beat: Array, condition: Condition, hidden: Concealed, quality: Weighing, rng: np.random.Generator
     ) -> Made:
-        """Record the forces ``beat`` [n, 2] with the balance, with its faults ``hidden``."""
+        """Record the forces ``beat`` [n, 2] (N) with the balance and its faults ``hidden``."""
         made = weigh(beat, self.rig, condition, quality, rng, hidden)
         noise = self.fitted(replace(made.recording, values=made.recording.values - made.clean)).values
         return Made(made.recording, rms(noise.ravel()))

@@ -1,4 +1,4 @@
-"""Two general methods on the same blind trials, for comparison: sparse regression of the residual, Gaussian process.
+"""Two general methods applied to the same blind trials for comparison: sparse regression and a Gaussian process.
 
 Both get the input of a diagnosis: the residual of the refitted nominal model, and the change that each effect of the
 library (the effects that a diagnosis can name) makes to the recordings. pysindy (de Silva et al. 2020; Kaptanoglu et
@@ -41,8 +41,8 @@ ROUNDS = 2  # of the refit; each computes a new Jacobian
 class PeerOutcome:
     """Result of a comparison method (``peer``) on one trial.
 
-    ``detected``: whether it found missing physics; ``named``: effects with non-zero weights, largest first; ``before``,
-    ``after``: RMS misfit to the held-out recordings without and with its correction, m or N.
+    ``detected``: whether the method detected missing physics; ``named``: effects with non-zero weights, largest first;
+    ``before``, ``after``: RMS misfit to the held-out recordings without and with the method's correction, m or N.
     """
 
     peer: str
@@ -59,12 +59,14 @@ class Material:
     """Input of the comparison methods.
 
     Attributes:
-        residual: [D] of the refitted nominal model at all D samples of the fitted recordings, m or N.
-        features: [D, E] change of these samples by each of E effects. Both are projected on the orthogonal complement
-            of the changes that the nominal model's parameters can make.
+        residual: [D] recorded minus simulated value of the refitted nominal model at the D valid samples of the fitted
+            recordings, m or N.
+        features: [D, E] change of these samples by each of E sizes of effects. ``residual`` and ``features`` are
+            projected on the orthogonal complement of the changes that the nominal model's parameters can make.
         owner: [D] number of each sample's recording.
         names: [E] effect of each feature.
-        left_out, left_out_features: [H], [H, E] the same for the held-out recordings, not projected.
+        left_out, left_out_features: [H], [H, E] residual and features at the H valid samples of the held-out
+            recordings, not projected.
         places, left_out_places: [D, 8], [H, 8] phase, channel and condition of each sample, as from :func:`_places`.
     """
 
@@ -79,7 +81,7 @@ class Material:
 
 
 def run(task: Task) -> tuple[PeerOutcome, PeerOutcome]:
-    """Results of sparse regression and Gaussian process on the dataset of ``task``, computed in this process."""
+    """Results of sparse regression and of a Gaussian process on the dataset of ``task``, computed in this process."""
     material, start = gathered(task), time.perf_counter()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # optimisers that reach their last iteration
@@ -90,7 +92,7 @@ def run(task: Task) -> tuple[PeerOutcome, PeerOutcome]:
 
 
 def gathered(task: Task) -> Material:
-    """Refit the nominal model to the dataset of ``task``, and compute the input of both methods."""
+    """Refit the nominal model to the dataset of ``task``, and compute the input of both comparison methods."""
     dataset = load_dataset(task.dataset)
     spec = CalibrationSpec(without=task.without)
     spec = replace(spec, division=task.division) if task.division else spec
@@ -128,7 +130,7 @@ def gathered(task: Task) -> Material:
 def features(
     refit: Refit, suspects: tuple[Suspect, ...], recordings: tuple[Recording, ...]
 ) -> tuple[tuple[str, ...], Array]:
-    """Features of the suspected effects: effect name of each column, and the columns [D, E].
+    """Features of the effects ``suspects``: effect name of each column, and the columns [D, E].
 
     A column is the change of all recorded values (fitted recordings first, m or N) by NUDGE times the typical value of
     one of the effect's size parameters. Effects that cannot be simulated are omitted.
@@ -202,7 +204,7 @@ def _thresholded(x: Array, y: Array, threshold: float) -> Array:
 
 
 def gaussian_process(trial: str, material: Material) -> PeerOutcome:
-    """Fit the residual by a Gaussian process of phase, channel and condition; "detected" if that improves the BIC."""
+    """Fit the residual by a Gaussian process of phase, channel and condition; detected if better by BIC than noise."""
     rng = np.random.default_rng(len(material.residual))
     some = rng.permutation(len(material.residual))[:POINTS]
     size = rms(material.residual) or 1.0
@@ -219,7 +221,7 @@ def gaussian_process(trial: str, material: Material) -> PeerOutcome:
 
 
 def mark(outcome: PeerOutcome, answer: Answer) -> Mark:
-    """Score the result of a comparison method by the same rules as a diagnosis."""
+    """Score the result of a comparison method by the rules of a diagnosis; without places and intervals."""
     verdict = "adequate" if not outcome.detected else "named" if outcome.named else "unnamed"
     plain = replace(blank(answer, verdict), alarm=outcome.detected, named=outcome.named, top=outcome.named[:1])
     held_out, worse = outcome.after / answer.noise_held_out, outcome.after > WORSE * outcome.before

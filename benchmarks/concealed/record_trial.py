@@ -1,7 +1,7 @@
 """Make the blind trials: simulate and record a rig, save the dataset for the diagnosis, and seal the answer.
 
 Parameters of the rig, conditions, recording quality and the shape of the hidden effect are drawn at random. The
-strength of the effect is chosen such that the refitted nominal model (:mod:`.strength`) keeps the intended misfit. The
+strength of the effect is chosen such that the refitted nominal model (:mod:`.strength`) has the intended misfit. The
 same trial always gives bit-identical data.
 """
 
@@ -57,7 +57,7 @@ class Addition:
 
 @dataclass(frozen=True, eq=False)
 class Specimen:
-    """A simulated rig on its bench with everything that determines its recordings.
+    """A simulated rig with its cameras or balance (``bench``), and all that determines the recordings.
 
     ``genome``: true parameters of the rig; ``hidden``: the hidden effects. Random numbers follow from ``seed`` and
     ``attempt``. ``level`` multiplies the noise that was drawn. An ``ideal`` specimen is recorded without noise and
@@ -74,13 +74,13 @@ class Specimen:
 
     @cached_property
     def quality(self) -> Any:
-        """Settings of cameras or balance."""
+        """Settings of cameras or balance, with the noise multiplied by ``level``, or without noise if ``ideal``."""
         drawn = self.bench.quality(np.random.default_rng([self.seed, self.attempt, 2]))
         return self.bench.ideal(drawn) if self.ideal else self.bench.quieter(drawn, self.level)
 
     @property
     def least_level(self) -> float:
-        """Smallest ``level`` of the noise that real equipment reaches."""
+        """Smallest ``level`` (factor on the drawn noise) that real equipment reaches."""
         return self.bench.least(replace(self, level=1.0, ideal=False).quality)
 
     def made(self, number: int, condition: Condition) -> Made:
@@ -90,14 +90,14 @@ class Specimen:
         return found._replace(recording=replace(found.recording, name=name_of(condition)))
 
     def fitted(self, conditions: Sequence[Condition]) -> tuple[Recording, ...]:
-        """Recordings under ``conditions``, filtered as for a fit."""
+        """Simulated recordings under ``conditions``, filtered as before a fit."""
         made = (self.made(number, condition).recording for number, condition in enumerate(conditions))
         return tuple(self.bench.fitted(one) for one in made)
 
     def secret(self, name: str, condition: Condition) -> Secret:
-        """The hidden effect ``name`` as it goes into the answer.
+        """Description of the hidden effect ``name`` for the answer.
 
-        Its phase is read from the beat under ``condition``.
+        The phase of an effect that depends on the motion is that in the beat under ``condition``.
         """
         law, parameters = self.bench.laws[name], self.hidden[name]
         beat = self.bench.beat(condition, self.genome, self.hidden)
@@ -114,12 +114,12 @@ class Specimen:
         )
 
     def noise(self, conditions: Sequence[Condition]) -> float:
-        """RMS noise of the recordings under ``conditions``, m or N."""
+        """RMS noise of the recordings under ``conditions`` after the filter that precedes a fit, m or N."""
         return rms(np.array([self.made(number, condition).noise for number, condition in enumerate(conditions)]))
 
 
 def make(order: Order) -> str:
-    """Record a trial, save its dataset and its answer; returns the SHA-256 of the answer.
+    """Record a trial, save its dataset and its answer, and return the SHA-256 of the file with the answer.
 
     RuntimeError if the plant cannot be simulated in any of ATTEMPTS draws.
     """
@@ -187,8 +187,9 @@ def _made(trial: Trial, attempt: int) -> tuple[Dataset, Answer]:
 class Strength:
     """Finds the strength of a hidden effect at which the refitted nominal model has a given misfit.
 
-    The change due to a hidden effect is simulated with the discretisation of the model, which is cheaper and gives the
-    same change. A strength is searched first with the model linearised at the true parameters, then by full refits.
+    The change due to a hidden effect is simulated with the discretisation of the model, which is cheaper and gives
+    nearly the same change. A strength is searched first with the model linearised at the true parameters, then by full
+    refits.
 
     Attributes:
         bare: the specimen without hidden effects, recorded without noise; ``coarse``: discretised like the model.
@@ -196,7 +197,8 @@ class Strength:
         refit: refits the nominal model to these recordings.
         plain: [D] all values recorded from ``coarse``, m or N.
         changes: cache of :meth:`change`.
-        ends: cache of RMS residual (m or N) and parameters at the end of each full refit; later refits start from them.
+        ends: cache, by hidden effects, of RMS residual (m or N) and parameters [F] (unit coordinates) at the end of
+            each full refit; later refits start from these parameters.
     """
 
     bare: Specimen
@@ -209,7 +211,7 @@ class Strength:
 
     @classmethod
     def of(cls, bare: Specimen, fitted: Sequence[Condition]) -> Strength:
-        """Set up for the specimen ``bare`` under the conditions ``fitted``; the model starts at the true parameters."""
+        """Simulate ``bare`` under the conditions ``fitted``, and set up a refit that starts at the true parameters."""
         ideal = replace(bare, ideal=True)
         coarse = replace(ideal, bench=bare.bench.coarse())
         recordings = ideal.fitted(fitted)
@@ -227,7 +229,7 @@ class Strength:
     def set(self, bare: Specimen, drawn: Concealed, target: float) -> Specimen:
         """The specimen ``bare`` with each effect of ``drawn`` at the strength where misfit / noise is ``target``.
 
-        If no allowed strength reaches it, the noise is lowered.
+        If the misfit stays below LITTLE times that, the noise is lowered instead, as far as real equipment allows.
         """
         hidden, level, noise = {}, bare.level, bare.noise(self.conditions)
         for name, parameters in drawn.items():
@@ -263,7 +265,7 @@ class Strength:
     def final(self, specimen: Specimen) -> float:
         """RMS residual (m or N) of a full refit with all effects hidden in ``specimen``; 0 if there are none.
 
-        For a single effect it is cached.
+        The result for a single effect is cached from the search for its strength.
         """
         hidden = specimen.hidden
         key = _key(hidden)

@@ -18,8 +18,8 @@ from wingfit.workers import make_evaluator
 class Task:
     """A diagnosis to run.
 
-    ``dataset``: path; ``division``: discretisation of a wing's model, "" for a vehicle; ``without``: force terms that a
-    vehicle's model omits; ``policy``: thresholds of the diagnosis.
+    ``trial``: label of the dataset; ``dataset``: its path; ``division``: discretisation of a wing's model, "" for a
+    vehicle; ``without``: force terms that a vehicle's model omits; ``policy``: thresholds of the diagnosis.
     """
 
     trial: str
@@ -31,7 +31,7 @@ class Task:
 
 @dataclass(frozen=True)
 class Outcome:
-    """Result of a task; ``reason`` says why there is no finding, and is "" if there is one."""
+    """Result of a diagnosis; ``reason`` says why there is no finding, and is "" if there is one."""
 
     trial: str
     finding: Finding | None

@@ -23,17 +23,17 @@ class Mark:
     Attributes:
         trial, group, rig: as in :class:`.answer.Answer`.
         truth: names of the hidden effects.
-        target, strength: misfit / noise of the hidden effect that was aimed at, and that a refit measured.
+        target, strength: misfit / noise intended for each hidden effect, and measured for all together by a refit.
         verdict, named: as in the finding; "failed" if the diagnosis gave none.
         top: effects of the most probable hypothesis other than the nominal model.
         alarm: the verdict is not "adequate".
-        first: the most probable hypothesis is the truth; exact: the verdict names the truth and nothing else.
-        found: number of hidden effects among those named, or among ``top`` if none is named.
+        first: ``top`` are the hidden effects and no others; exact: the verdict names these and no others.
+        found: number of hidden effects among those that the verdict names, or among ``top`` if it names none.
         wrong: the verdict names an effect that was not hidden.
-        side: physics or measurement, according to the verdict; None if it does not decide.
-        right_side: whether that is correct.
-        held_out: misfit / noise on held-out recordings; worse: whether the misfit is larger than with the refitted
-            nominal model.
+        side: physics or measurement, according to the verdict; None if the verdict does not decide.
+        right_side: whether all hidden effects are of this side.
+        held_out: misfit / noise on held-out recordings; worse: whether the misfit is more than 1 % larger than with the
+            refitted nominal model.
         span, chord, phase: distance of the reported from the true place, in spans, chords and degrees of the beat.
         covered, intervals: number of 90 % intervals that contain the true value, and number of intervals.
         finer, division, plant: as in the answer.
@@ -72,7 +72,7 @@ class Mark:
 
 
 def blank(answer: Answer, verdict: str, remark: str = "") -> Mark:
-    """A score with the entries of the answer; all that the diagnosis should have found counts as missed."""
+    """A score with the entries of ``answer``; all that a diagnosis should have detected counts as missed."""
     missed = bool(answer.secrets)
     return Mark(
         trial=answer.trial,
@@ -154,7 +154,7 @@ def _proof(finding: Finding, answer: Answer) -> tuple[float | None, bool | None]
 
     (None, None) without held-out recordings.
 
-    Only the noise that was added to these recordings counts as noise, not the error of the first discretisation: a
+    Noise is the RMS noise added to these recordings, without the error of the first discretisation, because a
     diagnosis may choose a finer one.
     """
     held_out = [one for one in finding.recordings if one.held_out]
@@ -166,10 +166,10 @@ def _proof(finding: Finding, answer: Answer) -> tuple[float | None, bool | None]
 
 
 def _covered(finding: Finding, answer: Answer) -> tuple[int, int]:
-    """Number of intervals that contain the truth, and number of intervals for which a truth exists.
+    """Number of bounded intervals that contain the true value of their gene, and number of those with a true value.
 
-    These are the genes of hidden effects that were named and, in null trials with equal discretisation, the nominal
-    genes. With a finer plant or with missing physics the nominal genes of the model have no true value.
+    True values exist for genes (parameters) of hidden effects that were named and, in null trials with equal
+    discretisation, for the nominal genes. With a finer plant or with missing physics the nominal genes have none.
     """
     true = _nominal(answer)
     if finding.verdict in NAMING:
@@ -182,7 +182,7 @@ def _covered(finding: Finding, answer: Answer) -> tuple[int, int]:
 
 
 def _nominal(answer: Answer) -> dict[str, float]:
-    """True values of the nominal genes if they exist, else empty."""
+    """True values of the nominal genes by name, in a null trial with equal discretisation; empty otherwise."""
     if answer.secrets or answer.finer:
         return {}
     return {name: value for name, value in answer.genome.items() if name not in SHARES}
@@ -202,7 +202,7 @@ def _holds(gene: GeneValue, true: float) -> bool | None:
 def _distances(finding: Finding, answer: Answer) -> tuple[float | None, float | None, float | None]:
     """Distances along span, chord (fractions) and beat (degrees) between reported and true place of the hidden effect.
 
-    Each is infinite if no place is reported, and None if there is no true one.
+    Each is infinite if no place is reported, and None if there is no true place.
     """
     where = finding.where
     span = _place(finding, answer, "station") or (where.span if where else None)
@@ -216,7 +216,7 @@ def _distances(finding: Finding, answer: Answer) -> tuple[float | None, float | 
 
 
 def _place(finding: Finding, answer: Answer, parameter: str) -> Interval | None:
-    """Estimated value of the gene ``parameter`` ("station", "chord") of the hidden effect; None if it is not named."""
+    """Estimate of the gene ``parameter`` ("station", "chord") of the hidden effect; None if that is not named."""
     secret = answer.secrets[0]
     if finding.verdict not in NAMING or secret.name not in finding.named:
         return None

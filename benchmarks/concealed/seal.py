@@ -1,7 +1,8 @@
 """Sealed answers of the blind trials: proof that the answers did not change after the first diagnosis.
 
 Each answer is a JSON file; a manifest holds the SHA-256 of all files, and its own hash is printed before the first
-diagnosis. Each file contains a random number too, so that an answer cannot be found by hashing guesses.
+diagnosis. Each file also contains a random number drawn from the trial's seed, so that an answer cannot be found by
+hashing guesses without that seed.
 """
 
 from __future__ import annotations
@@ -19,11 +20,11 @@ MANIFEST = "manifest.json"
 
 
 class BrokenSealError(ValueError):
-    """An answer differs from the one that was sealed."""
+    """A sealed answer, or the manifest of all hashes, was changed after it was written."""
 
 
 def seal(answer: Answer, folder: Path) -> str:
-    """Write ``answer`` into ``folder`` and return its SHA-256."""
+    """Write ``answer`` into ``folder`` as a JSON file named after its trial; return the SHA-256 of the file."""
     salt = np.random.default_rng([answer.seed, 7]).bytes(16).hex()
     text = json.dumps({"salt": salt, "answer": answer.as_json()}, sort_keys=True, indent=1)
     folder.mkdir(parents=True, exist_ok=True)
@@ -32,12 +33,12 @@ def seal(answer: Answer, folder: Path) -> str:
 
 
 def digest(text: str) -> str:
-    """SHA-256 of a text."""
+    """SHA-256 of ``text`` in UTF-8, as hexadecimal digits."""
     return hashlib.sha256(text.encode()).hexdigest()
 
 
 def close(hashes: Mapping[str, str], folder: Path) -> str:
-    """Write the manifest of ``hashes`` (by trial) into ``folder``, and return its own SHA-256.
+    """Write the manifest, ``hashes`` (SHA-256 of each answer by trial), into ``folder``; return the manifest's SHA-256.
 
     BrokenSealError if the folder already has a manifest with another hash for one of these trials.
     """
@@ -71,5 +72,5 @@ def open_seal(trial: str, folder: Path, manifest: str) -> Answer:
 
 
 def read(path: Path) -> Answer:
-    """The answer in the file ``path``, without a check; for simulating further recordings of the same rig."""
+    """The answer in the file ``path``, without a check of its hash; to simulate further recordings of the same rig."""
     return Answer.from_json(json.loads(path.read_text(encoding="utf-8"))["answer"])

@@ -88,7 +88,7 @@ class Refit:
         return self.tangent_at(self.unit, self.recordings)
 
     def tangent_at(self, unit: Array, recordings: Sequence[Recording]) -> Array:
-        """Jacobian [D, F] at ``unit`` [F] by central differences; RuntimeError as in :attr:`nominal`."""
+        """Jacobian [D, F] at ``unit`` [F] by central differences; RuntimeError if a simulation near there fails."""
         moves = STEP * np.eye(len(self.genes))
         around = np.clip(np.vstack([unit + moves, unit - moves]), 0.0, 1.0)
         seen = _whole(self.observed(around, recordings))
@@ -108,7 +108,7 @@ class Refit:
     def linear(self, change: Array) -> float:
         """RMS residual (m or N) of a linearised refit to a ``change`` [D] of the recordings, genes within their ranges.
 
-        It needs no simulation once the Jacobian is known.
+        Linearised by :attr:`tangent`, so that no simulation is needed once this Jacobian is known.
         """
         known = np.isfinite(change)
         slopes = self.tangent[known]
@@ -127,8 +127,8 @@ class Refit:
         """Genes [F] (unit coordinates) and residual [D] of a refit to ``target`` [D].
 
         Gauss-Newton with several dampings at once, of which the best is taken. The Jacobian is updated after every step
-        (Broyden 1965), and is evaluated again at the start of each of ``rounds``; at the true values it is already
-        known.
+        (Broyden 1965), and is evaluated again at the start of each of ``rounds``, except at the true values, where
+        :attr:`tangent` is used. The refit starts from the best of the true values and all ``near`` [F].
         """
         recordings = with_values(self.recordings, target)
         starts = np.stack([self.unit, *near])
@@ -166,7 +166,7 @@ class Refit:
 
 
 def _left(residual: Array, known: npt.NDArray[np.bool_]) -> float:
-    """RMS of ``residual`` [D]; infinite for an individual that could not be simulated.
+    """RMS of ``residual`` [D] of one individual; infinite if it could not be simulated.
 
     ``known`` [D]: mask of the samples that were recorded.
     """
@@ -213,7 +213,7 @@ def with_values(recordings: Sequence[Recording], values: Array) -> tuple[Recordi
 
 
 def stacked(recordings: Sequence[Recording]) -> Array:
-    """Values of all channels of all recordings, [D]."""
+    """Values of all channels of all recordings, one after the other, [D] (m or N)."""
     return np.concatenate([one.values.ravel() for one in recordings])
 
 

@@ -49,36 +49,36 @@ class Folders:
 
     @property
     def datasets(self) -> Path:
-        """Datasets: all that the diagnosis sees."""
+        """Folder of the datasets, the only files that the diagnosis reads."""
         return self.root / "datasets"
 
     @property
     def sealed(self) -> Path:
-        """Answers and manifest."""
+        """Folder of the sealed answers and of the manifest with their hashes."""
         return self.root / "sealed"
 
     @property
     def findings(self) -> Path:
-        """Findings of the diagnosis, as JSON."""
+        """Folder of the findings of the diagnosis, as JSON."""
         return self.root / "findings"
 
     @property
     def peers(self) -> Path:
-        """Results of the comparison methods, as JSON."""
+        """Folder of the results of the comparison methods, as JSON."""
         return self.root / "peers"
 
     def answer(self, trial: str) -> Path:
-        """Path of a sealed answer."""
+        """Path of the sealed answer of ``trial``."""
         return self.sealed / f"{trial}.json"
 
     def dataset(self, label: str) -> Path:
-        """Path of the dataset of a trial, or of its repetition with one more recording."""
+        """Path of the dataset ``label``: that of a trial, or its copy extended by one more recording."""
         return self.datasets / f"{label}.nc"
 
 
 @contextmanager
 def pool(jobs: int) -> Iterator[ProcessPoolExecutor]:
-    """New processes with one thread each."""
+    """Pool of ``jobs`` new processes in which numerical libraries use one thread each."""
     before = {name: os.environ.get(name) for name in SINGLE_THREAD}
     os.environ.update(dict.fromkeys(SINGLE_THREAD, "1"))
     try:
@@ -117,7 +117,7 @@ def each(
 def make(trials: Sequence[Trial], folders: Folders, jobs: int) -> str:
     """Make the datasets and answers of ``trials``, in ``jobs`` processes; returns the hash of the answers' manifest.
 
-    Trials that the folder already holds, made with the same seed, are not made again.
+    Trials that ``folders`` already hold, made with the same seed, are not made again.
     """
     folders.datasets.mkdir(parents=True, exist_ok=True)
     missing = [trial for trial in trials if not _made(trial, folders)]
@@ -129,7 +129,7 @@ def make(trials: Sequence[Trial], folders: Folders, jobs: int) -> str:
 
 
 def _made(trial: Trial, folders: Folders) -> bool:
-    """Whether the folder holds the trial; ValueError if a trial of another suite has its name there."""
+    """Whether ``folders`` hold this trial; ValueError if they hold a different trial of the same name."""
     if not (folders.answer(trial.name).exists() and folders.dataset(trial.name).exists()):
         return False
     earlier = seal.read(folders.answer(trial.name))

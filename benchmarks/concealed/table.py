@@ -13,25 +13,25 @@ from benchmarks.concealed.score import Mark
 
 NORMAL_90 = 1.6448536269514722
 BINS = {2: (1.6, 2.45), 3: (2.45, 3.87), 5: (3.87, math.inf)}
-"""Bins of the measured d (not of the d aimed at). Trials below the first bin are too weak to count."""
+"""Range of the measured strength d (misfit / noise) by intended d. Trials below the first are too weak to count."""
 WEAK = BINS[2][0]
 
 
 @dataclass(frozen=True)
 class Rate:
-    """``hits`` among ``n``, with the 90 % interval of Wilson (1927)."""
+    """Proportion of ``hits`` among ``n`` cases, with the 90 % confidence interval of Wilson (1927)."""
 
     hits: int
     n: int
 
     @property
     def percent(self) -> float | None:
-        """Rate in per cent; None if n is 0."""
+        """``hits`` / ``n`` in per cent; None if n is 0."""
         return round(100 * self.hits / self.n, 1) if self.n else None
 
     @property
     def interval(self) -> tuple[float, float] | None:
-        """Confidence interval of the rate, per cent; None if n is 0."""
+        """90 % confidence interval (low, high) of the rate, per cent (Wilson 1927); None if n is 0."""
         if not self.n:
             return None
         z, p, n = NORMAL_90, self.hits / self.n, self.n
@@ -53,12 +53,12 @@ def rate(marks: Iterable[Mark], good: Callable[[Mark], bool | None]) -> Rate:
 
 
 def of(marks: Iterable[Mark], group: str) -> list[Mark]:
-    """Those of ``marks`` that belong to one group of trials."""
+    """Scores among ``marks`` of the trials of one ``group``."""
     return [one for one in marks if one.group == group]
 
 
 def at(marks: Iterable[Mark], d: int) -> list[Mark]:
-    """Those of ``marks`` whose strength (misfit / noise) lies in the bin ``d`` of BINS."""
+    """Scores among ``marks`` whose strength (misfit / noise) lies in the bin ``d`` of BINS."""
     low, high = BINS[d]
     return [one for one in marks if low <= one.strength < high]
 
@@ -77,7 +77,7 @@ class Advised:
         verdict, named: of the first diagnosis.
         advice: the recording that it recommended, in words; None if it recommended none.
         resolved: whether the diagnosis named the truth after that recording.
-        by_chance: the same after a recording under a random condition.
+        by_chance: whether it did so after a recording under a random condition instead.
     """
 
     trial: str
@@ -94,7 +94,7 @@ class Table:
     """All scores of one method.
 
     ``marks``: one score per trial; ``advised``: trials whose first diagnosis was ambiguous; ``advice_trials``: number
-    of trials that were designed to be ambiguous; ``seconds``: duration of the whole test.
+    of trials that were designed to be ambiguous; ``seconds``: duration of the test with this method.
     """
 
     marks: tuple[Mark, ...]
@@ -104,7 +104,7 @@ class Table:
 
     @property
     def rates(self) -> dict[str, Rate]:
-        """Every rate of the table, by its name there."""
+        """Every rate of the table, by the name of its row."""
         listed, unlisted = of(self.marks, "listed"), seen(of(self.marks, "unlisted"))
         return {
             "null: false alarms": rate(of(self.marks, "null"), lambda m: m.alarm),
@@ -147,7 +147,7 @@ class Table:
 
     @property
     def failures(self) -> list[dict[str, Any]]:
-        """Every trial with a wrong result, and what is wrong."""
+        """Every trial with a wrong result or useless advice, and what is wrong with it, for the JSON output."""
         known = [(one, what) for one in self.marks if (what := wrongs(one))]
         wrong = [
             {
@@ -239,7 +239,7 @@ def side_by_side(tables: Mapping[str, Table]) -> str:
 
 
 def wrongs(one: Mark) -> str:
-    """What is wrong with a trial's result; "" if nothing is."""
+    """Description of all that is wrong with the result of one trial; "" if nothing is."""
     if one.verdict == "failed":
         return f"no finding: {one.remark}"
     mistakes = list[str]()
@@ -260,12 +260,12 @@ def wrongs(one: Mark) -> str:
 
 
 def of_rig(one: Mark) -> str:
-    """Label of a trial's rig with the discretisations of model and plant, such as "wing 4 of 8x1"."""
+    """Label of a trial's rig with the discretisations of model and plant: "wing 4 of 8x1" is model 4, plant 8x1."""
     return f"{one.rig} {one.division} of {one.plant}".removesuffix("  of ")
 
 
 def right(one: Mark) -> bool | None:
-    """Whether the result of a trial is right for its group; None if the trial is too weak to count."""
+    """Whether nothing is wrong with the result of a trial; None if its hidden effect is too weak to count."""
     return None if one.truth and one.strength < WEAK else not wrongs(one)
 
 
@@ -279,17 +279,17 @@ BY_RIG: tuple[tuple[str, str, Callable[[Mark], bool | None]], ...] = (
 
 
 def kinds(marks: Sequence[Mark]) -> list[str]:
-    """Names of the effects hidden in any of the trials, sorted."""
+    """Names of all effects hidden in the trials of ``marks``, sorted."""
     return sorted({name for one in marks for name in one.truth})
 
 
 def of_kind(marks: Iterable[Mark], name: str) -> list[Mark]:
-    """Scores of trials in which ``name`` was hidden."""
+    """Scores among ``marks`` of the trials in which the effect ``name`` was hidden."""
     return [one for one in marks if name in one.truth]
 
 
 def median(values: Iterable[float | None]) -> float | None:
-    """Median of the finite values; None if there are none."""
+    """Median of the values that are not None, rounded to 4 decimals; None if it is infinite or there are none."""
     known = [value for value in values if value is not None]
     middle = float(np.median(known)) if known else math.inf
     return round(middle, 4) if math.isfinite(middle) else None

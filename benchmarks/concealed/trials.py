@@ -38,8 +38,8 @@ FLIGHT = (
 class Build:
     """A rig, with the discretisations of the diagnosed model and of the plant (the simulator that makes the data).
 
-    ``division`` (model) and ``plant``: bodies of the wing, as "8x4"; both "" for a vehicle. ``without``: force terms
-    omitted both from the vehicle's model and from its plant, in addition to what is hidden.
+    ``division`` (model) and ``plant``: bodies of the wing, such as "8x4" (8 strips of 4 bodies); both "" for a vehicle.
+    ``without``: force terms omitted both from the vehicle's model and from its plant.
     """
 
     rig: Literal["wing", "vehicle"]
@@ -64,7 +64,7 @@ class Trial:
     """One trial before it is recorded.
 
     Attributes:
-        name: does not reveal what is hidden.
+        name: label that does not reveal what is hidden.
         group: the group it is counted in, such as "null" (nothing hidden) or "pairs" (two effects hidden).
         build: rig, model and plant.
         hidden: names of the hidden effects in the plant; empty in a null trial.
@@ -145,7 +145,8 @@ def plan(seed: int, *, quick: bool = False, only: Sequence[str] = ()) -> tuple[T
 def _group(group: Group, n: int, thinned: int) -> Iterator[Trial]:
     """The trials of a group, still without name and seed.
 
-    ``n`` trials in all; for groups "listed" and "unlisted", ``n`` trials of every ``thinned``-th effect.
+    ``n`` trials in all; for groups "listed" and "unlisted", ``n`` trials of every ``thinned``-th effect; for "listed"
+    also up to two (at most n // 7) of wings whose model has 24 bodies.
     """
     if group == "null":
         builds = [one for pair in zip((*SMALL, ELEVEN_FINER), cycle(VEHICLES), strict=False) for one in pair]
@@ -181,7 +182,7 @@ def _each(group: Group, names: Sequence[str], builds: Sequence[Build], n: int) -
 def _mixed(
     group: Group, wing: Sequence[tuple[str, ...]], vehicle: Sequence[tuple[str, ...]], n: int
 ) -> Iterator[Trial]:
-    """``n`` trials that cycle through the tuples of hidden effects in ``wing`` and ``vehicle``."""
+    """``n`` trials in all that cycle through the tuples of effects to hide in a ``wing`` and in a ``vehicle``."""
     kinds = [(names, True) for names in wing] + [(names, False) for names in vehicle]
     step = next(step for step in range(4, len(kinds) + 4) if math.gcd(step, len(kinds)) == 1)
     for k in range(n):  # with a stride, so that the first few contain both rigs
@@ -196,7 +197,7 @@ def _draft(group: Group, build: Build, hidden: tuple[str, ...] = (), target: flo
 
 
 def conditions(trial: Trial, rng: np.random.Generator) -> list[tuple[Condition, bool]]:
-    """Conditions of a trial's recordings, and whether each is held out."""
+    """(condition, held out) of each recording of ``trial``; the conditions are drawn from ``rng``."""
     if trial.build.rig == "vehicle":
         return _flights(trial, rng)
     return _alike(rng) if trial.poor else _campaign(rng)
@@ -250,23 +251,23 @@ def _drawn(trial: Trial, rng: np.random.Generator) -> Condition:
 
 
 def chamber(pressure: float, lag: float, frequency: float) -> Condition:
-    """A condition in the vacuum chamber; Pa, rad, Hz."""
+    """Condition in the vacuum chamber at ``pressure`` (Pa), phase ``lag`` (rad) and flap ``frequency`` (Hz)."""
     return Condition(float(frequency), float(lag), pressure, ROOM_K)
 
 
 def tunnel(lag: float, frequency: float, airspeed: float) -> Condition:
-    """A condition in the wind tunnel; rad, Hz, m/s."""
+    """Condition in the wind tunnel at phase ``lag`` (rad), flap ``frequency`` (Hz), ``airspeed`` (m/s), pitch 4 deg."""
     return Condition(float(frequency), float(lag), AIR_PA, ROOM_K, float(airspeed), INCIDENCE)
 
 
 def flight(number: int) -> Condition:
-    """A flight condition of the DelFly, by its row in FLIGHT."""
+    """Flight condition of the DelFly in row ``number`` of FLIGHT."""
     speed, pitch, frequency = FLIGHT[number]
     return Condition(frequency, 0.0, AIR_PA, ROOM_K, speed, math.radians(pitch))
 
 
 def name_of(condition: Condition) -> str:
-    """Name of a recording, such as ``chamber-0010mbar-lag3-2.5hz``."""
+    """Name of a recording under ``condition``, such as ``chamber-0010mbar-lag3-2.50hz``."""
     end = f"{condition.flap_frequency:.2f}hz"
     if condition.airspeed > 0:
         pitch = math.degrees(condition.angle_of_attack)

@@ -1,1 +1,1 @@
-"""The plant: simulated rigs that share no code with the product's simulator, with simulated cameras and a balance."""
+"""The plant: simulated rigs, cameras and balance that share no code with ``wingfit.sim``, the tested simulator."""

@@ -14,9 +14,9 @@ F = TypeVar("F", bound=Callable[..., object])
 
 
 def _folder() -> Path:
-    """Cache folder, named after a hash of the sources.
+    """Cache folder for compiled code, named after a hash of the sources; OSError if none is writable.
 
-    Numba does not notice a change in a function called from another file.
+    Numba itself does not notice a change in a function called from another file.
     """
     here = Path(__file__).resolve().parent
     sources = [text for text in (file.read_bytes() for file in sorted(here.rglob("*.py"))) if b"@compiled" in text]
@@ -35,10 +35,7 @@ _CACHE = _folder()
 
 
 def compiled(function: F) -> F:
-    """Decorator: ``function`` compiled by numba without the GIL; floating-point sums may be reordered.
-
-    OSError if no cache folder is writable.
-    """
+    """Decorator that compiles ``function`` by numba to run without the GIL; floating-point sums may be reordered."""
     before = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(_CACHE)
     try:

@@ -24,7 +24,7 @@ class Law:
         name: of the library's effect with the same meaning, or a name of its own if the library has none.
         side: "physics", or "measurement" for a fault of the measurement.
         typical: strength that is typical in practice, in the unit of the effect.
-        source: literature.
+        source: literature on which the equation is based.
         listed: whether the library has the effect.
         both_signs: whether the strength may be negative.
         shape: (low, high) of the uniform distribution of each parameter other than the strength. "span" and "chord"
@@ -55,7 +55,7 @@ def strength(concealed: Concealed, name: str) -> float:
 
 
 def check_known(concealed: Concealed, laws: Mapping[str, Law]) -> None:
-    """ValueError for a name that is not in ``laws``, or for parameters that do not belong to it."""
+    """Raise ValueError if a name is not in ``laws``, or if its parameters are not exactly those of its law."""
     for name, parameters in concealed.items():
         if name not in laws:
             raise ValueError(f"nothing called {name!r} can be hidden here; there are {', '.join(laws)}")

@@ -62,7 +62,7 @@ class Weighing:
 class Weighed(NamedTuple):
     """A recording by the balance.
 
-    ``clean`` [T samples, 2]: its values without noise, N; ``noise``: RMS of the noise over all frequencies, N.
+    ``clean`` [T samples, 2]: the recorded forces without noise, N; ``noise``: RMS of the noise at all frequencies, N.
     """
 
     recording: Recording
@@ -71,7 +71,7 @@ class Weighed(NamedTuple):
 
 
 def draw_weighing(rng: np.random.Generator) -> Weighing:
-    """A random balance similar to that of Armanini et al. (2016), section 3.2."""
+    """Settings, drawn from ``rng``, of a balance similar to that of Armanini et al. (2016), section 3.2."""
     colours = [c for c in COLOURS if c != "shake"]
     low = [0.0, 8e-4, 4e-3, 105.0, 85.0, 2e-4, 0.008, 2e-4]
     high = [0.7, 2.5e-3, 1e-2, 150.0, 120.0, 6e-4, 0.025, 6e-4]
@@ -81,7 +81,7 @@ def draw_weighing(rng: np.random.Generator) -> Weighing:
 
 
 def silent(weighing: Weighing) -> Weighing:
-    """The same balance without noise, drift and variation between beats."""
+    """Copy of the settings ``weighing`` without noise, drift and variation between beats."""
     return replace(weighing, sensor=0.0, rattle=0.0, wander=0.0, scatter=0.0, jitter=0.0)
 
 
@@ -95,7 +95,7 @@ def weigh(
     *,
     name: str = "balance",
 ) -> Weighed:
-    """Simulate a recording by the balance of one wing beat that repeats.
+    """Simulate a recording by the balance; the wing beat repeats exactly but for the noise of ``weighing``.
 
     ``forces`` [n, 2] along body x and z, N, at n equal steps of a beat from its start. ``hidden``: faults of the
     balance with their parameters, by name as in :data:`FAULTS`; the numbers drawn from ``rng`` do not depend on them.
@@ -171,9 +171,9 @@ def _mount(natural: float, damping: float, rate: float) -> tuple[Array, Array]:
 
 
 def _through(forces: Array, rate: float, hidden: Concealed) -> Array:
-    """Forces [T, 2] after the faults of axes, mount and amplifier: cross-talk, resonance, delay, dry friction.
+    """Forces [T, 2] (N) after the faults of axes, mount and amplifier: cross-talk, resonance, delay, dry friction.
 
-    ``rate``: samples of ``forces`` [T, 2] per second.
+    ``rate``: samples of the input ``forces`` [T, 2] (N) per second.
     """
     if strength(hidden, "balance_tilt"):
         a = strength(hidden, "balance_tilt")
@@ -194,7 +194,7 @@ def _through(forces: Array, rate: float, hidden: Concealed) -> Array:
 
 
 def _stuck(forces: Array, p: Parameters) -> Array:
-    """Output [T, 2] of a pivot with stiction: it moves only once a force differs from it by ``strength`` (N).
+    """Output [T, 2] (N) of a pivot with stiction: constant until a force differs from the output by ``strength`` (N).
 
     Play operator of Krejci (1996), on each axis.
     """

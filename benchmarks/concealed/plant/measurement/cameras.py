@@ -23,10 +23,10 @@ _GLARE = (0.08, 0.12, 0.05)  # extent of glare, as fractions of span, chord and 
 
 @dataclass(frozen=True)
 class Cameras:
-    """A pair of cameras.
+    """Poses of a pair of pinhole cameras.
 
     Attributes:
-        centres: [2, 3] m, in the wing frame.
+        centres: [2, 3] centres of projection, m, in the wing frame.
         middle: [2, 2], the middle of each image in focal lengths from the camera's axis. The lenses are shifted so that
             both images show the wing; distortion is relative to this point.
         axes: [2, 3, 3]: rows are right, down and forward of each camera in the wing frame. Rows of an image run along
@@ -40,7 +40,7 @@ class Cameras:
     span: float
 
     def image(self, points: Array, k: int) -> Array:
-        """Image coordinates [..., 2] in camera ``k`` of ``points`` [..., 3] m; in focal lengths from the middle."""
+        """Image coordinates [..., 2] of ``points`` [..., 3] (m) in camera ``k``, in focal lengths from ``middle``."""
         seen = (points - self.centres[k]) @ self.axes[k].T
         return np.asarray(seen[..., :2] / seen[..., 2:] - self.middle[k])
 
@@ -68,7 +68,7 @@ class Cameras:
 
 
 def draw_cameras(wing: Wing, rng: np.random.Generator) -> Cameras:
-    """Two cameras above the wing, side by side along the span, looking down and slightly towards each other."""
+    """Random poses of two cameras above the wing, side by side along the span and inclined towards each other."""
     aim = np.mean([marker.position for marker in wing.markers], axis=0) * [1.0, 1.0, 0.0]
     height, base, lean = (float(v) for v in rng.uniform([2.05, 0.3, 0.0], [2.8, 0.5, 0.1]))
     height *= wing.span
@@ -121,7 +121,7 @@ def divided(image: Array, amount: float) -> Array:
 
 
 def _assumed(cameras: Cameras, wing: Wing, hidden: Concealed) -> Cameras:
-    """The cameras at the poses that the triangulation assumes: wrong by a hidden rotation, shift or scale error.
+    """Camera poses that the triangulation assumes; they differ from the true ones by rotation, shift or scale error.
 
     Rotation and scaling are about the hinge of the wing.
     """
@@ -141,18 +141,18 @@ def _assumed(cameras: Cameras, wing: Wing, hidden: Concealed) -> Cameras:
 
 
 def _direction(p: Parameters) -> Array:
-    """Unit vector [3] from its angles "azimuth" and "height" (elevation) in ``p``, rad."""
+    """Unit vector [3] whose angles (rad) in ``p`` are "azimuth" and "height" (elevation)."""
     flat = np.cos(p["height"])
     return np.array([flat * np.cos(p["azimuth"]), flat * np.sin(p["azimuth"]), np.sin(p["height"])])
 
 
 def direction_values(name: str, p: Parameters) -> dict[str, float]:
-    """True values of the genes ``name``.x, .y and .z of a library effect that is a vector: strength times direction."""
+    """True genes ``name``.x, .y and .z of an effect that is a vector: "strength" times the direction in ``p``."""
     return {f"{name}.{axis}": float(p["strength"] * u) for axis, u in zip("xyz", _direction(p), strict=True)}
 
 
 def _beyond_pane(points: Array, cameras: Cameras, wing: Wing, p: Parameters) -> Array:
-    """Image displacement [..., 2] of points outboard of a joint in the window, seen through a tilted second pane.
+    """Image displacement [..., 2] (focal lengths) of points outboard of a window joint, seen through a tilted pane.
 
     A plate of thickness d shifts a ray by d sin(i) (1 - cos(i) / sqrt(n^2 - sin^2 i)) (Born and Wolf 1999, sect. 1.5),
     nearly the same for all rays through it; ``strength`` is this shift at the wing, m.
@@ -164,7 +164,7 @@ def _beyond_pane(points: Array, cameras: Cameras, wing: Wing, p: Parameters) -> 
 
 
 def _pulled(beats: Array, cameras: Cameras, wing: Wing, p: Parameters) -> Array:
-    """Image displacement [T, M, 2] by glare: at one phase, a lamp's reflection on part of the skin shifts the markers.
+    """Image displacement [T, M, 2] (focal lengths) of markers near a lamp's reflection, which appears at one phase.
 
     ``beats`` [T, M]: phase at which each marker is imaged.
     """
@@ -176,7 +176,7 @@ def _pulled(beats: Array, cameras: Cameras, wing: Wing, p: Parameters) -> Array:
 
 
 def places(wing: Wing) -> Array:
-    """Position [M, 2] of every marker at rest, as fractions of the span and of the local chord."""
+    """Position [M, 2] of each of M markers at rest, as fractions of the span and of the local chord."""
     rest = np.array([marker.position for marker in wing.markers])
     y, edge, chord = (np.array([getattr(s, name) for s in wing.stations]) for name in ("y", "leading_edge", "chord"))
     along = (rest[:, 0] - np.interp(rest[:, 1], y, edge)) / np.interp(rest[:, 1], y, chord)

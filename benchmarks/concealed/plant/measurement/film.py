@@ -36,14 +36,14 @@ class Filming:
     """How a wing is filmed.
 
     Attributes:
-        noise: of the tracks.
-        mode: "strobe": each frame is of another beat, at a slightly earlier phase than the last; "fast": consecutive
-            frames of each beat.
+        noise: settings of the noise of the tracks.
+        mode: "strobe": each frame is of another beat, at a slightly earlier phase than the previous frame; "fast": many
+            frames in each beat.
         beats: number of beats shown: apparent beats of a strobe, real ones of a fast camera.
-        per_beat: frames in a beat; a random fraction of a frame is added for a fast camera.
+        per_beat: n; a strobe takes n + 1 frames in an apparent beat, a fast camera n plus a random fraction in a beat.
         lost: number of markers that are never visible.
         gap_rate: probability per frame that a marker is lost for a while.
-        gap_frames: mean length of such a gap.
+        gap_frames: mean length of such a gap, frames.
     """
 
     noise: Noise
@@ -58,7 +58,8 @@ class Filming:
 class Filmed(NamedTuple):
     """A recording of the markers.
 
-    ``clean`` [T frames, C channels]: its values without noise but with the same gaps, m; ``noise``: RMS noise, m.
+    ``clean`` [T frames, C channels]: the recorded positions without noise but with the same gaps, m; ``noise``: RMS
+    noise, m.
     """
 
     recording: Recording
@@ -67,7 +68,7 @@ class Filmed(NamedTuple):
 
 
 def draw_filming(rng: np.random.Generator, mode: Mode | None = None) -> Filming:
-    """Random settings; without a given ``mode``, a strobe in three of four cases."""
+    """Settings of filming drawn from ``rng``; without a given ``mode``, a strobe in three of four cases."""
     drawn: Mode = "strobe" if rng.uniform() < 0.75 else "fast"
     beats, per_beat, lost = (int(n) for n in rng.integers([2, 24, 5], [5, 37, 13]))
     rate, frames = (float(g) for g in rng.uniform([0.002, 3.0], [0.012, 8.0]))
@@ -90,11 +91,11 @@ def film(
     Args:
         tracks: all markers of ``wing`` over one beat, [n, M, 3] in m at n equal steps from drive phase 0.
         wing: the wing that is filmed.
-        condition: of the recording.
-        filming: settings.
-        rng: source of all random numbers; the draws depend neither on what is hidden nor on the noise.
+        condition: condition of the recording, of which frequency and airspeed are used.
+        filming: settings of the noise, the frames and the gaps.
+        rng: source of all random numbers; the draws depend neither on ``hidden`` nor on the RMS of the noise.
         hidden: parameters of the faults, by name as in :data:`FAULTS`.
-        name: of the recording.
+        name: name of the recording.
         cameras: the pair of cameras, drawn at random if not given; pass one pair to share it between recordings.
     """
     hidden = hidden or {}
@@ -121,7 +122,7 @@ def film(
 
 
 def _between(tracks: Array) -> Tracks:
-    """Function from phases [T, M] (beats) to positions [T, M, 3] of each marker at its own phases.
+    """Function from phases [T, M] (beats) to positions [T, M, 3] (m) of each marker at its own phases.
 
     It interpolates ``tracks`` [n, M, 3] by periodic cubic splines.
     """
@@ -139,7 +140,7 @@ def _between(tracks: Array) -> Tracks:
 
 
 def _times(filming: Filming, frequency: float, rng: np.random.Generator) -> Array:
-    """Times of the frames, s. In each beat, a fast camera's frames are at other phases than in the beat before."""
+    """Times [T] of the frames, s. A fast camera's frames are at other phases in each beat than in the previous one."""
     odd = rng.uniform(0.2, 0.8)
     if filming.mode == "strobe":
         rate, frames = frequency * (filming.per_beat + 1) / filming.per_beat, (filming.per_beat + 1) * filming.beats
@@ -149,14 +150,14 @@ def _times(filming: Filming, frequency: float, rng: np.random.Generator) -> Arra
 
 
 def _beats(times: Array, frequency: float, hidden: Concealed) -> Array:
-    """True phase (beats) at the recorded ``times`` [T]; the hidden fault "strobe_rate" makes the clock fast."""
+    """True phase [T] (beats) at the recorded ``times`` [T] (s); with "strobe_rate", true time passes faster."""
     late = times - times.mean()
     fast = strength(hidden, "strobe_rate") * (1.0 + _WANDER * late / (np.ptp(times) + 1e-12))
     return np.asarray(frequency * (times + fast * late))
 
 
 def _kept(wing: Wing, lost: int, rng: np.random.Generator, hidden: Concealed) -> list[int]:
-    """Indices of visible markers: all but ``lost`` random ones; those of a fault and some references always stay."""
+    """Indices of visible markers: all but ``lost`` random ones, never markers of a hidden fault or four references."""
     order = [int(k) for k in rng.permutation(len(wing.markers))]
     references = [k for k in order if wing.markers[k].name in wing.reference_markers][:_KEPT_REFERENCES]
     concerned = [k for name in ("marker_slip", "marker_swap") if name in hidden for k in _pair(wing, hidden[name])]
@@ -165,7 +166,7 @@ def _kept(wing: Wing, lost: int, rng: np.random.Generator, hidden: Concealed) ->
 
 
 def _pair(wing: Wing, p: Parameters) -> tuple[int, int]:
-    """Indices of the marker nearest to the position "span", "chord" in ``p``, and of its nearest neighbour."""
+    """Indices of the marker nearest to "span", "chord" (fractions) in ``p``, and of its nearest neighbour."""
     rest = np.array([marker.position for marker in wing.markers])
     part = places(wing)
     one = int(np.hypot(part[:, 0] - p["span"], (part[:, 1] - p["chord"]) * 0.4).argmin())
@@ -173,7 +174,7 @@ def _pair(wing: Wing, p: Parameters) -> tuple[int, int]:
 
 
 def _slipped(tracks: Array, wing: Wing, hidden: Concealed) -> Array:
-    """Tracks [T, M, 3] with one marker displaced by ``strength`` (m) along the skin, as a marker that has slipped.
+    """Tracks [T, M, 3] with one slipped marker: displaced along the skin by the hidden fault's "strength" (m).
 
     The skin's rotation in each frame is fitted to the neighbouring markers (Kabsch 1976).
     """
@@ -202,7 +203,7 @@ def _swaps(frames: int, part: float, rng: np.random.Generator) -> Bools:
 
 
 def _exchanged(tracks: Array, wing: Wing, frames: Bools, hidden: Concealed) -> Array:
-    """Tracks [T, M, 3] with two neighbouring markers exchanged in the frames of the mask ``frames`` [T]."""
+    """Tracks [T, M, 3] with two neighbouring markers exchanged in the frames where the mask ``frames`` [T] is True."""
     if not frames.any():
         return tracks
     one, other = _pair(wing, hidden["marker_swap"])
@@ -212,7 +213,7 @@ def _exchanged(tracks: Array, wing: Wing, frames: Bools, hidden: Concealed) -> A
 
 
 def _crept(tracks: Array, times: Array, hidden: Concealed) -> Array:
-    """Tracks [T, M, 3] shifted more and more during a recording, as the lamps warm the cameras' mount (Fraser 1997)."""
+    """Tracks [T, M, 3] (m) plus a drift that levels off, as lamps warm the cameras' mount (Fraser 1997)."""
     if not strength(hidden, "thermal_creep"):
         return tracks
     p = hidden["thermal_creep"]
@@ -222,12 +223,12 @@ def _crept(tracks: Array, times: Array, hidden: Concealed) -> Array:
 
 
 def tracked(tracks: Array, hole: Bools, hidden: Concealed) -> Array:
-    """Tracks [T, M, 3] (m) as a tracker's Kalman filter reports them: it lags behind fast motion.
+    """Tracks [T, M, 3] (m) as reported by a tracker's Kalman filter, which lags behind fast motion.
 
-    Its states are position, velocity and acceleration, with white noise as jerk and the covariance of Bar-Shalom, Li
-    and Kirubarajan (2001, sect. 6.2.3). The standard deviation of the jerk is 1 / ``strength`` of the hidden
-    "tracker_lag", in units of the measurement's standard deviation and of frames. The filter extrapolates where the
-    mask ``hole`` [T, M] is True.
+    The filter's states are position, velocity and acceleration, with white noise as jerk and the covariance of
+    Bar-Shalom, Li and Kirubarajan (2001, sect. 6.2.3). The standard deviation of the jerk is 1 / ``strength`` of the
+    hidden "tracker_lag", in units of the measurement's standard deviation and of frames. The filter extrapolates where
+    the mask ``hole`` [T, M] is True.
     """
     if not strength(hidden, "tracker_lag"):
         return tracks.copy()  # with unlimited jerk the filter follows every frame
@@ -250,7 +251,7 @@ def tracked(tracks: Array, hole: Bools, hidden: Concealed) -> Array:
 def _started(tracks: Array) -> Array:
     """Initial state [3, M, 3] of the filter: position, velocity, acceleration one frame before the first (per frame).
 
-    From a parabola through the first five frames.
+    They follow from a parabola fitted to the first five frames.
     """
     first = np.polyfit(np.arange(1, 6), tracks[:5].reshape(5, -1), 2)[::-1] * np.array([[1.0], [1.0], [2.0]])
     return np.asarray(first.reshape(3, *tracks.shape[1:]))
@@ -325,5 +326,5 @@ FAULTS = {
 
 
 def with_noise(filming: Filming, level: float) -> Filming:
-    """The same settings with another RMS noise, m."""
+    """Copy of the settings ``filming`` with the RMS noise ``level``, m."""
     return replace(filming, noise=replace(filming.noise, level=level))

@@ -1,4 +1,4 @@
-"""Random noise of trackers and balances with several spectra, which a diagnosis of the recording is not given."""
+"""Random noise of trackers and balances with several spectra, which are not given to a diagnosis."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _DEPTH = 1.5  # noise along z, away from the cameras, relative to that along x a
 
 @dataclass(frozen=True)
 class Noise:
-    """Noise of tracks.
+    """Settings of the noise of marker tracks.
 
     Attributes:
         colour: "first_order" autoregressive; "wavy" ARMA(2, 1), with a pair of complex poles; "pink", power inversely
@@ -41,14 +41,14 @@ class Noise:
 
 
 def draw_noise(rng: np.random.Generator) -> Noise:
-    """Random settings: any colour, RMS 0.2 to 0.8 mm."""
+    """Settings of the noise drawn from ``rng``: any colour, RMS 0.2 to 0.8 mm."""
     colour = COLOURS[int(rng.integers(len(COLOURS)))]
     level, memory, common = rng.uniform([2e-4, 0.0, 0.3], [8e-4, 0.8, 0.7])
     return Noise(colour, float(level), float(memory), float(common))
 
 
 def track_noise(noise: Noise, frames: int, markers: int, rng: np.random.Generator) -> Array:
-    """Noise [frames, markers, 3] of marker positions, m; largest along z (depth), and different for each marker."""
+    """Noise [frames, markers, 3] of marker positions, m, largest along z (depth) and of another RMS for each marker."""
     each = coloured(noise.colour, noise.memory, (frames, markers, 3), rng)
     if noise.colour == "shake":
         shared = coloured("first_order", noise.memory, (frames, 1, 3), rng)
@@ -60,7 +60,7 @@ def track_noise(noise: Noise, frames: int, markers: int, rng: np.random.Generato
 def coloured(colour: Colour, memory: float, shape: tuple[int, ...], rng: np.random.Generator) -> Array:
     """Random array of ``shape``, correlated along its first axis (time), with expected variance one.
 
-    ``memory``: modulus of the poles. For "shake", this is only the part that differs between markers.
+    ``memory``: modulus of the poles. For "shake", the result is only the part that differs between markers.
     """
     if colour == "pink":
         return _pink(shape, rng)
@@ -79,7 +79,7 @@ def coloured(colour: Colour, memory: float, shape: tuple[int, ...], rng: np.rand
 
 
 def _pink(shape: tuple[int, ...], rng: np.random.Generator) -> Array:
-    """Noise with power 1 / f along the first axis of ``shape``, and expected variance one.
+    """Noise of ``shape`` with power proportional to 1 / frequency along its first axis, and expected variance one.
 
     The power is constant below the frequency of one period in four times the length of the result.
     """

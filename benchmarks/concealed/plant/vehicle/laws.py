@@ -29,7 +29,8 @@ _LAG_STEPS = 120  # steps per beat of the integral over past circulation
 class Flow:
     """Motion of the blade elements of the wings on one side over a beat: n instants, E elements along the span.
 
-    Complex vectors: the real part is along body x or the chord, the imaginary part along the normal of either.
+    Complex vectors: the real part is along body x (axes of the stroke) or along the chord (axes of the chord), the
+    imaginary part normal to it.
 
     Attributes:
         t: beats from the start of the beat.
@@ -37,13 +38,14 @@ class Flow:
         frequency: flapping frequency, Hz.
         rho: density of the air, kg/m^3.
         span: length of a wing, m.
-        zeta, rate, acceleration: flap angle and its time derivatives [n].
+        zeta, rate, acceleration: flap angle and its first two time derivatives [n] (rad, s).
         level: cosine of the wing's angle to the horizontal [n].
-        theta, turn, turn_rate: pitch angle and its time derivatives [n, E].
-        own, own_rate: velocity due to flapping and airspeed in axes of the stroke, complex, and its rate [n, E].
+        theta, turn, turn_rate: pitch angle and its first two time derivatives [n, E] (rad, s).
+        own, own_rate: velocity due to flapping and airspeed in axes of the stroke, complex, and its time derivative
+            [n, E] (m, s).
         peel, peeled: fraction of each instant in which the two wings peel apart, and of the chord that has separated
             [n] (clap and peel).
-        met: velocity through the air in axes of the chord, with all inflow and gusts [n, E].
+        met: velocity through the air in axes of the chord, complex, with all inflow and gusts [n, E], m/s.
     """
 
     t: Array
@@ -86,7 +88,7 @@ class Flow:
 
 
 def levered(flap: Array, strength: float) -> Array:
-    """Flap angle [n] with a driving lever longer by the fraction ``strength``.
+    """Flap angle [n] (rad) if the driving lever is longer by the fraction ``strength`` than for ``flap`` [n].
 
     The tangent of the angle's deviation from its mean grows by that fraction.
     """
@@ -97,7 +99,7 @@ def levered(flap: Array, strength: float) -> Array:
 
 
 def blocked(condition: Condition, strength: float) -> Condition:
-    """The condition with an airspeed whose square is larger by 2 ``strength``, as by tunnel blockage (Maskell 1963)."""
+    """Copy of ``condition`` with airspeed squared times 1 + 2 ``strength``, as by tunnel blockage (Maskell 1963)."""
     return replace(condition, airspeed=condition.airspeed * math.sqrt(1.0 + 2.0 * strength))
 
 
@@ -175,7 +177,7 @@ def _stall(flow: Flow, gamma: Array, rotation: Array, p: Parameters) -> Array:
 
 
 def _followed(target: Array, steps: Array) -> Array:
-    """Periodic solution x [n, E] of x' = target - x, with steps ``steps`` [n, E] of the independent variable."""
+    """Periodic solution x [n, E] of x' = target - x, for steps ``steps`` [n, E] in units of the time constant."""
     keep = np.exp(-steps)
     start = np.zeros(target.shape[1])
     for _ in range(2):  # the first round gives the correction of the start value
@@ -218,7 +220,7 @@ def _pocket(flow: Flow, p: Parameters) -> Complex:
 
 
 def _jet(flow: Flow, p: Parameters) -> Complex:
-    """Change [n, E] (m/s) of the velocity along body x by a local jet of ``strength`` m/s, at one phase and span."""
+    """Change [n, E] (m/s) of the velocity along body x by a jet of ``strength`` m/s near one phase and span."""
     apart = (flow.t - p["phase"] + 0.5) % 1.0 - 0.5
     place = np.exp(-0.5 * ((flow.r / flow.span - p["span"]) / 0.15) ** 2)
     return np.asarray(p["strength"] * np.exp(-0.5 * (apart / 0.05) ** 2)[:, None] * place + 0j)
@@ -241,7 +243,7 @@ def _tail(forces: Array, vehicle: Vehicle, air: Condition, p: Parameters) -> Arr
 
 
 def _knock(forces: Array, vehicle: Vehicle, air: Condition, p: Parameters) -> Array:
-    """Force [n, 2] (N, body x and z) of a linkage that hits its stop at one phase, and an opposite one as it separates.
+    """Force [n, 2] (N, body x and z) of a linkage that hits its stop at one phase, then reversed as it separates.
 
     ``strength``: peak force in units of the vehicle's weight at 12 Hz; it grows with the square of the frequency.
     """

@@ -41,7 +41,7 @@ _ROUNDS, _COARSE, _SETTLED = 40, 120, 1e-5  # of the inflow: iterations, instant
 
 @dataclass(frozen=True)
 class Motion:
-    """``flap`` angle, and ``pitch`` angle at the pitch station, at n equal steps of a beat from its start.
+    """Angles ``flap``, and ``pitch`` at the pitch station, of a wing at n equal steps of a beat from its start.
 
     Both [3, n]: angle and its first two time derivatives (rad, s).
     """
@@ -81,12 +81,12 @@ def simulate(
 
 
 def density(air: Condition) -> float:
-    """Density of dry air, kg/m^3."""
+    """Density of dry air at the pressure and temperature of ``air``, kg/m^3."""
     return air.pressure / (GAS * air.temperature)
 
 
 def motion_of(vehicle: Vehicle, frequency: float, instants: int, hidden: Concealed) -> Motion:
-    """Flap angle and pitch with two time derivatives, at ``instants`` equal steps of a beat of ``frequency`` (Hz)."""
+    """Flap and pitch angle with two time derivatives, at ``instants`` equal steps of a beat of ``frequency`` (Hz)."""
     flap = levered(_flap_samples(vehicle.motion.flap), strength(hidden, "stroke_amplitude"))
     rates = [_derived(flap, frequency, order) for order in range(4)]
     law = vehicle.motion.pitch
@@ -104,7 +104,7 @@ def motion_of(vehicle: Vehicle, frequency: float, instants: int, hidden: Conceal
 
 
 def _flap_samples(law: Flap) -> Array:
-    """Flap angle [_FINE] (rad) at equal steps of a beat: a Fourier series, or Eqs. 20-21 smoothed by a Gaussian."""
+    """Flap angle [_FINE] (rad) in a beat: Fourier series, or Eqs. 20-21 of Armanini et al. (2016) with smoothing."""
     if isinstance(law, FourierFlap):
         return _series(law.mean, law.cosine, law.sine)
     spectrum = np.fft.rfft(_split_cycle(law))
@@ -221,9 +221,9 @@ def _flow(vehicle: Vehicle, air: Condition, motion: Motion, r: Array, chord: Arr
 
 
 def _peel(turn: Array, t: Array, vehicle: Vehicle) -> tuple[Array, Array]:
-    """Fraction of each instant in which the wings peel apart (Eq. 7), and of the chord that has separated, [n] each.
+    """Fraction of each instant in which the wings peel apart, and of the chord that has separated, [n] each.
 
-    ``turn``: pitch rate [n], rad/s; ``t``: instants [n], beats.
+    Armanini et al. (2016), Eq. 7. ``turn``: pitch rate [n], rad/s; ``t``: instants [n], beats.
     """
     if not vehicle.claps:
         return np.zeros(len(t)), np.ones(len(t))
@@ -246,9 +246,9 @@ def _element_forces(
     terms: tuple[str, ...],
     inflow: Array | None,
 ) -> tuple[Complex, Complex]:
-    """Forces per metre of span on the elements, two arrays [n, E]: due to circulation and drag, and due to inertia.
+    """Forces (N/m of span) on the elements, two arrays [n, E]: due to circulation and drag, and due to inertia.
 
-    Complex: the real part is along body x, the imaginary part along the normal of the wing's plane.
+    Complex: the real part is along body x, the imaginary part along the normal of the wing at zero pitch.
     """
     rho, chord = flow.rho, flow.chord
     air = flow.own if inflow is None else flow.own + inflow[:, None] * flow.r / flow.span
@@ -267,7 +267,7 @@ def _element_forces(
 def _circulation(
     flow: Flow, vehicle: Vehicle, coefficients: Mapping[str, float], hidden: Concealed, terms: tuple[str, ...]
 ) -> Array:
-    """Circulation of the elements [n, E] (m^2/s) by Eqs. 2-4 and 7, changed by the hidden effects.
+    """Circulation [n, E] (m^2/s) by Armanini et al. (2016), Eqs. 2-4 and 7, changed by the hidden effects.
 
     Circulation lag and stall act on the circulation of a single wing, not on that of two wings that peel apart.
     """
@@ -287,10 +287,10 @@ def _circulation(
 
 
 def _inertia(flow: Flow, stream: Complex, vehicle: Vehicle, terms: tuple[str, ...]) -> Complex:
-    """Inertial and added-mass forces per metre of span [n, E], complex, in axes of the chord (Eqs. 9-14).
+    """Inertial and added-mass forces (N/m of span) [n, E], complex, in axes of the chord.
 
-    The wing's own mass moves with the wing, the added mass with the velocity relative to the air, ``stream`` [n, E].
-    The rate of change of the induced inflow is neglected.
+    Armanini et al. (2016), Eqs. 9-14. The wing's own mass moves with the wing, the added mass with the velocity
+    relative to the air, ``stream`` [n, E]. The rate of change of the induced inflow is neglected.
     """
     rho, chord, own = flow.rho, flow.chord, flow.turned(flow.own)
     peeled = flow.peeled[:, None] if "effective_chord" in terms else 1.0
@@ -316,7 +316,7 @@ def _inflow(
 ) -> Array:
     """Induced velocity [instants] (m/s) along body x at the wing tips, by iteration with the thrust that it reduces.
 
-    It is computed for the disc that the wings sweep. ValueError if the iteration does not converge.
+    The area of the actuator disc is that which the wings sweep. ValueError if the iteration does not converge.
     """
     p = hidden["induced_inflow"]
     swept = min(0.5 * vehicle.wings * float(np.ptp(_flap_samples(vehicle.motion.flap))), np.pi) * vehicle.span**2

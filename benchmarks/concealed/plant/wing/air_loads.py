@@ -55,7 +55,7 @@ def frame_of(rig: Rig, m: Motion, s: int) -> tuple[V3, V3, V3]:
 
 @compiled
 def _blown(rig: Rig, m: Motion, s: int, flow: V3) -> V3:
-    """Air velocity at strip ``s`` (m/s): ``flow`` plus the velocity of the jets that the strip passes through."""
+    """Air velocity (m/s) at strip ``s``: ``flow`` plus the velocity of hidden jets that the strip passes through."""
     for k in range(len(rig.jets)):
         if int(rig.jets[k, 0]) == s:
             z = 0.0
@@ -68,7 +68,7 @@ def _blown(rig: Rig, m: Motion, s: int, flow: V3) -> V3:
 
 @compiled
 def _attached(alpha: float, angle: float) -> float:
-    """Fraction of the chord with attached flow, in steady flow at an angle of attack ``alpha``; stall at ``angle``."""
+    """Fraction of the chord with attached flow in steady flow at the angle ``alpha``; stall at ``angle`` (rad)."""
     a = abs(alpha)
     if a <= angle:
         return 1.0 - 0.3 * math.exp((a - angle) / _BEFORE)
@@ -84,7 +84,7 @@ def _relax(old: float, rate: float, goal: float, z: Array, k: int) -> float:
 
 @compiled
 def _vortex(rig: Rig, alpha: float, cl: float, cd: float) -> tuple[float, float]:
-    """Lift and drag coefficient: ``cl``, ``cd`` blended with those of a leading-edge vortex at large ``alpha``."""
+    """Lift and drag coefficient: ``cl``, ``cd`` blended with those of a leading-edge vortex at large ``alpha``, rad."""
     laws, a = rig.air_laws, abs(alpha)
     x = min(max((a - laws[VORTEX_ANGLE]) / _ONSET, 0.0), 1.0)
     part, side = x * x * x * (10.0 + x * (6.0 * x - 15.0)), 1.0 if alpha >= 0.0 else -1.0
@@ -100,7 +100,7 @@ def air_loads(rig: Rig, m: Motion, old: Array, hg: float, z: Array, first: int, 
     """Add the air loads on every body to ``load`` [N + 2, 6] (force N, moment N m).
 
     The internal states of lag and stall are ``z`` from index ``first`` on. They are advanced from ``old`` by an
-    implicit Euler step of ``hg`` (s), as in ``remembered_loads``.
+    implicit Euler step of ``hg`` (s).
     """
     for s in range(len(rig.area)):
         chord, normal, u = frame_of(rig, m, s)
@@ -143,7 +143,7 @@ def air_loads(rig: Rig, m: Motion, old: Array, hg: float, z: Array, first: int, 
 
 @compiled
 def carried(rig: Rig, s: int) -> tuple[float, float]:
-    """Added mass of strip ``s`` in heave, kg, and its added moment of inertia in pitch about mid-chord, kg m^2."""
+    """Hidden added mass of strip ``s`` in heave, kg, and added moment of inertia in pitch about mid-chord, kg m^2."""
     half = 0.5 * rig.chord[s]
     mass = rig.air_laws[CARRIED] * rig.air * math.pi * half * half * rig.area[s] / rig.chord[s]
     return mass, 0.125 * half * half * mass

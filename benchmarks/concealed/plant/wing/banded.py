@@ -14,7 +14,7 @@ Array = npt.NDArray[np.float64]
 
 @compiled
 def factor(A: Array) -> None:
-    """Replace ``A`` [n, width] by its lower Cholesky factor L, with 1 / L_ii in place of the diagonal."""
+    """Replace the band matrix ``A`` [n, width] by its lower Cholesky factor L, with 1 / L_ii on the diagonal."""
     n, width = A.shape
     last = width - 1
     for i in range(n):
@@ -34,7 +34,7 @@ def factor(A: Array) -> None:
 
 @compiled
 def solve(L: Array, x: Array) -> None:
-    """Replace the right-hand side ``x`` [n] by the solution of A y = x; ``L`` is A after :func:`factor`."""
+    """Replace the right-hand side ``x`` [n] by the solution y of A y = x; ``L``: A after :func:`factor`."""
     n, width = L.shape
     last = width - 1
     for i in range(n):

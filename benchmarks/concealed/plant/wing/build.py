@@ -30,13 +30,13 @@ class Draft:
 
     Attributes:
         wing, genome, condition: what is simulated; ``division``: its bodies, as in :func:`.geometry.counts_of`.
-        lumps: additional point masses; to be added before :meth:`cut_up`, which divides the wing and sets the rest.
+        lumps: additional point masses; to be added before :meth:`cut_up`, which divides the wing.
         cut, joints: the divided wing and its C joints.
-        factor: [C] on stiffness and damping of each joint.
+        factor: [C] factor on stiffness and damping of each joint.
         hardening, play: [C], as in :class:`.rig.Rig`, like ``air_laws``, ``jets``, ``hinge`` and ``axle``.
         memory: joints with an internal state: (joint, axis, kind, stiffness, parameter), as in ``Rig.memory``.
-        points: (body, row of ``Rig.points``).
-        rods: [K, 2] Fourier series of the angles of the front and rear driving rod.
+        points: loads at one point: (body, row of ``Rig.points``).
+        rods: [K, 2] complex Fourier series of the angles of the front and rear driving rod, rad.
     """
 
     wing: Wing
@@ -70,7 +70,7 @@ class Draft:
         return np.stack([one, one * np.exp(-1j * self.condition.phase_lag * np.arange(len(one)))], axis=1)
 
     def curvature(self, joint: Joint) -> float:
-        """Ratio of span to the length that a joint represents: converts its angle to an angle over the whole span."""
+        """Ratio of span to ``joint.length``, which converts the joint's angle to an angle over the whole span."""
         return self.span / joint.length
 
     def at(self, span: float, chord: float) -> tuple[int, Array, Array]:
@@ -85,7 +85,7 @@ class Draft:
 
 
 def rig_of(draft: Draft) -> Rig:
-    """The arrays of a draft, ready for the compiled simulation."""
+    """Convert ``draft`` to the arrays of the compiled simulation."""
     cut, condition = draft.cut, draft.condition
     mass, centre, inertia = cut.bodies
     found, n = draft.joints, len(mass)

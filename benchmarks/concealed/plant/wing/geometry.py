@@ -96,7 +96,7 @@ class Cut:
         return np.asarray(self.start[strip] + along, np.int64)
 
     def _stretches(self, strip: int) -> tuple[Array, Array]:
-        """Gauss points y and weights (m) over the width of a strip, for each interval between stations in turn."""
+        """Gauss points y and weights (m) over the width of ``strip``, for each interval between stations in turn."""
         inner, outer = self.edges[strip], self.edges[strip + 1]
         cuts = np.unique(np.concatenate([[inner, outer], self._y[(self._y > inner) & (self._y < outer)]]))
         nodes, weights = np.polynomial.legendre.leggauss(_GAUSS)
@@ -105,12 +105,12 @@ class Cut:
 
     @cached_property
     def area(self) -> Array:
-        """[N] planform area, m^2."""
+        """[N] planform area of each body, m^2."""
         return np.array([self._plan(n)[0].sum() for n in range(len(self.strip))])
 
     @cached_property
     def centroid(self) -> Array:
-        """[N, 2] centroid of the planform, wing frame, m."""
+        """[N, 2] centroid of each body's planform, wing frame, m."""
         return np.array([w @ np.stack([x, y], axis=1) / w.sum() for w, x, y, _ in map(self._plan, range(len(self.s0)))])
 
     def _plan(self, n: int) -> tuple[Array, Array, Array, Array]:
@@ -146,7 +146,7 @@ class Cut:
 
     @cached_property
     def bodies(self) -> tuple[Array, Array, Array]:
-        """Mass [N] kg, centre of mass [N, 3] m, inertia about it [N, 3, 3] kg m^2, in the wing frame."""
+        """Mass [N] kg, centre of mass [N, 3] m and inertia about it [N, 3, 3] kg m^2 of each body, wing frame."""
         found = [self._body(n) for n in range(len(self.strip))]
         return np.array([f[0] for f in found]), np.array([f[1] for f in found]), np.array([f[2] for f in found])
 

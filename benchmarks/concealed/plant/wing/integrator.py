@@ -1,4 +1,4 @@
-"""Integrates one beat with a singly diagonally implicit Runge-Kutta method of fourth order.
+"""Integrates one beat of a wing with a singly diagonally implicit Runge-Kutta method of fourth order.
 
 ARK4(3)6L[2]SA, implicit part (Kennedy and Carpenter, Applied Numerical Mathematics 44, 139 (2003)): an explicit stage
 and five implicit ones, stage order 2, L-stable, stiffly accurate. Rotations are Cayley vectors relative to the start of
@@ -138,7 +138,7 @@ def _place(rig: Rig, hg: float, work: _Work) -> None:
 
 @compiled
 def _residual(rig: Rig, hg: float, work: _Work) -> None:
-    """Set ``work.step`` to the residual of Newton's and Euler's equations: hg times (load - rate of momentum)."""
+    """Set ``work.step`` [6 N] to hg times (load - rate of momentum), the residual of the equations of motion."""
     for n in range(len(rig.mass)):
         m, w = work.m, row(work.m.w, n)
         L, dL = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
@@ -155,7 +155,7 @@ def _residual(rig: Rig, hg: float, work: _Work) -> None:
 
 @compiled
 def _stage(rig: Rig, hg: float, tolerance: float, work: _Work, z: Array) -> int:
-    """Solve a stage for its velocities, starting from those in ``work.m``.
+    """Solve a stage of length ``hg`` (s) for its velocities, starting from those in ``work.m``; also sets ``z``.
 
     Returns the number of Newton iterations, or -1 without convergence to ``tolerance`` (m).
     """
@@ -199,7 +199,7 @@ def _base(rig: Rig, h: float, stage: int, start: State, work: _Work) -> None:
 
 @compiled
 def _rates(rig: Rig, hg: float, stage: int, work: _Work, z: Array) -> None:
-    """Set ``work.k[stage]`` to the time derivatives of a solved stage."""
+    """Set ``work.k[stage]`` to the time derivatives of all states in a solved stage of length ``hg`` (s)."""
     n, k, m = len(rig.mass), work.k[stage], work.m
     for b in range(n):
         for i in range(3):
@@ -228,7 +228,7 @@ def _new_work(rig: Rig, states: int) -> _Work:
 
 @compiled
 def _begin(rig: Rig, rods: Array, start: State, tolerance: float, work: _Work) -> bool:
-    """Set the rates at the start of a beat, from a very short implicit stage; returns whether it converged."""
+    """Set the rates at the start of a beat by a very short implicit stage; return whether that stage converged."""
     n, z, m = len(rig.mass), start.z.copy(), work.m
     m.R[:n], m.p[:n], m.v[:n], m.w[:n] = start.R, start.p, start.v, start.w
     work.R0[:], work.g[:] = start.R, 0.0
@@ -253,7 +253,7 @@ def _guess(work: _Work, hg: float, stage: int) -> None:
 
 @compiled
 def _renew(rig: Rig, hg: float, work: _Work) -> None:
-    """Compute and factor the Newton matrix again, at the present velocities."""
+    """Compute and factor the Newton matrix ``work.band`` again, at the velocities in ``work.m``."""
     _place(rig, hg, work)
     assemble(rig, work.m, hg, work.band)
     factor(work.band)

@@ -1,4 +1,4 @@
-"""Loads of joints: springs and dampers (thesis Eqs. 4-7), and the effects that can be hidden in them.
+"""Loads of joints: springs and dampers (van der Grinten's thesis, Eqs. 4-7), and the effects hidden in them.
 
 A joint connects frame a of its first body to frame b of its second. With their axes a_k, b_k and the vector s between
 their origins, in world axes, the spring's energy is sum_k g_k (1 - a_k . b_k) + (s . A s + s . B s) / 4, where
@@ -61,9 +61,9 @@ def angle_between(m: Motion, i: int, j: int, k: int) -> float:
 
 @compiled
 def _bend(rig: Rig, m: Motion, c: int, load: Array) -> None:
-    """Add the nonlinear part of the bending moment of joint ``c``, beyond k phi: hardening, or play at the root.
+    """Add the bending moment of joint ``c`` (N m) in excess of k phi to ``load``: hardening, or play at the root.
 
-    Hardening: k phi sinh(x) / x, where x is hardening times curvature times the angle phi.
+    Hardening: k phi sinh(x) / x, where x is hardening times curvature times the angle phi, and k the stiffness.
     """
     i, j, k = rig.first[c], rig.second[c], rig.bends[c]
     phi = angle_between(m, i, j, k)
@@ -80,7 +80,7 @@ def _bend(rig: Rig, m: Motion, c: int, load: Array) -> None:
 
 @compiled
 def dead_zone(phi: float, half: float) -> float:
-    """The part of the angle ``phi`` outside -half to half (rad), with soft edges: log(1 + exp) instead of max(., 0)."""
+    """Excess of ``phi`` beyond -half to half (rad), 0 between, with soft edges: log(1 + exp) in place of max(., 0)."""
     soft = _SOFT * half
     up, down = (phi - half) / soft, (-phi - half) / soft
     above = up if up > 30.0 else math.log1p(math.exp(up))

@@ -26,10 +26,10 @@ _SERIES = 15  # terms of the torsion constant
 class Joint:
     """Joint of body ``first`` (-1: front driving rod, -2: rear one) and body ``second`` at ``point`` (wing frame, m).
 
-    ``stiffness`` and ``damping`` [6] about x, y, z (N m/rad) and along x, y, z (N/m). ``of_rods``: the rods' part of
-    the bending stiffness, N m/rad. ``along_span``: whether the bodies are neighbours along the span or along the chord.
-    ``from_y``, ``to_y``: the stretch of wing that the joint represents, m; ``length``: distance of the bodies'
-    centroids, m.
+    ``stiffness``, ``damping`` [6]: about x, y, z (N m/rad, N m s/rad), then along x, y, z (N/m, N s/m). ``of_rods``:
+    the rods' part of the bending stiffness, N m/rad. ``along_span``: whether the bodies are neighbours along the span,
+    not the chord. ``from_y``, ``to_y``: the stretch of wing that the joint represents, m; ``length``: distance of the
+    bodies' centroids, or from the root to the first centroid, m.
     """
 
     first: int
@@ -63,10 +63,10 @@ class _Maker:
         self, pair: tuple[int, int], point: tuple[float, float], section: Array, along_span: bool,
         length: float, over: tuple[float, float], rods: list[Rod],
     ) -> Joint:  # fmt: skip
-        """The joint of the bodies ``pair`` at ``point`` (x, y), m.
+        """Make the joint of the bodies ``pair`` at ``point`` (x, y), m.
 
         ``section`` [6]: foam's second moments (m^4) about x, y, z and areas (m^2) along x, y, z; ``length``: between
-        the bodies, m; ``over``: span positions (m) between which it represents the wing; ``rods`` that stiffen it.
+        the bodies, m; ``over``: span positions (m) between which it represents the wing; ``rods`` stiffen it.
         """
         foam = section[:, None] * (self.spanwise if along_span else self.chordwise)
         plain = foam[:, 0] / length
@@ -103,7 +103,7 @@ class _Maker:
         return found
 
     def _border(self, strip: int) -> list[Joint]:
-        """Joints between the bodies of a strip and those of the next strip outboard."""
+        """Joints between the bodies of ``strip`` and those of the next strip outboard."""
         cut = self.cut
         a, b = cut.start[strip], cut.start[strip + 1]
         inner, outer = cut.counts[strip], cut.counts[strip + 1]
@@ -194,7 +194,7 @@ def _x_of(rod: Rod, y: float) -> float:
 
 
 def joints(cut: Cut, genome: Mapping[str, float]) -> list[Joint]:
-    """All joints of a divided wing.
+    """All joints of the divided wing ``cut``.
 
     ``genome``: moduli of foam and rods E_f, E_r, G_f, G_r (Pa) and damping of the foam D_E, D_G (Pa s).
     """

@@ -15,10 +15,11 @@ HARMONICS = 40
 
 
 def rocker(link: FourBarDrive, psi: Array) -> Array:
-    """Angle (rad, -pi to pi) of a four-bar linkage's rocker at crank angles ``psi`` [n], continuous over a turn.
+    """Angle [n] (rad) of a four-bar linkage's rocker at crank angles ``psi`` [n] (rad), continuous over a turn.
 
     Freudenstein's equation (1955): a cos(theta) + b sin(theta) = k, solved by the tangent of theta / 2. Of the two
-    assemblies it is the one whose rocker lies clockwise of the line from its pivot to the crank pin.
+    assemblies it is the one whose rocker lies clockwise of the line from its pivot to the crank pin. ValueError without
+    a full turn.
     """
     a, b = link.crank * np.cos(psi) - link.ground, link.crank * np.sin(psi)
     k = (link.rocker**2 - link.coupler**2 + a**2 + b**2) / (2 * link.rocker)
@@ -33,7 +34,7 @@ def rocker(link: FourBarDrive, psi: Array) -> Array:
 
 
 def series_of(drive: Drive) -> Complex:
-    """Complex Fourier series [HARMONICS + 1] of the rod's angle (rad) over the drive phase psi.
+    """Complex Fourier series [HARMONICS + 1] of the driving rod's angle (rad) over the drive phase psi.
 
     angle = Re sum_k series_k exp(i k psi).
     """
@@ -50,7 +51,7 @@ def series_of(drive: Drive) -> Complex:
 
 
 def angles(series: Complex, psi: Array) -> Array:
-    """[..., 2]: angle (rad) and its derivative by the drive phase, at phases ``psi`` [...] (rad)."""
+    """[..., 2]: angle (rad) of Fourier ``series`` and its derivative by the drive phase, at ``psi`` [...] (rad)."""
     k = np.arange(len(series))
     turn = np.exp(1j * psi[..., None] * k)
     return np.stack([(turn @ series).real, (turn @ (1j * k * series)).real], axis=-1)

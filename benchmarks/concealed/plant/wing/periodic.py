@@ -25,7 +25,7 @@ _WORSE = 5.0  # ratio to the smallest change so far above which an extrapolation
 
 @dataclass(frozen=True)
 class Accuracy:
-    """Settings of the search: ``rough`` integration steps a beat at first, ``steps`` in the end.
+    """Settings of the search for a periodic motion: ``rough`` integration steps a beat at first, ``steps`` at the end.
 
     A motion counts as periodic if it repeats to within ``periodic`` m; ``beats`` limits each of the two searches. With
     the default values the time discretisation error is below 0.02 mm for van der Grinten's wings at up to 4 Hz.

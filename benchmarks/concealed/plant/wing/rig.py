@@ -1,4 +1,4 @@
-"""Everything about one wing under one condition that the compiled equations need, as plain arrays."""
+"""Plain arrays with all that the compiled equations of motion need about one wing under one condition."""
 
 from __future__ import annotations
 
@@ -25,7 +25,9 @@ BAND, STOP, BRAKE, APPENDAGE = range(4)
 
 
 class Rig(NamedTuple):
-    """One wing under one condition, SI units. N bodies; frames N and N + 1 are the front and the rear driving rod.
+    """One wing under one condition, SI units: N bodies, S strips, C joints.
+
+    Frames N and N + 1 are the front and the rear driving rod.
 
     Attributes:
         mass: [N] kg; ``inertia`` [N, 3, 3] kg m^2 about the centre of mass, in the body's frame.
@@ -41,7 +43,7 @@ class Rig(NamedTuple):
         memory_of: [E] joint of each spring with an internal state; ``memory_axis`` [E] its axis; ``memory`` [E, 3]
             kind, stiffness (N m/rad), and relaxation time (s) or yield angle (rad).
         strip: [S + 1] first body of each strip; ``weight`` [N] body's part of the strip's area; ``centroid`` [N, 2] of
-            the body's area, from its centre of mass, m.
+            the body's area from its centre of mass, m.
         area, chord: [S] of the strips, m^2 and m.
         coefficients: [4] genes L_a, L_b, ID_a, ID_b of lift and drag (van der Grinten's thesis, Eqs. 10-11); ``lift``,
             ``drag`` [N, 2]: as returned by :func:`.joints.shares`.
@@ -96,8 +98,8 @@ class Rig(NamedTuple):
 class Motion(NamedTuple):
     """Motion of the frames of N bodies and 2 rods at one instant, in the world frame.
 
-    Rotation ``R`` [N + 2, 3, 3]; centre ``p``, velocity ``v``, angular velocity ``w``, and the accelerations ``dv`` and
-    ``dw``, [N + 2, 3] each.
+    Rotation ``R`` [N + 2, 3, 3]; centre ``p``, velocity ``v``, angular velocity ``w``, and their time derivatives
+    ``dv`` and ``dw``, [N + 2, 3] each (m, rad, s).
     """
 
     R: Array

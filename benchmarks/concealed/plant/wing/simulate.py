@@ -24,7 +24,7 @@ SAMPLES = 192  # least number of instants in a beat
 
 @dataclass(frozen=True, eq=False)
 class Beat:
-    """One beat of the periodic motion.
+    """One simulated beat of a wing's periodic motion.
 
     Attributes:
         wing: the wing that was simulated.
@@ -67,7 +67,7 @@ class Beat:
         return float(2 * np.pi * (k - height[k] / slope[k]) / len(height))
 
     def phase(self, psi: float) -> float:
-        """Drive phase (rad) as a phase from the start of the dataset's beat, in beats from 0 to 1."""
+        """Convert drive phase ``psi`` (rad) to beats, 0 to 1, from the start of a beat as a dataset defines it."""
         return float((psi - self.crossing) / (2 * np.pi) % 1.0)
 
 
@@ -101,7 +101,7 @@ def simulate(
 
 
 def _middle(draft: Draft, effect: Effect, R: Array, p: Array) -> float:
-    """Drive phase (rad) at which an effect acts: the middle of the interval in which it exceeds half its maximum."""
+    """Drive phase (rad) at which an effect acts: circular mean weighted by magnitudes above half the maximum."""
     if effect.kind.acting is None:
         raise ValueError(f"{effect.name} has no phase that the motion determines")
     body, arm, _ = draft.at(effect.values["span"], effect.values.get("chord", 0.5))
@@ -113,7 +113,7 @@ def _middle(draft: Draft, effect: Effect, R: Array, p: Array) -> float:
 
 
 def at_rest(rig: Rig) -> State:
-    """Initial state: the undeformed wing at rest, with all internal states zero."""
+    """Initial state of ``rig``: the undeformed wing at rest, with all internal states zero."""
     n = len(rig.mass)
     return State(
         np.tile(np.eye(3), (n, 1, 1)), rig.rest.copy(), np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(states_of(rig))

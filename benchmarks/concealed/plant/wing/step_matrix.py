@@ -94,7 +94,7 @@ def _stiffness(rig: Rig, m: Motion, c: int, k: int) -> float:
 
 @compiled
 def _couple(rig: Rig, c: int, a: V3, size: float, band: Array) -> None:
-    """Add a rotational spring or damper of size ``size`` about the axis ``a`` between the bodies of joint ``c``."""
+    """Add ``size``, of a rotational spring or damper about ``a`` between the bodies of joint ``c``, to ``band``."""
     i, j = rig.first[c], rig.second[c]
     x, y = np.zeros(6), np.zeros(6)
     _fill(x, ZERO, a)
@@ -133,7 +133,7 @@ def _product(n: int, x: Array, k: int, y: Array, size: float, band: Array) -> No
 
 @compiled
 def _air(rig: Rig, m: Motion, hg: float, band: Array) -> None:
-    """Add the aerodynamic damping along the normal, and the added mass, of each strip as a whole."""
+    """Add the aerodynamic damping along the normal, and the added mass, of each strip as a whole to ``band``."""
     x, y = np.zeros(6), np.zeros(6)
     for s in range(len(rig.area)):
         chord, normal, u = frame_of(rig, m, s)
@@ -161,7 +161,7 @@ def _air(rig: Rig, m: Motion, hg: float, band: Array) -> None:
 
 @compiled
 def _point(rig: Rig, m: Motion, k: int, hg: float, band: Array) -> None:
-    """Add stiffness and damping of the point load ``k`` (row of Rig.points), taken as equal in all directions."""
+    """Add stiffness or damping of the point load ``k`` (row of Rig.points) to ``band``, equal in all directions."""
     q, n = rig.points[k], rig.point_body[k]
     arm = turned(m.R, n, (q[1], q[2], q[3]))
     v = plus(row(m.v, n), 1.0, cross(row(m.w, n), arm))

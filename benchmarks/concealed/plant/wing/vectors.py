@@ -1,4 +1,4 @@
-"""Vectors in space as tuples of three floats, for compiled code."""
+"""Operations on vectors in space, given as tuples of three floats, for compiled code."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Hidden aerodynamic effects that the diagnosis can name, simulated by other equations than its own.
+"""Hidden aerodynamic effects that the diagnosis can name, but simulates by other equations.
 
 The equations are in ``wing/air_loads.py``. "The library" is the set of effects that the diagnosis can name.
 """

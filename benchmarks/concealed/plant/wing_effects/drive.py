@@ -1,4 +1,4 @@
-"""Hidden errors of the drive that the diagnosis can name, simulated by other equations than its own.
+"""Hidden errors of the drive that the diagnosis can name, but simulates by other equations.
 
 "The library" is the set of effects that the diagnosis can name. Fourier series of the rods' angles are complex [K], as
 in ``wing/linkage.py``.
@@ -27,7 +27,7 @@ def _linkage(wing: Wing) -> FourBarDrive:
 
 
 def _further(wing: Wing, strength: float) -> Complex:
-    """Change [K] of the rod's Fourier series for a crank longer by the fraction ``strength``; same mean."""
+    """Change [K] (rad) of the rods' Fourier series for a crank longer by the fraction ``strength``; same mean."""
     link = _linkage(wing)
     change = series_of(replace(link, crank=link.crank * (1 + strength))) - series_of(link)
     change[0] = 0.0
@@ -35,7 +35,7 @@ def _further(wing: Wing, strength: float) -> Complex:
 
 
 def _otherwise(wing: Wing, strength: float) -> Complex:
-    """Change [K] of the rod's Fourier series for a ground link longer by the fraction ``strength``.
+    """Change [K] (rad) of the rods' Fourier series for a ground link longer by the fraction ``strength``.
 
     Mean and first harmonic stay the same.
     """
@@ -48,7 +48,7 @@ def _otherwise(wing: Wing, strength: float) -> Complex:
 
 
 def _add(draft: Draft, change: Complex) -> None:
-    """Add ``change`` [K] to the Fourier series of both rods, for the rear rod with the rod's phase lag."""
+    """Add ``change`` [K] (rad) to the Fourier series of both rods, delayed by the phase lag for the rear one."""
     late = np.exp(-1j * draft.condition.phase_lag * np.arange(len(change)))
     draft.rods += np.stack([change, change * late], axis=1)
 

@@ -73,7 +73,7 @@ class Hidden:
 
     @classmethod
     def one(cls, name: str, strength: float, **at: float) -> Hidden:
-        """A single effect ``name`` with its strength and those parameters ``at`` that are not typical."""
+        """The single effect ``name`` with its ``strength`` and those parameters ``at`` that are not typical."""
         return cls((Effect(name, strength, at),))
 
     def put_into(self, draft: Draft) -> None:
@@ -89,7 +89,7 @@ class Hidden:
                 effect.kind.put(draft, effect.strength, effect.values)
 
     def truths(self, wing: Wing, turns: Mapping[str, float]) -> tuple[Truth, ...]:
-        """What a diagnosis should report about each effect.
+        """What a correct diagnosis should report about each effect hidden in ``wing``.
 
         ``turns``: drive phase (rad) at which an effect acts, by its name, for those whose phase follows from the
         motion.
@@ -113,6 +113,6 @@ def _truth(effect: Effect, wing: Wing, turn: float | None) -> Truth:
 
 
 def drawn(name: str, strength: float, rng: np.random.Generator) -> Effect:
-    """An effect with its other parameters drawn uniformly from their ranges."""
+    """The effect ``name`` of ``strength``, with its other parameters drawn uniformly from their ranges."""
     shape = Effect(name, strength).kind.shape
     return Effect(name, strength, {key: float(rng.uniform(low, high)) for key, (_, low, high) in shape.items()})

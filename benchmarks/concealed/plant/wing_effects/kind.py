@@ -24,8 +24,8 @@ class Kind:
     Attributes:
         name: as in the library if ``listed``, else a name used only here.
         family: structure, inertia, actuation or aerodynamics.
-        listed: whether the library has it.
-        unit: of its strength; ``typical``: a strength that is easily detected with a noise of 0.5 mm.
+        listed: whether the library has the effect.
+        unit: unit of the strength; ``typical``: a strength that is easily detected with a noise of 0.5 mm.
         largest: strength above which it is not physical, or above which a periodic motion may not exist.
         shape: other parameters by name, as (typical value, lower bound, upper bound).
         source: literature, and how the law differs from the library's.

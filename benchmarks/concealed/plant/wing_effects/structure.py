@@ -1,4 +1,4 @@
-"""Hidden effects of structure and inertia that the diagnosis can name, simulated by other equations than its own.
+"""Hidden effects of structure and inertia that the diagnosis can name, but simulates by other equations.
 
 "The library" is the set of effects that the diagnosis can name.
 """
@@ -38,7 +38,7 @@ def _lump_genes(_: Wing, strength: float, at: Values) -> dict[str, float]:
 
 
 def _damage(draft: Draft, strength: float, at: Values) -> None:
-    """Reduce the stiffness by the fraction ``strength``, uniformly over an interval of the span with sharp ends."""
+    """Reduce stiffness and damping by the fraction ``strength``, uniformly over an interval of the span."""
     root = float(draft.cut.edges[0])
     lower, upper = (root + draft.span * (at["span"] + side * 0.5 * at["width"]) for side in (-1, 1))
     for c, joint in enumerate(draft.joints):
@@ -54,7 +54,7 @@ def _damage_genes(_: Wing, __: float, at: Values) -> dict[str, float]:
 
 
 def _hardening(draft: Draft, strength: float, _: Values) -> None:
-    """Make bending springs harden: moment k phi sinh(x) / x at the angle phi, x = h times curvature.
+    """Make bending springs, except at the root, harden: moment k phi sinh(x) / x at the angle phi, x = h curvature.
 
     Curvature is the angle over the whole span; h is such that sinh(x) / x is 1 + ``strength`` at one radian.
     """
@@ -65,7 +65,7 @@ def _hardening(draft: Draft, strength: float, _: Values) -> None:
 
 
 def _relaxing(draft: Draft, strength: float, at: Values) -> None:
-    """Add two Maxwell branches in parallel to each spring of bending and torsion."""
+    """Add two Maxwell branches in parallel to each spring of bending and torsion (at the root: torsion only)."""
     for c, joint in enumerate(draft.joints):
         for k in (0, 1):
             if joint.first >= 0 or k == 1:
@@ -75,7 +75,7 @@ def _relaxing(draft: Draft, strength: float, at: Values) -> None:
 
 
 def _yielding(draft: Draft, strength: float, at: Values) -> None:
-    """Add to each bending and torsion spring three parallel Dahl elements with different yield angles (Iwan 1966)."""
+    """Add three parallel Dahl elements (Iwan 1966) to each spring of bending and torsion (root: torsion only)."""
     for c, joint in enumerate(draft.joints):
         for k in (0, 1):
             if joint.first >= 0 or k == 1:
@@ -85,7 +85,7 @@ def _yielding(draft: Draft, strength: float, at: Values) -> None:
 
 
 def _slipping(draft: Draft, strength: float, at: Values) -> None:
-    """Add a spring in series with a dry-friction slider in parallel to each joint with rods.
+    """Add a spring in series with a dry-friction slider in parallel to each joint with rods, except at the root.
 
     The slider slips when the spring's angle, expressed over the whole span, reaches ``strength`` (rad).
     """

@@ -1,4 +1,4 @@
-"""Hidden effects that the diagnosis has not got in its library: it can detect but not name them."""
+"""Hidden effects that are not in the library of the diagnosis, which can detect but not name them."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ def _point(draft: Draft, kind: int, at: Values, *law: float) -> None:
 
 
 def _height(draft: Draft, at: Values) -> float:
-    """Height (m) of the span position ``at['span']`` on an undeformed wing.
+    """Height (m, wing frame) of the span position ``at['span']`` on an undeformed wing.
 
-    At the fraction ``at['stroke']`` of the range of the front rod's angle.
+    The front rod's angle is at the fraction ``at['stroke']`` of its range.
     """
     angle = angles(draft.rods[:, 0], 2 * np.pi * np.arange(256) / 256)[:, 0]
     there = angle.min() + at["stroke"] * (angle.max() - angle.min())
@@ -80,7 +80,7 @@ def _tooth(draft: Draft, strength: float, at: Values) -> None:
 
 
 def _cells(draft: Draft, strength: float, _: Values) -> None:
-    """Stiffen the wing in proportion to the ambient pressure (closed-cell foam), by ``strength`` at sea level."""
+    """Multiply stiffness and damping by 1 + ``strength`` x ambient pressure / that at sea level (closed-cell foam)."""
     draft.factor *= 1 + strength * draft.condition.pressure / _SEA_LEVEL
 
 
