@@ -75,7 +75,7 @@ class Subject(NamedTuple):
     scene: Callable[[Array], WingScene]
 
 
-class _Group:
+class Group:
     """Up to LANES individuals simulated together under a condition, all starting from rest or all from given states."""
 
     def __init__(self, subject: Subject, courses: list[Course], steps: int, with_motion: bool = False) -> None:
@@ -119,7 +119,7 @@ class _Group:
             if course.secants is None:
                 course.secants = Secants(before, self.angular_rate, numerics.window, self.sizes)
             course.state, course.distance = course.secants.add(before, after)
-            _put(self.state, lane, course.state)
+            put(self.state, lane, course.state)
             if course.distance <= numerics.settled:
                 course.growth = course.secants.growth
                 course.trace = Trace(*(array[..., lane].copy() for array in self.trace))
@@ -147,7 +147,7 @@ def settle(subject: Subject, courses: list[Course], numerics: Numerics, steps: i
     Results are stored in ``courses``; ``with_motion``: whether the motion of all bodies is stored too. Either all
     courses or none of them start from rest.
     """
-    group = _Group(subject, courses, steps, with_motion)
+    group = Group(subject, courses, steps, with_motion)
     first = 0 if courses[0].state is None else numerics.ramp_beats
     tables = {beat: group.table(numerics, steps, beat) for beat in range(first, numerics.ramp_beats + 1)}
     for course in courses:
@@ -175,7 +175,7 @@ def measure_growth(subject: Subject, courses: list[Course], steps: int) -> None:
     The growth of each course is set; infinite if the motion diverges. The estimate from the secants is less reliable,
     because it includes beats on which the motion was far from periodic.
     """
-    group, numerics = _Group(subject, courses, steps), Numerics(steps=steps)
+    group, numerics = Group(subject, courses, steps), Numerics(steps=steps)
     table = group.table(numerics, steps, numerics.ramp_beats)
     monitors = [Secants(_lane(group.state, k), group.angular_rate, 0, group.sizes) for k in range(len(courses))]
     distances = np.zeros((GROWTH_BEATS, len(courses)))
@@ -190,7 +190,7 @@ def _recover(course: Course, lane: int, state: State) -> bool:
     """Revert the extrapolation that made individual ``lane`` of ``state`` diverge; return False if there was none."""
     if course.secants is None or not course.secants.extrapolated:
         return False
-    _put(state, lane, course.secants.step_back())
+    put(state, lane, course.secants.step_back())
     return True
 
 
@@ -198,7 +198,7 @@ def _lane(state: State, lane: int) -> State:
     return State(*(array[..., lane].copy() for array in state))
 
 
-def _put(into: State, lane: int, state: State) -> None:
+def put(into: State, lane: int, state: State) -> None:
     for array, value in zip(into, state, strict=True):
         array[..., lane] = value
 
