@@ -28,7 +28,7 @@ class Secret:
         parameters: everything the plant needs to simulate the effect again.
         span, chord: place on the wing, as fractions; None for an effect without a place.
         phase: in beats from the start of the beat as a dataset defines it; None for an effect without a phase.
-        values: true values, by name, of the genes (parameters) of the library's effect that have the same meaning in
+        values: true values, by name, of the genes of the library's effect that have the same meaning in
             the plant.
     """
 

@@ -29,8 +29,8 @@ class Law:
         both_signs: whether the strength may be negative.
         shape: (low, high) of the uniform distribution of each parameter other than the strength. "span" and "chord"
             (fractions) and "phase" (beats) say where and when the effect acts.
-        values: function from the parameters to the true values, by name, of those genes (parameters) of the library's
-            effect that have the same meaning.
+        values: function from the parameters to the true values, by name, of those genes of the library's effect
+            that have the same meaning as one of the parameters.
     """
 
     name: str

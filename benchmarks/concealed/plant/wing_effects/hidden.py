@@ -50,8 +50,8 @@ class Truth:
         parameters: all of its parameters.
         span, chord: place on the wing, as fractions; None for an effect without a place.
         turn: drive phase (rad) near which it acts; None if it always acts.
-        genes: true values, by name, of those genes (parameters) of the diagnosis's own effect that have the same
-            meaning.
+        genes: true values, by name, of those genes of the library's effect of the same kind that have the same
+            meaning as a parameter of this one.
     """
 
     name: str
