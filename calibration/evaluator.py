@@ -43,11 +43,15 @@ class Unit:
 
 
 def units(problem: Problem, individuals: int) -> list[Unit]:
-    """Split a batch of so many ``individuals`` into units of one recording and at most LANES individuals each."""
+    """Split a batch of so many ``individuals`` into units of one recording and at most LANES individuals each.
+
+    The individuals of a model that is differentiated (``DifferentiableModel.tangent``) stay together.
+    """
+    size = individuals if getattr(problem.model, "differentiates", False) else LANES
     return [
-        Unit(start, min(start + LANES, individuals), recording)
+        Unit(start, min(start + size, individuals), recording)
         for recording in range(len(problem.recordings))
-        for start in range(0, individuals, LANES)
+        for start in range(0, individuals, size)
     ]
 
 

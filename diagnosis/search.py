@@ -216,9 +216,9 @@ def _follow(finer: FitContext, refit: Refit, best: Refit) -> Refit | None:
 def _try_suspects(state: SearchState, suspects: Sequence[Suspect], at_least: Refit | None = None) -> Steps:
     """Score-test ``suspects`` at the nominal fit, then refit the strongest; yields the fraction done and the stage.
 
-    ``at_least``: the nominal model with a finer discretisation. If no suspect is predicted to fit better, there are no
-    refits; if none does fit better, there are few: an effect and a discretisation error may absorb each other's
-    residual.
+    ``at_least``: the nominal model with a finer discretisation, where it was fitted. A suspect must fit better than it,
+    since an effect can imitate an error of the discretisation: without a suspect that is predicted to, nothing is
+    refitted, and without a refit that does, combinations are not tried.
     """
     nominal = state.fitted_nominal.refit
     tests = score_tests(state.context, nominal.fit, suspects)

@@ -21,6 +21,8 @@ Simulate = Callable[[Array], tuple[Outputs, Sequence[str | None]]]
 # estimate). Simulated motions have errors of some hundredths of a millimetre, different at each point: much smaller
 # steps would measure these errors, larger steps the curvature (docs/estimation.md has the figures).
 STEP = 0.003
+# Change of a gene where a model differentiates the motion that it computes: the error is of this size, relative.
+TANGENT_STEP = 1e-6
 
 
 @dataclass(frozen=True)
@@ -76,6 +78,52 @@ def differences(
     width = (up - down)[np.arange(len(columns)), columns]
     slopes = [_slopes(base, part, failed, width) for base, part in zip(at, found, strict=True)]
     return Differences(tuple(at), tuple(slopes), width != 0.0, len(batch), tuple(r for r in reasons if r))
+
+
+def derivatives(
+    simulate: Simulate,
+    tangent: Simulate | None,
+    unit: Float[Array, " F"],
+    columns: Int[Index, " K"],
+    *,
+    at: Outputs | None = None,
+    sides: int = 2,
+) -> Differences:
+    """Differentiate outputs as :func:`differences` does, by exact derivatives of the simulated motion where it has any.
+
+    ``tangent`` simulates neighbours of ``unit``, the first of every batch, exactly to first order in their distance,
+    and fails where there is no derivative; None for a model without derivatives. ``at`` is used by ``simulate`` only.
+    """
+    if tangent is None:
+        return differences(simulate, unit, columns, at=at, sides=sides)
+    try:
+        found = differences(tangent, unit, columns, step=TANGENT_STEP, sides=1)
+    except ValueError:  # no periodic motion that can be differentiated
+        return differences(simulate, unit, columns, at=at, sides=sides)
+    return with_more(found, simulate, unit, columns, at=at, sides=sides)
+
+
+def with_more(
+    found: Differences,
+    simulate: Simulate,
+    unit: Float[Array, " F"],
+    columns: Int[Index, " K"],
+    *,
+    at: Outputs | None = None,
+    step: float = STEP,
+    sides: int = 2,
+) -> Differences:
+    """Return ``found`` with differences of another ``step`` for those of its ``columns`` that it does not know."""
+    failed = np.flatnonzero(~found.known)
+    if not len(failed):
+        return found
+    again = differences(simulate, unit, columns[failed], at=found.outputs if at is None else at, step=step, sides=sides)
+    known, slopes = found.known.copy(), [one.copy() for one in found.slopes]
+    known[failed] = again.known
+    for one, new in zip(slopes, again.slopes, strict=True):
+        one[..., failed] = new
+    evaluations, reasons = found.evaluations + again.evaluations, (*found.reasons, *again.reasons)
+    return Differences(found.outputs, tuple(slopes), known, evaluations, reasons)
 
 
 def _slopes(base: Array, neighbours: Array, failed: Mask, width: Array) -> Array:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -57,6 +57,24 @@ class Model(Protocol):
         """Simulate ``genomes`` [B, G] under the recording's condition, at the recording's samples and channels.
 
         Tracks are also aligned in phase with the recording; forces are filtered as the recording was.
+        """
+        ...
+
+
+@runtime_checkable
+class DifferentiableModel(Model, Protocol):
+    """A model that starts simulations from a known motion, and differentiates the motion that it computes."""
+
+    def beside(self, genome: ArrayLike) -> Model:
+        """Return the same model, whose simulations start from the motion of ``genome`` [G] without effects."""
+        ...
+
+    def tangent(self, genome: ArrayLike) -> Model:
+        """Return the same model for individuals that are very close to the first of their batch.
+
+        They differ from the first by the derivative of its computed motion times their distance, however small this is.
+        An individual fails, with a reason, where the motion has no derivative in its direction. A batch must not be
+        split. ``genome`` [G]: from its motion that of the first is found.
         """
         ...
 

@@ -17,6 +17,7 @@ import numpy as np
 from wingfit.calibration.effects import is_size
 from wingfit.calibration.estimates.linearised import (
     Linearised,
+    beside_problem,
     free_genes,
     linearise,
     residuals_of,
@@ -191,6 +192,7 @@ def at_bounds(genes: list[Gene], values: Mapping[str, float]) -> tuple[str, ...]
 
 def _iteration(problem: Problem, evaluator: Evaluator, genes: list[Gene], state: _State) -> tuple[Step, _State]:
     unit = np.array(state.unit)
+    problem = beside_problem(problem, values_at(genes, unit[None])[0])
     linear = linearise(problem, evaluator, unit)
     noise = [Noise.of(record, v) for record, v in zip(problem.recordings, linear.residuals, strict=True)]
     quadratic, power = _quadratic(noise, linear)

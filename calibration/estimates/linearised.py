@@ -1,4 +1,6 @@
-"""Linearises a problem about a genome by finite differences; all displaced genomes are simulated in one batch.
+"""Linearises a problem about a genome: by the derivatives of the computed motion, else by finite differences.
+
+Either way all displaced genomes are simulated in one batch.
 
 The variables are the genes in unit coordinates (:meth:`wingfit.records.Gene.to_unit`): scaled so that their bounds are
 0 and 1, logarithmically for a log-scaled gene.
@@ -6,15 +8,16 @@ The variables are the genes in unit coordinates (:meth:`wingfit.records.Gene.to_
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.problem import Evaluation, Problem
-from wingfit.inference.differences import STEP, Outputs, differences
+from wingfit.inference.differences import STEP, Outputs, Simulate, derivatives, with_more
 from wingfit.records import Gene
 from wingfit.records.array_types import Array, Mask
+from wingfit.sim.model import DifferentiableModel
 
 AT_BOUND = 1e-6  # in unit coordinates
 SHORTER = 0.125  # of the step, where both neighbours fail
@@ -73,27 +76,44 @@ def residuals_of(evaluation: Evaluation) -> list[Array]:
     return [part for part in parts if part is not None]
 
 
-def linearise(problem: Problem, evaluator: Evaluator, unit: Array) -> Linearised:
-    """Linearise by central differences about ``unit`` [F], genes scaled to 0..1.
+def beside_problem(problem: Problem, values: Array) -> Problem:
+    """Return ``problem`` with simulations that start from the motion at ``values`` [F] of the free genes."""
+    if not isinstance(problem.model, DifferentiableModel):
+        return problem
+    return replace(problem, model=problem.model.beside(problem.genomes(values)[0]))
 
-    ValueError if the genome there cannot be simulated. A step beyond a bound ends at the bound, and a displaced genome
-    that fails is replaced by the one at ``unit``, so that differences may become one-sided. For genes with a failure on
-    both sides, shorter steps are tried once.
+
+def tangent_problem(problem: Problem, values: Array) -> Problem | None:
+    """Return ``problem`` for batches of neighbours; None if it has no derivatives (:class:`DifferentiableModel`).
+
+    ``values`` [F] of the free genes: close to those of the batches.
     """
-    genes, evaluations = free_genes(problem), list[Evaluation]()
+    if not isinstance(problem.model, DifferentiableModel):
+        return None
+    return replace(problem, model=problem.model.tangent(problem.genomes(values)[0]))
 
-    def simulate(units: Array) -> tuple[Outputs, tuple[str | None, ...]]:
-        evaluation = evaluator.evaluate(problem, values_at(genes, units), residuals=True)
-        evaluations.append(evaluation)
-        return residuals_of(evaluation), evaluation.reasons
 
-    found = differences(simulate, unit, np.arange(len(unit)))
-    failed = np.flatnonzero(~found.known)
-    if len(failed):
-        again = differences(simulate, unit, failed, at=found.outputs, step=STEP * SHORTER)
-        found.known[failed] = again.known
-        for slopes, new in zip(found.slopes, again.slopes, strict=True):
-            slopes[..., failed] = new
+def linearise(problem: Problem, evaluator: Evaluator, unit: Array) -> Linearised:
+    """Linearise about ``unit`` [F], genes scaled to 0..1.
+
+    ValueError if the genome there cannot be simulated. A model that is differentiable is differentiated in steps of
+    TANGENT_STEP; for the genes that have no derivative, and for other models, central differences are taken. Their
+    steps end at the bounds, and a displaced genome that fails is replaced by the one at ``unit``, so that differences
+    may become one-sided. For genes with a failure on both sides, shorter steps are tried once.
+    """
+    genes, evaluations, every = free_genes(problem), list[Evaluation](), np.arange(len(unit))
+
+    def simulated_by(problem: Problem) -> Simulate:
+        def simulate(units: Array) -> tuple[Outputs, tuple[str | None, ...]]:
+            evaluation = evaluator.evaluate(problem, values_at(genes, units), residuals=True)
+            evaluations.append(evaluation)
+            return residuals_of(evaluation), evaluation.reasons
+
+        return simulate
+
+    simulate, tangent = simulated_by(problem), tangent_problem(problem, values_at(genes, unit[None])[0])
+    found = derivatives(simulate, simulated_by(tangent) if tangent else None, unit, every)
+    found = with_more(found, simulate, unit, every, step=STEP * SHORTER)
     return Linearised(
         found.outputs,
         found.slopes,

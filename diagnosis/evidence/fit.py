@@ -13,11 +13,11 @@ from functools import partial
 
 import numpy as np
 
-from wingfit.calibration.estimates.linearised import free_genes, values_at
+from wingfit.calibration.estimates.linearised import free_genes, tangent_problem, values_at
 from wingfit.calibration.problem import Problem
 from wingfit.diagnosis.evidence.context import FitContext
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
-from wingfit.inference.differences import Outputs, differences
+from wingfit.inference.differences import Outputs, Simulate, derivatives
 from wingfit.inference.gauss_newton import Quadratic, Trials
 from wingfit.records.array_types import Array, Bool, Float, Mask
 
@@ -190,6 +190,22 @@ class _Simulator:
         found, reasons, _ = self.at(units, motion_genes)
         return [found], reasons
 
+    def tangent(self, motion_genes: Array) -> Simulate | None:
+        """Return a function that simulates the first of a batch, and its neighbours to first order.
+
+        It starts from the motion of ``motion_genes`` [F]; None if the model is not differentiable.
+        """
+        genes = free_genes(self.problem)
+        tangent = tangent_problem(self.problem, values_at(genes, motion_genes[None])[0])
+        if tangent is None:
+            return None
+
+        def simulate(units: Array) -> tuple[Outputs, tuple[str | None, ...]]:
+            found, reasons, _ = self.context.evaluate(tangent, values_at(genes, units))
+            return [found], reasons
+
+        return simulate
+
 
 def _initial_fit(simulator: _Simulator, unit: Array) -> Fit:
     found, reasons, residuals = simulator.at(unit[None], unit)
@@ -206,12 +222,16 @@ def _initial_fit(simulator: _Simulator, unit: Array) -> Fit:
 
 
 def _measure_columns(simulator: _Simulator, fit: Fit, which: Mask, sides: int = 2) -> Fit:
-    """Return ``fit`` with columns ``which`` [F] of its Jacobian measured by differences to one or two ``sides``."""
+    """Return ``fit`` with columns ``which`` [F] of its Jacobian measured.
+
+    Where the model is not differentiable, they are differences to one or two ``sides``.
+    """
     (columns,) = np.nonzero(which)
     if not len(columns):
         return fit
     simulate = partial(simulator.outputs, fit.motion_genes)
-    found = differences(simulate, fit.unit, columns, at=[fit.coefficients], sides=sides)
+    tangent = simulator.tangent(fit.motion_genes)
+    found = derivatives(simulate, tangent, fit.unit, columns, at=[fit.coefficients], sides=sides)
     jacobian = fit.jacobian.copy()
     jacobian[:, columns] = found.slopes[0]
     return replace(fit, jacobian=jacobian, jacobian_measured=bool(which.all()))

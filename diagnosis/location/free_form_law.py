@@ -63,7 +63,10 @@ class _NormalEquations:
         return np.asarray(self.power[recording] + np.einsum("bn,bnm,bm->b", found, matrix, found) - 2 * along)
 
     def explained(self, terms: Int[Index, "B N"]) -> Float[Array, " B"]:
-        """Return the fraction [B] of the excess that each law explains, recordings left out one at a time."""
+        """Return the fraction [B] of :attr:`excess` that each of B laws explains in recordings left out of its fit.
+
+        ``terms`` [B, N]: the terms of each law. The recordings are left out one at a time.
+        """
         after = np.zeros(len(terms))
         for r in range(len(self.power)):
             after += self.remaining(r, terms, self.fit(terms, np.arange(len(self.power)) != r)) - self.count[r]

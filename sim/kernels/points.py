@@ -66,8 +66,9 @@ def add_point_wrenches(laws: Laws, work: Work) -> None:
 
 @kernel
 def add_point_blocks(laws: Laws, work: Work, length: float) -> None:
-    """Add to ``work.blocks`` the points' part of S, -dW/dV (I - l A) - l dW/dxi; l is ``length`` = h gamma.
+    """Add the part of the step's matrix S that is due to wrenches at points, -dW/dV (I - l A) - l dW/dxi.
 
+    It is added to ``work.blocks``; l is ``length`` = h gamma, the other symbols are those at the top of this module.
     -dW/dV of each point is stored in ``work.drag`` [P, 36, W]. Both terms together are E (D + l K + [[X, 0], [Y, 0]])
     E^T with (X, Y) = l (D (-omega~ / 2, b~ omega~ / 2 - omega~ b~) - (m~, f~)).
     """

@@ -199,6 +199,7 @@ def _lane(state: State, lane: int) -> State:
 
 
 def put(into: State, lane: int, state: State) -> None:
+    """Set the individual ``lane`` of the group's state ``into`` to ``state``."""
     for array, value in zip(into, state, strict=True):
         array[..., lane] = value
 

@@ -11,11 +11,13 @@ from wingfit.sim.kernels import LANES
 from wingfit.sim.kernels.arrays import State, Trace
 from wingfit.sim.solver.numerics import LADDER, Numerics, estimated_error
 from wingfit.sim.solver.scene import new_trace
+from wingfit.sim.solver.sensitivity import neighbourhood
 from wingfit.sim.solver.settle import Course, Subject, measure_growth, settle, warm_start
 from wingfit.sim.wing.structure import Structure
 
 FLUTTER = 1.02  # growth of a disturbance in a beat above which a periodic motion counts as unstable
 RETRY_FACTOR = 1.5  # on the steps of individuals that fail from a warm start and from rest
+NO_DERIVATIVE = "the derivative of its motion was not found"
 _MAX_FAILURES = 4  # numbers of steps that may fail before an individual counts as failed
 
 
@@ -62,6 +64,42 @@ def periodic_beats(
         return _beats_near(subject, genomes, numerics, near, len(near.trace.tracks), with_motion)
     courses = [Course(genome) for genome in genomes]
     return _settled(subject, courses, numerics, with_motion)
+
+
+def neighbouring_beats(
+    subject: Subject, genomes: Array, sizes: Array, numerics: Numerics, near: Course, *, same: bool
+) -> tuple[Beat, ...]:
+    """Simulate ``genomes[0]``, and its neighbours to first order in their distance (:mod:`.sensitivity`).
+
+    ``genomes`` [1 + K, G]; ``sizes`` [K]: distances of the neighbours, in any unit. ``near``: a periodic motion close
+    to that of the first, or, if ``same``, the motion of the first. Of the beats, only the tracks are known. A neighbour
+    whose derivative does not converge has a reason; if the first fails, all have its reason.
+    """
+    if not same:
+        near = _settled_near(subject, near, genomes[0], numerics)
+        if near.reason is not None:
+            return (_beat(subject.structure, near, with_motion=False),) * len(genomes)
+    found = neighbourhood(subject, near, genomes, sizes, numerics)
+    tracks = np.concatenate([found.tracks[None], found.tracks + sizes[:, None, None, None] * found.slopes])
+    first = None if np.isfinite(found.distance) else "no periodic motion was found from that of a neighbour"
+    later = (None if np.isfinite(error) else NO_DERIVATIVE for error in found.errors)
+    n = len(found.tracks)
+    rods, air, energy, power = (np.full(shape, np.nan) for shape in ((n, 2, 6), (n, 3), (n, 3), (n, 4)))
+    error = near.error + found.distance
+    return tuple(
+        Beat(one, rods, air, energy, power, found.beats, error, near.growth, reason)
+        for one, reason in zip(tracks, (first, *later), strict=True)
+    )
+
+
+def _settled_near(subject: Subject, near: Course, genome: Array, numerics: Numerics) -> Course:
+    """Simulate ``genome`` [G] with as many steps as ``near``, whose motion it starts from; it may fail."""
+    if near.trace is None:
+        raise ValueError("a warm start needs an individual with a periodic motion")
+    course = warm_start(near, genome, len(subject.scene(genome[None]).frozen().laws.size))
+    settle(subject, [course], numerics, len(near.trace.tracks), False)
+    course.error = near.error + course.distance
+    return course
 
 
 def settled_course(subject: Subject, genome: Array, numerics: Numerics) -> Course | None:

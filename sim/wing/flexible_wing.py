@@ -24,7 +24,7 @@ from wingfit.sim.kernels import LANES
 from wingfit.sim.model import Observation, Solution, genome_batch
 from wingfit.sim.solver.numerics import Numerics
 from wingfit.sim.solver.settle import Course, Subject
-from wingfit.sim.solver.simulate import Beat, periodic_beats, settled_course
+from wingfit.sim.solver.simulate import Beat, neighbouring_beats, periodic_beats, settled_course
 from wingfit.sim.wing.alignment import REFERENCE_HARMONICS, recorded_crossing, reference_columns, upstroke_crossing
 from wingfit.sim.wing.division import Division
 from wingfit.sim.wing.genes import AERODYNAMIC, FACTOR, STRUCTURAL, lanes, wing_genes
@@ -34,7 +34,7 @@ Key = TypeVar("Key")
 Value = TypeVar("Value")
 
 MAX_SHIFT = 0.05  # rad, about 3 degrees of the beat
-_DEFINITION = ("wing", "division", "bounds_factor", "numerics", "effects", "probe", "near")
+_DEFINITION = ("wing", "division", "bounds_factor", "numerics", "effects", "probe", "near", "differentiates")
 _OWN_GENES = len(STRUCTURAL + AERODYNAMIC)  # the other genes are those of effects
 _MAX_STARTS = 256
 # Solutions used as warm starts, by wing and condition; shared by models that differ only in their effects.
@@ -58,7 +58,8 @@ class FlexibleWing:
         effects: names of :data:`wingfit.sim.effects.registry.EFFECTS`; their genes follow the wing's own.
         probe: a known load, whose genes come last; None: no load.
         near: values of the wing's own genes. The periodic motion of this genome is the warm start of all individuals.
-        Empty: every simulation starts from rest.
+            Empty: every simulation starts from rest.
+        differentiates: whether individuals are neighbours of the first of their batch, whose motion is differentiated.
     """
 
     wing: Wing
@@ -68,6 +69,7 @@ class FlexibleWing:
     effects: tuple[str, ...] = ()
     probe: Probe | None = None
     near: tuple[float, ...] = ()
+    differentiates: bool = False
 
     def __post_init__(self) -> None:
         chosen(self.effects, self.wing)
@@ -95,6 +97,13 @@ class FlexibleWing:
     def beside(self, genome: ArrayLike) -> FlexibleWing:
         """Return the same wing, whose simulations start from the periodic motion of ``genome`` [G] without effects."""
         return self._share_structure(replace(self, near=tuple(np.asarray(genome, float)[:_OWN_GENES].tolist())))
+
+    def tangent(self, genome: ArrayLike) -> FlexibleWing:
+        """Return the same wing for batches of neighbours, found from the motion of ``genome`` [G] without effects.
+
+        See :class:`wingfit.sim.model.DifferentiableModel`.
+        """
+        return self._share_structure(replace(self.beside(genome), differentiates=True))
 
     def _share_structure(self, other: FlexibleWing) -> FlexibleWing:
         """Return ``other``, a model of the same wing and division, after giving it this model's structures."""
@@ -158,6 +167,8 @@ class FlexibleWing:
         """
         first, wing = _distinct(self._acting(batch, [effect for effect in self.chosen if effect.wing]))
         wings, found = batch[first], dict[int, Beat]()
+        if self.differentiates:
+            return list(self._neighbours(wings, recording.condition)), wing
         for effects, rows in by_active([effect for effect in self.chosen if effect.wing], self.genes, wings):
             reused = self.near and not effects and not with_motion
             keys = {k: self._key(wings[k], recording.condition) for k in rows} if reused else {}
@@ -170,6 +181,24 @@ class FlexibleWing:
             for k, key in keys.items():
                 _remember(_BEATS, key, found[k], _MAX_BEATS)
         return [found[k] for k in range(len(wings))], wing
+
+    def _neighbours(self, wings: Array, condition: Condition) -> tuple[Beat, ...]:
+        """Beats of the first of ``wings`` [B, G] and, by its derivatives, of its neighbours.
+
+        A neighbour in which another effect is on fails: many laws have a kink where they are switched off.
+        """
+        on = np.array([effect.on(self.genes, wings) for effect in self.chosen if effect.wing], bool)
+        alike = (on == on[:, :1]).all(axis=0) if len(on) else np.ones(len(wings), bool)
+        acting, near = self.switched_on(wings[0]), self._start_near(condition)
+        subject, same = self.subject(acting, condition), not acting and tuple(wings[0, :_OWN_GENES]) == self.near
+        if near is None:
+            return periodic_beats(subject, wings, self.numerics)
+        unit = np.array([gene.to_unit(column) for gene, column in zip(self.genes, wings[alike].T, strict=True)]).T
+        apart = np.abs(unit[1:] - unit[0]).max(axis=1)
+        found = iter(neighbouring_beats(subject, wings[alike], apart, self.numerics, near, same=same))
+        first = next(found)
+        kinked = replace(first, reason="an effect that is off has no derivative")
+        return (first, *(next(found) if smooth else kinked for smooth in alike[1:]))
 
     def _key(self, genome: Array, condition: Condition) -> tuple[bytes, Condition, bytes]:
         return self._plain_key, condition, genome[:_OWN_GENES].tobytes()
