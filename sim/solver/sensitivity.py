@@ -110,7 +110,7 @@ class _Secants:
     def combined(self, changes: Array) -> tuple[Array, Array]:
         """Combine the secants so that the ``changes`` [J, D] over a beat vanish as far as they can.
 
-        Returns the weights [S, J] of the secants, and what is left of the changes [J, D].
+        Returns the weights [S, J] of the secants, and the changes [J, D] that remain.
         """
         if not self.starts or not np.all(np.isfinite(changes)):
             return np.zeros((len(self.starts), len(changes))), changes
