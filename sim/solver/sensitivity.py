@@ -141,7 +141,7 @@ class _Beats:
         z = near.state.z if len(near.state.z) == states else np.zeros(states)
         self.about = near.state._replace(z=z)
         self.groups = [Group(subject, [Course(genome, self.about) for genome in part], steps) for part in parts]
-        self.tables = [group.table(numerics, steps, numerics.ramp_beats) for group in self.groups]
+        self.tables = [group.table(numerics, steps, [numerics.ramp_beats]) for group in self.groups]
         self.start = self._coordinates(self.about)
 
     def run(self, starts: Array) -> tuple[Array, Array]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -20,6 +20,7 @@ from wingfit.sim.solver.periodic import Secants
 from wingfit.sim.solver.scene import at_rest, drive_table, new_trace
 from wingfit.sim.wing.structure import Structure
 
+REFILLED = 2  # lanes that are free before others take them: to set up a group costs a tenth of a beat
 GROWTH_BEATS = 16  # after which the fastest growing mode dominates the transient
 ROUND_OFF = 1e-12  # m: size of transients that consist of round-off
 DIVERGED = "a body turned more than 1 rad within one step"
@@ -76,7 +77,7 @@ class Subject(NamedTuple):
 
 
 class Group:
-    """Up to LANES individuals simulated together under a condition, all starting from rest or all from given states."""
+    """Up to LANES individuals simulated together under a condition, each from rest or from the state of its course."""
 
     def __init__(self, subject: Subject, courses: list[Course], steps: int, with_motion: bool = False) -> None:
         structure, self.courses = subject.structure, courses
@@ -87,14 +88,29 @@ class Group:
         states = len(self.sizes)
         self.work = new_work(self.wiring, self.here, self.lanes)
         self.trace = new_trace(structure, steps, with_motion=with_motion, states=states)
-        moving = [course.state for course in courses if course.state is not None]
-        self.state = _stacked(moving) if moving else at_rest(structure, states)
+        self.state = at_rest(structure, states)
+        for lane in range(LANES):  # lanes without an individual repeat the last
+            course = courses[min(lane, len(courses) - 1)]
+            if course.state is not None:
+                put(self.state, lane, course.state)
         self.alive = np.ones(LANES, bool)
 
-    def table(self, numerics: Numerics, steps: int, beat: int) -> Array:
-        """Return the rods' motion in beat number ``beat``, see :func:`wingfit.sim.solver.scene.drive_table`."""
+    def table(self, numerics: Numerics, steps: int, beats: Sequence[int]) -> Array:
+        """Return the rods' motion in beat number ``beats[lane]`` of each individual, the last for lanes without one.
+
+        See :func:`wingfit.sim.solver.scene.drive_table`.
+        """
         frequency, compliant = self.angular_rate / (2 * np.pi), len(self.lanes.laws.motor) > 0
-        return drive_table(self.scene.rods, frequency, numerics, steps, beat, compliant=compliant)
+        tables = {
+            beat: drive_table(self.scene.rods, frequency, numerics, steps, beat, compliant=compliant)
+            for beat in {min(beat, numerics.ramp_beats) for beat in beats}
+        }
+        if len(tables) == 1:
+            return next(iter(tables.values()))
+        found = aligned(tables[min(beats[-1], numerics.ramp_beats)].copy())
+        for lane, beat in enumerate(beats):
+            found[..., lane] = tables[min(beat, numerics.ramp_beats)][..., lane]
+        return found
 
     def beat(self, table: Array) -> State:
         """Simulate one beat with the drive ``table``; return a copy of the state at its start."""
@@ -105,14 +121,17 @@ class Group:
     def evaluate(self, lane: int, start: State, beat: int, numerics: Numerics) -> None:
         """Decide on the individual ``lane`` after a beat: failed, periodic, or to continue from an extrapolated start.
 
-        ``start``: state of the group at the start of beat number ``beat``. The decision is stored in the individual's
-        course, and the start of its next beat in the group's state.
+        ``start``: state of the group at the start of the individual's beat number ``beat``. The decision is stored in
+        the individual's course, and the start of its next beat there and in the group's state.
         """
         course = self.courses[lane]
         course.beats += 1
+        course.state = _lane(self.state, lane)
         if not self.alive[lane]:
             self.alive[lane] = _recover(course, lane, self.state)
-            if not self.alive[lane]:
+            if self.alive[lane]:
+                course.state = _lane(self.state, lane)
+            else:
                 course.reason, course.state, course.secants = f"diverged in beat {beat + 1}: {DIVERGED}", None, None
         elif beat >= numerics.ramp_beats:
             before, after = _lane(start, lane), _lane(self.state, lane)
@@ -142,31 +161,49 @@ def warm_start(near: Course, genome: Array, states: int) -> Course:
 
 
 def settle(subject: Subject, courses: list[Course], numerics: Numerics, steps: int, with_motion: bool) -> None:
-    """Simulate up to LANES individuals with ``steps`` per beat until the motion of each is periodic or has failed.
+    """Simulate individuals with ``steps`` per beat until the motion of each is periodic or has failed.
 
-    Results are stored in ``courses``; ``with_motion``: whether the motion of all bodies is stored too. Either all
-    courses or none of them start from rest.
+    LANES of them are simulated at a time; when REFILLED lanes are done, the next individuals take these. Results are
+    stored in ``courses``; ``with_motion``: whether the motion of all bodies is stored too.
     """
-    group = Group(subject, courses, steps, with_motion)
-    first = 0 if courses[0].state is None else numerics.ramp_beats
-    tables = {beat: group.table(numerics, steps, beat) for beat in range(first, numerics.ramp_beats + 1)}
     for course in courses:
         course.reason, course.trace = None, None
         if course.secants is not None:
             course.secants.restart()
-    running = list(range(len(courses)))
-    for beat in range(first, numerics.max_beats):
-        start = group.beat(tables[min(beat, numerics.ramp_beats)])
-        for lane in running:
-            group.evaluate(lane, start, beat, numerics)
-        running = [lane for lane in running if courses[lane].reason is None and courses[lane].trace is None]
-        if not running:
-            return
-    for lane in running:
-        courses[lane].reason = (
-            f"not periodic after {courses[lane].beats} beats: still more than {numerics.settled * 1e3:g} mm from a "
-            "periodic motion; it may flutter"
-        )
+    waiting, running = list(courses), list[_Running]()
+    group = None
+    while waiting or running:
+        if group is None or not running or (waiting and len(running) <= LANES - REFILLED):
+            taken, waiting = waiting[: LANES - len(running)], waiting[LANES - len(running) :]
+            running += [_Running(course, 0 if course.state is None else numerics.ramp_beats) for course in taken]
+            for lane, one in enumerate(running):
+                one.lane = lane
+            group = Group(subject, [one.course for one in running], steps, with_motion)
+            beats = [one.beat for one in running]
+        start = group.beat(group.table(numerics, steps, beats))
+        for one in running:
+            group.evaluate(one.lane, start, one.beat, numerics)
+            one.beat = beats[one.lane] = one.beat + 1
+            if one.unfinished and one.beat >= numerics.max_beats:
+                one.course.reason = (
+                    f"not periodic after {one.course.beats} beats: still more than {numerics.settled * 1e3:g} mm from "
+                    "a periodic motion; it may flutter"
+                )
+        running = [one for one in running if one.unfinished]
+
+
+@dataclass
+class _Running:
+    """An individual that is being simulated: its course, the number of its next beat, and its lane."""
+
+    course: Course
+    beat: int
+    lane: int = 0
+
+    @property
+    def unfinished(self) -> bool:
+        """Whether the individual is neither periodic nor failed."""
+        return self.course.reason is None and self.course.trace is None
 
 
 def measure_growth(subject: Subject, courses: list[Course], steps: int) -> None:
@@ -176,7 +213,7 @@ def measure_growth(subject: Subject, courses: list[Course], steps: int) -> None:
     because it includes beats on which the motion was far from periodic.
     """
     group, numerics = Group(subject, courses, steps), Numerics(steps=steps)
-    table = group.table(numerics, steps, numerics.ramp_beats)
+    table = group.table(numerics, steps, [numerics.ramp_beats])
     monitors = [Secants(_lane(group.state, k), group.angular_rate, 0, group.sizes) for k in range(len(courses))]
     distances = np.zeros((GROWTH_BEATS, len(courses)))
     for beat in range(GROWTH_BEATS):
@@ -208,9 +245,3 @@ def _mean_growth(distances: Array) -> float:
     """Fit an exponential to the latter half of ``distances`` [beats] (m); return its growth factor per beat."""
     tail = np.log(np.maximum(distances[len(distances) // 2 :], ROUND_OFF))
     return float(np.exp(np.polyfit(np.arange(len(tail)), tail, 1)[0]))
-
-
-def _stacked(states: list[State]) -> State:
-    """Return states of single individuals as the state of a group; if they are too few, the last is repeated."""
-    filled = [states[min(k, len(states) - 1)] for k in range(LANES)]
-    return State(*(aligned(np.stack(parts, axis=-1)) for parts in zip(*filled, strict=True)))

@@ -125,8 +125,7 @@ def _beats_near(
     """Simulate individuals from the motion of ``near`` with ``steps`` per beat; those that fail restart from rest."""
     states = len(subject.scene(genomes[:1]).frozen().laws.size)
     courses = [warm_start(near, genome, states) for genome in genomes]
-    for group in _groups(courses):
-        settle(subject, group, numerics, steps, with_motion)
+    settle(subject, courses, numerics, steps, with_motion)
     failed = [k for k, course in enumerate(courses) if course.reason is not None or course.growth > FLUTTER]
     for k, course in zip(failed, _from_rest(subject, genomes[failed], numerics, steps, with_motion), strict=True):
         courses[k] = course
@@ -151,24 +150,17 @@ def _settled(subject: Subject, courses: list[Course], numerics: Numerics, with_m
     ladder = numerics.ladder(subject.condition)
     for rung, steps in enumerate(ladder):
         under_way = [course for course in courses if not course.done]
-        for group in _groups(under_way):
-            settle(subject, group, numerics, steps, with_motion)
-            for course in group:
-                _judge(course, numerics, steps, last=rung == len(ladder) - 1)
+        settle(subject, under_way, numerics, steps, with_motion)
+        for course in under_way:
+            _judge(course, numerics, steps, last=rung == len(ladder) - 1)
         suspect = [c for c in under_way if c.done and c.reason is None and c.growth > FLUTTER]
-        for group in _groups(suspect):
-            measure_growth(subject, group, steps)
-            for course in group:
-                if course.growth > FLUTTER:  # an extrapolation may find an unstable motion
-                    growth = f"a disturbance of its periodic motion grows {course.growth:.3g}-fold from beat to beat"
-                    course.reason = f"flutters: {growth}"
+        for start in range(0, len(suspect), LANES):
+            measure_growth(subject, suspect[start : start + LANES], steps)
+        for course in suspect:
+            if course.growth > FLUTTER:  # an extrapolation may find an unstable motion
+                growth = f"a disturbance of its periodic motion grows {course.growth:.3g}-fold from beat to beat"
+                course.reason = f"flutters: {growth}"
     return tuple(_beat(subject.structure, course, with_motion) for course in courses)
-
-
-def _groups(courses: list[Course]) -> list[list[Course]]:
-    """Split ``courses`` into groups of up to LANES, in which either all or none start from rest."""
-    parts = [[c for c in courses if (c.state is None) == resting] for resting in (True, False)]
-    return [part[k : k + LANES] for part in parts for k in range(0, len(part), LANES)]
 
 
 def _judge(course: Course, numerics: Numerics, steps: int, *, last: bool) -> None:
