@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -23,14 +24,16 @@ import numpy as np
 import numpy.typing as npt
 
 from benchmarks import calibration, diagnosis
+from benchmarks.common.files import REPOSITORY
 from benchmarks.common.machine import commit, cpu
 from benchmarks.common.progress import show
 from benchmarks.physics import flops
 from benchmarks.physics.convergence import Subject, by_default
 from benchmarks.simulator import CONDITIONS, DIVISIONS, case, search_seconds
+from wingfit.calibration.estimates.linearised import unit_at, values_at
 from wingfit.calibration.search import CalibrationSpec
-from wingfit.inference.differences import TANGENT_STEP
-from wingfit.records import load_dataset, save_dataset
+from wingfit.inference.differences import TANGENT_STEP, differences
+from wingfit.records import Condition, load_dataset, save_dataset
 from wingfit.sim.kernels import LANES
 from wingfit.sim.solver.numerics import Numerics
 from wingfit.sim.virtual_rigs.campaign import blank_recording
@@ -64,41 +67,33 @@ def derivatives() -> dict[str, Any]:
     """Cost of the derivatives by 18 genes in certified motions, with the motion they start from, and their error."""
     wings, errors = [], []
     for condition in CONDITIONS.values():
-        subject = Subject(DIVISIONS[BODIES], condition)
-        model, recording, times = subject.model, blank_recording(subject.model.wing, condition), []
+        subject, times = Subject(DIVISIONS[BODIES], condition), []
         for repetition in range(REPETITIONS, -1, -1):
             # Another genome each time, so that its motion is not known from before; the last is the subject's.
-            rows = _moved(model, subject.genome[0] * (1.0 + 1e-6 * repetition), TANGENT_STEP)
+            genome = subject.genome[0] * (1.0 + 1e-6 * repetition)
             began = time.thread_time()
-            beats = model.tangent(rows[0]).beats(rows, recording)
+            found = _slopes(subject.model.tangent(genome), genome, condition, TANGENT_STEP, sides=1)
             times.append(time.thread_time() - began)
         wings.append(1e3 * min(times[1:]) / by_default(subject).ms)
-        found = np.array([(beat.tracks - beats[0].tracks) / TANGENT_STEP for beat in beats[1:]])
-        expected = _differences(subject, len(beats[0].tracks))
-        size = np.abs(expected).max(axis=(1, 2, 3))
-        error = np.abs(found - expected).max(axis=(1, 2, 3)) / np.maximum(size, STRONG * size.max())
+        exact = replace(subject.model, numerics=replace(EXACT, steps=len(found)))
+        coarse, fine = (_slopes(exact, subject.genome[0], condition, step) for step in PAIRS)
+        expected = (4 * fine - coarse) / 3
+        size = np.abs(expected).max(axis=(0, 1, 2))
+        error = np.abs(found - expected).max(axis=(0, 1, 2)) / np.maximum(size, STRONG * size.max())
         errors.append(float(error.max()))
     return {"jacobian_18_genes_in_wings": max(wings), "sensitivity_error": max(errors)}
 
 
-def _moved(model: FlexibleWing, genome: Array, step: float) -> Array:
-    """``genome`` [G] and, for each gene, the genome with this gene changed by ``step`` of its range, [1 + G, G]."""
-    genes = model.genes
-    unit = np.array([float(gene.to_unit(value)) for gene, value in zip(genes, genome, strict=True)])
-    rows = np.vstack([unit, unit + step * np.eye(len(unit))])
-    return np.stack([gene.from_unit(column) for gene, column in zip(genes, rows.T, strict=True)], axis=1)
+def _slopes(model: FlexibleWing, genome: Array, condition: Condition, step: float, sides: int = 2) -> Array:
+    """Derivatives [n, M, 3, G] of the tracks with respect to the genes, by differences of this step."""
+    blank = blank_recording(model.wing, condition)
 
+    def simulate(units: Array) -> tuple[list[Array], list[str | None]]:
+        beats = model.beats(values_at(list(model.genes), units), blank)
+        return [np.array([beat.tracks for beat in beats])], [beat.reason for beat in beats]
 
-def _differences(subject: Subject, steps: int) -> Array:
-    """Derivatives [G, n, M, 3] of the tracks by central differences of converged motions."""
-    exact = replace(subject.model, numerics=replace(EXACT, steps=steps))
-    blank = blank_recording(exact.wing, subject.condition)
-
-    def central(size: float) -> Array:
-        up, down = (exact.beats(_moved(exact, subject.genome[0], sign * size)[1:], blank) for sign in (1, -1))
-        return np.array([(a.tracks - b.tracks) / (2 * size) for a, b in zip(up, down, strict=True)])
-
-    return (4 * central(PAIRS[1]) - central(PAIRS[0])) / 3
+    unit = unit_at(list(model.genes), genome)
+    return differences(simulate, unit, np.arange(len(unit)), step=step, sides=sides).slopes[0]
 
 
 def calibrations() -> dict[str, Any]:
@@ -135,12 +130,14 @@ def concealed() -> dict[str, Any]:
 
 def starting() -> dict[str, Any]:
     """Time until the first simulation: with nothing compiled, and with everything compiled."""
-    with tempfile.TemporaryDirectory() as cache:
-        environment = os.environ | {"NUMBA_CACHE_DIR": cache}
+    with tempfile.TemporaryDirectory() as scratch:
+        # A copy of the package without what was compiled, which would be found beside the sources.
+        shutil.copytree(REPOSITORY / "wingfit", Path(scratch) / "wingfit", ignore=shutil.ignore_patterns("__pycache__"))
+        environment = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
         seconds = []
         for _ in range(2):
             done = subprocess.run(  # noqa: S603
-                [sys.executable, "-c", WARM], env=environment, check=True, capture_output=True, text=True
+                [sys.executable, "-c", WARM], cwd=scratch, env=environment, check=True, capture_output=True, text=True
             )
             seconds.append(float(done.stdout.split()[-1]))
     return {"cold_compile_s": seconds[0], "warm_start_s": seconds[1]}

@@ -16,6 +16,7 @@ from wingfit.calibration.problem import Evaluation, Misfit, Problem, concatenate
 from wingfit.records.array_types import Array, ArrayLike
 from wingfit.records.blas_threads import one_blas_thread
 from wingfit.sim.kernels import LANES
+from wingfit.sim.model import DifferentiableModel
 
 
 class Evaluator(Protocol):
@@ -47,7 +48,8 @@ def units(problem: Problem, individuals: int) -> list[Unit]:
 
     The individuals of a model that is differentiated (``DifferentiableModel.tangent``) stay together.
     """
-    size = individuals if getattr(problem.model, "differentiates", False) else LANES
+    together = isinstance(problem.model, DifferentiableModel) and problem.model.differentiates
+    size = individuals if together else LANES
     return [
         Unit(start, min(start + size, individuals), recording)
         for recording in range(len(problem.recordings))

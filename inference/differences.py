@@ -7,7 +7,7 @@ whose scale is "log".
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -92,12 +92,13 @@ def derivatives(
     """Differentiate outputs as :func:`differences` does, by exact derivatives of the simulated motion where it has any.
 
     ``tangent`` simulates neighbours of ``unit``, the first of every batch, exactly to first order in their distance,
-    and fails where there is no derivative; None for a model without derivatives. ``at`` is used by ``simulate`` only.
+    and fails where there is no derivative, which is not reported as a failure; None for a model without derivatives.
+    ``at`` is used by ``simulate`` only.
     """
     if tangent is None:
         return differences(simulate, unit, columns, at=at, sides=sides)
     try:
-        found = differences(tangent, unit, columns, step=TANGENT_STEP, sides=1)
+        found = replace(differences(tangent, unit, columns, step=TANGENT_STEP, sides=1), reasons=())
     except ValueError:  # no periodic motion that can be differentiated
         return differences(simulate, unit, columns, at=at, sides=sides)
     return with_more(found, simulate, unit, columns, at=at, sides=sides)

@@ -65,6 +65,11 @@ class Model(Protocol):
 class DifferentiableModel(Model, Protocol):
     """A model that starts simulations from a known motion, and differentiates the motion that it computes."""
 
+    @property
+    def differentiates(self) -> bool:
+        """Whether this is the :meth:`tangent` of a model, whose batches must not be split."""
+        ...
+
     def beside(self, genome: ArrayLike) -> Model:
         """Return the same model, whose simulations start from the motion of ``genome`` [G] without effects."""
         ...
@@ -73,8 +78,8 @@ class DifferentiableModel(Model, Protocol):
         """Return the same model for individuals that are very close to the first of their batch.
 
         They differ from the first by the derivative of its computed motion times their distance, however small this is.
-        An individual fails, with a reason, where the motion has no derivative in its direction. A batch must not be
-        split. ``genome`` [G]: from its motion that of the first is found.
+        An individual fails, with a reason, where the motion has no derivative in its direction. ``genome`` [G]: from
+        its motion that of the first is found.
         """
         ...
 

@@ -114,12 +114,14 @@ def linearise(problem: Problem, evaluator: Evaluator, unit: Array) -> Linearised
     simulate, tangent = simulated_by(problem), tangent_problem(problem, values_at(genes, unit[None])[0])
     found = derivatives(simulate, simulated_by(tangent) if tangent else None, unit, every)
     found = with_more(found, simulate, unit, every, step=STEP * SHORTER)
+    # The first batch begins with the point itself; if it cannot be differentiated, so does the second.
+    base = next(evaluation for evaluation in evaluations if evaluation.reasons[0] is None)
     return Linearised(
         found.outputs,
         found.slopes,
         found.known,
-        float(evaluations[0].fitness[0]),
-        float(evaluations[0].distance[0]),
+        float(base.fitness[0]),
+        float(base.distance[0]),
         sum(len(evaluation.fitness) for evaluation in evaluations),
-        tuple(reason for evaluation in evaluations for reason in evaluation.reasons if reason),
+        found.reasons,
     )

@@ -50,14 +50,11 @@ class Neighbourhood:
     beats: int
 
 
-def neighbourhood(
-    subject: Subject, near: Course, genomes: Array, sizes: Array, numerics: Numerics, tolerance: float = TOLERANCE
-) -> Neighbourhood:
+def neighbourhood(subject: Subject, near: Course, genomes: Array, sizes: Array, numerics: Numerics) -> Neighbourhood:
     """Differentiate the periodic motion of ``genomes[0]`` in the directions of the other genomes.
 
     ``genomes`` [1 + K, G]: the undisturbed genome, then K genomes that differ from it by small changes of ``sizes``
-    [K], which divide the differences. ``near``: a periodic motion from which the undisturbed one is found. ValueError
-    if it is none.
+    [K], which divide the differences. ``near``: the motion of the undisturbed one; ValueError if it is not periodic.
     """
     beats, secants = _Beats(subject, near, genomes, numerics), _Secants()
     x, d = beats.start, np.zeros((len(sizes), len(beats.start)))
@@ -67,16 +64,16 @@ def neighbourhood(
         secants.add(np.vstack([x, d]), np.vstack([ends[:1], reached]), np.concatenate([tracks[:1], seen]))
         whole, moved = np.isfinite(reached).all(axis=1), ends[0] - x
         weights, left = secants.combined(np.vstack([np.where(whole[:, None], reached - d, 0.0), moved]))
-        resolved = np.linalg.norm(reached, axis=1) + ROUND_OFF / (tolerance * sizes)
+        resolved = np.linalg.norm(reached, axis=1) + ROUND_OFF / (TOLERANCE * sizes)
         remaining = np.linalg.norm(left[:-1], axis=1) / (1.0 - min(near.growth, LARGEST_GROWTH))
         errors, distance = np.where(whole, remaining / resolved, np.inf), float(np.abs(moved).max())
-        exact = distance <= SETTLED and bool((errors[whole] <= tolerance).all())
+        exact = distance <= SETTLED and bool((errors[whole] <= TOLERANCE).all())
         if exact or not np.isfinite(distance) or beat == MAX_BEATS:
             break
         step = secants.moved(weights)
         d, x = np.where(whole[:, None], reached + step[:-1], 0.0), ends[0] + step[-1]
     settled = distance <= ACCEPTED
-    good = (errors <= tolerance) & settled
+    good = (errors <= TOLERANCE) & settled
     slopes = np.where(good[:, None, None, None], seen + secants.seen(weights)[:-1], np.nan)
     return Neighbourhood(tracks[0], slopes, np.where(good, errors, np.inf), distance if settled else np.inf, beat)
 
@@ -137,9 +134,7 @@ class _Beats:
             raise ValueError("derivatives need an individual with a periodic motion")
         steps = len(near.trace.tracks)
         parts = [genomes[k : k + LANES] for k in range(0, len(genomes), LANES)]
-        states = len(subject.scene(genomes[:1]).frozen().laws.size)
-        z = near.state.z if len(near.state.z) == states else np.zeros(states)
-        self.about = near.state._replace(z=z)
+        self.about = near.state
         self.groups = [Group(subject, [Course(genome, self.about) for genome in part], steps) for part in parts]
         self.tables = [group.table(numerics, steps, [numerics.ramp_beats]) for group in self.groups]
         self.start = self._coordinates(self.about)

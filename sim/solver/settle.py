@@ -170,40 +170,41 @@ def settle(subject: Subject, courses: list[Course], numerics: Numerics, steps: i
         course.reason, course.trace = None, None
         if course.secants is not None:
             course.secants.restart()
-    waiting, running = list(courses), list[_Running]()
-    group = None
-    while waiting or running:
-        if group is None or not running or (waiting and len(running) <= LANES - REFILLED):
-            taken, waiting = waiting[: LANES - len(running)], waiting[LANES - len(running) :]
-            running += [_Running(course, 0 if course.state is None else numerics.ramp_beats) for course in taken]
-            for lane, one in enumerate(running):
-                one.lane = lane
-            group = Group(subject, [one.course for one in running], steps, with_motion)
-            beats = [one.beat for one in running]
-        start = group.beat(group.table(numerics, steps, beats))
-        for one in running:
-            group.evaluate(one.lane, start, one.beat, numerics)
-            one.beat = beats[one.lane] = one.beat + 1
-            if one.unfinished and one.beat >= numerics.max_beats:
-                one.course.reason = (
-                    f"not periodic after {one.course.beats} beats: still more than {numerics.settled * 1e3:g} mm from "
-                    "a periodic motion; it may flutter"
-                )
-        running = [one for one in running if one.unfinished]
+    waiting = [_Running(course, 0 if course.state is None else numerics.ramp_beats) for course in courses]
+    lanes, group = list[_Running](), None
+    while waiting or any(one.unfinished for one in lanes):
+        running = [one for one in lanes if one.unfinished]
+        if group is None or (waiting and len(running) <= LANES - REFILLED):
+            free = LANES - len(running)
+            lanes, waiting = running + waiting[:free], waiting[free:]
+            group = Group(subject, [one.course for one in lanes], steps, with_motion)
+        start = group.beat(group.table(numerics, steps, [one.beat for one in lanes]))
+        for lane, one in enumerate(lanes):
+            if one.unfinished:
+                group.evaluate(lane, start, one.beat, numerics)
+                one.end_beat(numerics)
 
 
 @dataclass
 class _Running:
-    """An individual that is being simulated: its course, the number of its next beat, and its lane."""
+    """An individual that is being simulated: its course, and the number of its next beat."""
 
     course: Course
     beat: int
-    lane: int = 0
 
     @property
     def unfinished(self) -> bool:
         """Whether the individual is neither periodic nor failed."""
         return self.course.reason is None and self.course.trace is None
+
+    def end_beat(self, numerics: Numerics) -> None:
+        """Go on to the next beat, or give the individual up after ``numerics.max_beats``."""
+        self.beat += 1
+        if self.unfinished and self.beat >= numerics.max_beats:
+            self.course.reason = (
+                f"not periodic after {self.course.beats} beats: still more than {numerics.settled * 1e3:g} mm from a "
+                "periodic motion; it may flutter"
+            )
 
 
 def measure_growth(subject: Subject, courses: list[Course], steps: int) -> None:

@@ -61,7 +61,8 @@ def periodic_beats(
     taken as theirs. ``with_motion``: also return the motion of all bodies.
     """
     if near is not None and near.trace is not None:
-        return _beats_near(subject, genomes, numerics, near, len(near.trace.tracks), with_motion)
+        courses = _courses_near(subject, genomes, numerics, near, with_motion=with_motion)
+        return tuple(_beat(subject.structure, course, with_motion) for course in courses)
     courses = [Course(genome) for genome in genomes]
     return _settled(subject, courses, numerics, with_motion)
 
@@ -76,7 +77,7 @@ def neighbouring_beats(
     whose derivative does not converge has a reason; if the first fails, all have its reason.
     """
     if not same:
-        near = _settled_near(subject, near, genomes[0], numerics)
+        (near,) = _courses_near(subject, genomes[:1], numerics, near, with_motion=False)
         if near.reason is not None:
             return (_beat(subject.structure, near, with_motion=False),) * len(genomes)
     found = neighbourhood(subject, near, genomes, sizes, numerics)
@@ -90,16 +91,6 @@ def neighbouring_beats(
         Beat(one, rods, air, energy, power, found.beats, error, near.growth, reason)
         for one, reason in zip(tracks, (first, *later), strict=True)
     )
-
-
-def _settled_near(subject: Subject, near: Course, genome: Array, numerics: Numerics) -> Course:
-    """Simulate ``genome`` [G] with as many steps as ``near``, whose motion it starts from; it may fail."""
-    if near.trace is None:
-        raise ValueError("a warm start needs an individual with a periodic motion")
-    course = warm_start(near, genome, len(subject.scene(genome[None]).frozen().laws.size))
-    settle(subject, [course], numerics, len(near.trace.tracks), False)
-    course.error = near.error + course.distance
-    return course
 
 
 def settled_course(subject: Subject, genome: Array, numerics: Numerics) -> Course | None:
@@ -119,10 +110,13 @@ def settled_course(subject: Subject, genome: Array, numerics: Numerics) -> Cours
     return course
 
 
-def _beats_near(
-    subject: Subject, genomes: Array, numerics: Numerics, near: Course, steps: int, with_motion: bool
-) -> tuple[Beat, ...]:
-    """Simulate individuals from the motion of ``near`` with ``steps`` per beat; those that fail restart from rest."""
+def _courses_near(
+    subject: Subject, genomes: Array, numerics: Numerics, near: Course, *, with_motion: bool
+) -> list[Course]:
+    """Solve for individuals from the motion of ``near`` with as many steps; those that fail restart from rest."""
+    if near.trace is None:
+        raise ValueError("a warm start needs an individual with a periodic motion")
+    steps = len(near.trace.tracks)
     states = len(subject.scene(genomes[:1]).frozen().laws.size)
     courses = [warm_start(near, genome, states) for genome in genomes]
     settle(subject, courses, numerics, steps, with_motion)
@@ -131,7 +125,7 @@ def _beats_near(
         courses[k] = course
     for course in courses:
         course.error = near.error + course.distance
-    return tuple(_beat(subject.structure, course, with_motion) for course in courses)
+    return courses
 
 
 def _from_rest(subject: Subject, genomes: Array, numerics: Numerics, steps: int, with_motion: bool) -> list[Course]:

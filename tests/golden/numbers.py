@@ -57,14 +57,16 @@ def motion(example: str, recordings: int, **settings: Any) -> Callable[[], Array
     return compute
 
 
-def search(example: str, recordings: int, **settings: Any) -> Callable[[], Array]:
-    """The history of a short search in this process: fitness and best genome of each generation."""
+def search(example: str, recordings: int, *, genes: bool = True, **settings: Any) -> Callable[[], Array]:
+    """The history of a short search in this process: fitness and, with ``genes``, best genome of each generation."""
 
     def compute() -> Array:
         dataset = load_dataset(EXAMPLES / example)
         names = tuple(recording.name for recording in _spread(dataset, recordings))
         spec = replace(CalibrationSpec(recordings=names, seed=3), **settings)
         generations = list(calibrate(spec, dataset, InProcessEvaluator()))
+        if not genes:
+            return np.array([one.best for one in generations])
         rows = [[one.best, one.mean, one.diversity, one.distance, *one.genome.values()] for one in generations]
         return np.array(rows, float).ravel()
 
@@ -89,12 +91,16 @@ CASES: dict[str, Callable[[], Array]] = {
     "genetic search": search(ROBIRD, 2, division="4", population=8, max_generations=2),
     "CMA-ES": search(ROBIRD, 2, division="4", mode="joint", method="cma_es", population=8, max_generations=2),
     "Gauss-Newton on the wing": search(ROBIRD, 2, division="4", method="gauss_newton", max_generations=2),
+    "fitness of Gauss-Newton on the wing": search(
+        ROBIRD, 2, genes=False, division="4", method="gauss_newton", max_generations=2
+    ),
     "Gauss-Newton on the vehicle": search(DELFLY, 2),
 }
 
-# Compared only where the golden file knows the machine: Gauss-Newton takes its steps from differences of simulations,
-# which multiply the rounding of the last bits, and two iterations leave badly determined genes anywhere in their range.
+# Two iterations of Gauss-Newton leave badly determined genes where the rounding of the last bits sends them: on
+# machines that are not in the golden file only the fitness is compared, to this relative tolerance.
 KNOWN_MACHINES_ONLY = {"Gauss-Newton on the wing"}
+ELSEWHERE = {"fitness of Gauss-Newton on the wing": 5e-3}
 
 
 def entry(values: Array) -> dict[str, Any]:

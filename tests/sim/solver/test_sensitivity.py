@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from wingfit.calibration.estimates.linearised import free_genes, linearise, unit_at
+from wingfit.calibration.estimates.linearised import free_genes, linearise, unit_at, values_at
 from wingfit.calibration.evaluator import units
 from wingfit.calibration.problem import Problem, base_genome
 from wingfit.inference.differences import TANGENT_STEP, differences
@@ -27,11 +27,11 @@ CONDITIONS = [vacuum(10.0, 0.05, 3.0), tunnel(0.12, 4.0, 6.0)]
 EXACT = Numerics(periodic=1e-11, max_beats=100)
 
 
-def moved(model: FlexibleWing, genome: Array, step: float) -> Array:
-    """``genome`` and, for each gene, the genome with that gene changed by ``step`` of its range."""
-    unit = np.array([float(gene.to_unit(value)) for gene, value in zip(model.genes, genome, strict=True)])
-    rows = np.vstack([unit, unit + step * np.eye(len(unit))])
-    return np.stack([gene.from_unit(column) for gene, column in zip(model.genes, rows.T, strict=True)], axis=1)
+def moved(model: FlexibleWing, genome: Array) -> Array:
+    """``genome`` and, for each gene, the genome with that gene changed by TANGENT_STEP of its range."""
+    genes = list(model.genes)
+    unit = unit_at(genes, genome)
+    return values_at(genes, np.vstack([unit, unit + TANGENT_STEP * np.eye(len(unit))]))
 
 
 def genome_of(model: FlexibleWing, *effects: str) -> Array:
@@ -39,24 +39,23 @@ def genome_of(model: FlexibleWing, *effects: str) -> Array:
     return np.array(base_genome(model, values).values)
 
 
-def by_derivatives(model: FlexibleWing, genome: Array, condition: Condition) -> Array:
-    """Derivatives [G, n, M, 3] of the tracks with respect to the genes."""
-    beats = model.tangent(genome).beats(moved(model, genome, TANGENT_STEP), blank_recording(WING, condition))
-    assert [beat.reason for beat in beats] == [None] * len(beats)
-    return np.array([(beat.tracks - beats[0].tracks) / TANGENT_STEP for beat in beats[1:]])
+def slopes(model: FlexibleWing, genome: Array, condition: Condition, step: float, sides: int = 2) -> Array:
+    """Derivatives [n, M, 3, G] of the tracks with respect to the genes, by differences of this step."""
+
+    def simulate(units: Array) -> tuple[list[Array], list[str | None]]:
+        beats = model.beats(values_at(list(model.genes), units), blank_recording(WING, condition))
+        return [np.array([beat.tracks for beat in beats])], [beat.reason for beat in beats]
+
+    unit = unit_at(list(model.genes), genome)
+    found = differences(simulate, unit, np.arange(len(unit)), step=step, sides=sides)
+    assert found.reasons == ()
+    return found.slopes[0]
 
 
 def by_differences(model: FlexibleWing, genome: Array, condition: Condition, steps: int) -> Array:
-    """The same by central differences of converged motions, extrapolated from two sizes of the differences."""
+    """Derivatives by central differences of converged motions, extrapolated from two sizes of the differences."""
     exact = replace(model, numerics=replace(EXACT, steps=steps))
-
-    def central(step: float) -> Array:
-        up, down = (
-            exact.beats(moved(exact, genome, sign * step)[1:], blank_recording(WING, condition)) for sign in (1, -1)
-        )
-        return np.array([(a.tracks - b.tracks) / (2 * step) for a, b in zip(up, down, strict=True)])
-
-    return (4 * central(5e-4) - central(1e-3)) / 3
+    return (4 * slopes(exact, genome, condition, 5e-4) - slopes(exact, genome, condition, 1e-3)) / 3
 
 
 @pytest.mark.parametrize("condition", CONDITIONS, ids=["vacuum", "tunnel"])
@@ -64,10 +63,10 @@ def by_differences(model: FlexibleWing, genome: Array, condition: Condition, ste
 def test_they_are_those_of_a_converged_motion(effects: tuple[str, ...], condition: Condition) -> None:
     model = FlexibleWing(WING, "4", effects=effects)
     genome = genome_of(model, *effects)
-    found = by_derivatives(model, genome, condition)
-    expected = by_differences(model, genome, condition, found.shape[1])
-    size = np.abs(expected).max(axis=(1, 2, 3))
-    error = np.abs(found - expected).max(axis=(1, 2, 3))
+    found = slopes(model.tangent(genome), genome, condition, TANGENT_STEP, sides=1)
+    expected = by_differences(model, genome, condition, len(found))
+    size = np.abs(expected).max(axis=(0, 1, 2))
+    error = np.abs(found - expected).max(axis=(0, 1, 2))
     assert (error <= 1e-4 * size + 1e-6).all(), dict(zip([g.name for g in model.genes], error / size, strict=True))
     strong = size > 0.1 * size.max()
     assert (error[strong] <= 3e-5 * size[strong]).all()
@@ -76,19 +75,17 @@ def test_they_are_those_of_a_converged_motion(effects: tuple[str, ...], conditio
 def test_a_step_a_thousand_times_larger_shows_the_same_derivative() -> None:
     """The step is no compromise between errors: a smaller or larger one changes the derivative by its own size only."""
     model = FlexibleWing(WING, "4")
-    genome, recording = genome_of(model), blank_recording(WING, CONDITIONS[1])
-    slopes = []
-    for step in (1e-6, 1e-5, 1e-4):
-        beats = model.tangent(genome).beats(moved(model, genome, step)[:4], recording)
-        slopes.append(np.array([(beat.tracks - beats[0].tracks) / step for beat in beats[1:]]))
-    for step, slope in zip((1e-5, 1e-4), slopes[1:], strict=True):
-        assert np.abs(slope - slopes[0]).max() <= (10 * step + 1e-5) * np.abs(slopes[0]).max()
+    genome = genome_of(model)
+    steps = (1e-6, 1e-5, 1e-4)
+    first, *others = (slopes(model.tangent(genome), genome, CONDITIONS[1], step, sides=1) for step in steps)
+    for step, found in zip(steps[1:], others, strict=True):
+        assert np.abs(found - first).max() <= (10 * step + 1e-5) * np.abs(first).max()
 
 
 def test_an_effect_that_is_off_has_none() -> None:
     model = FlexibleWing(WING, "4", effects=("added_mass",))
     genome = genome_of(model)
-    beats = model.tangent(genome).beats(moved(model, genome, TANGENT_STEP), blank_recording(WING, CONDITIONS[1]))
+    beats = model.tangent(genome).beats(moved(model, genome), blank_recording(WING, CONDITIONS[1]))
     off = [gene.name for gene, beat in zip(model.genes, beats[1:], strict=True) if beat.reason]
     assert off == ["added_mass.k"]
     assert beats[-1].reason == "an effect that is off has no derivative"
@@ -98,7 +95,7 @@ def test_one_that_has_not_settled_is_refused(monkeypatch: pytest.MonkeyPatch) ->
     model = FlexibleWing(WING, "4")
     genome = genome_of(model)
     monkeypatch.setattr(sensitivity, "MAX_BEATS", 1)
-    beats = model.tangent(genome).beats(moved(model, genome, TANGENT_STEP), blank_recording(WING, CONDITIONS[0]))
+    beats = model.tangent(genome).beats(moved(model, genome), blank_recording(WING, CONDITIONS[0]))
     assert beats[0].reason is None
     assert {beat.reason for beat in beats[1:]} >= {NO_DERIVATIVE}
     assert all(np.isnan(beat.tracks).all() for beat in beats if beat.reason)
@@ -108,7 +105,7 @@ def test_without_a_periodic_motion_there_is_none() -> None:
     """Neither the first nor its neighbours have a beat, and the reason is that of the simulation."""
     model = FlexibleWing(WING, "4", numerics=Numerics(max_beats=2, periodic=1e-9), effects=("viscoelastic",))
     genome = genome_of(model, "viscoelastic")
-    beats = model.tangent(genome).beats(moved(model, genome, TANGENT_STEP), blank_recording(WING, CONDITIONS[0]))
+    beats = model.tangent(genome).beats(moved(model, genome), blank_recording(WING, CONDITIONS[0]))
     assert all(beat.reason and "not periodic" in beat.reason for beat in beats)
 
 
@@ -131,14 +128,13 @@ def test_genes_without_one_are_differenced(effect: str, on: bool) -> None:
     found = linearise(problem, InProcessEvaluator(), unit)
 
     def simulate(rows: Array) -> tuple[list[Array], tuple[str | None, ...]]:
-        seen = problem.model.observe(
-            problem.genomes(np.stack([g.from_unit(c) for g, c in zip(genes, rows.T, strict=True)], axis=1)),
-            problem.recordings[0],
-        )
+        seen = problem.model.observe(problem.genomes(values_at(genes, rows)), problem.recordings[0])
         return [seen.channels], seen.reasons
 
     expected = differences(simulate, unit, np.arange(2)).slopes[0]
     assert found.known.all()
+    assert found.reasons == ()
+    assert np.isfinite(found.fitness)
     scale = np.abs(expected).max(axis=(0, 1))
     assert (np.abs(found.sensitivities[0] - expected).max(axis=(0, 1)) <= 0.1 * scale).all()
 
