@@ -19,6 +19,7 @@ from wingfit.calibration.estimates.linearised import (
     Linearised,
     beside_problem,
     free_genes,
+    initial_motion,
     linearise,
     residuals_of,
     stopped,
@@ -35,10 +36,10 @@ from wingfit.records import Gene
 from wingfit.records.array_types import Array
 from wingfit.records.blas_threads import one_blas_thread
 
-# Dampings tried at once, times the last successful one: two groups of lanes. Near 1 they lie densely, because valleys
-# of stiffnesses that compensate each other bend: a damping three times too small leaves the valley, one three times too
-# large makes tiny steps.
-DAMPINGS = 10.0 ** np.array([-4, -3, -2, -1.5, -1, -0.75, -0.5, -0.25, 0, 0.25, 0.5, 0.75, 1, 1.5, 2, 3])
+# Dampings tried at once, times the last successful one: two groups of lanes, with the present genome. Near 1 they lie
+# densely, because valleys of stiffnesses that compensate each other bend: a damping three times too small leaves the
+# valley, one three times too large makes tiny steps.
+DAMPINGS = 10.0 ** np.array([-4, -3, -2, -1.5, -1, -0.75, -0.5, -0.25, 0, 0.25, 0.5, 0.75, 1, 1.5, 3])
 FIRST_DAMPING, LEAST_DAMPING, LARGEST_DAMPING = 1e-3, 1e-4, 1e6  # of each gene's curvature
 LEAST_CURVATURE = 4.0  # that of a prior with half the range as standard deviation: an unidentifiable gene stays
 LEAST_GAIN = 1e-3  # of the decrease that the linearised problem predicts
@@ -98,14 +99,26 @@ class Estimate:
 class _State:
     """State between iterations: genes ``unit`` (scaled to 0..1), damping, and number of the last iteration.
 
-    ``flat`` counts the last successive iterations that lowered the cost by at most the fraction COST.
+    ``motion``: genes (scaled to 0..1) whose periodic motion is the initial motion of simulations. ``flat`` counts the
+    last successive iterations that lowered the cost by at most the fraction COST.
     """
 
     unit: tuple[float, ...]
+    motion: tuple[float, ...]
     damping: float = FIRST_DAMPING
     index: int = -1
     flat: int = 0
     converged: bool = False
+
+    @classmethod
+    def resumed(cls, checkpoint: dict[str, Any]) -> _State:
+        """Return the state of a ``checkpoint``; an old one without a motion goes on from that of its genes."""
+        unit = tuple(checkpoint["unit"])
+        return cls(**(checkpoint | {"unit": unit, "motion": tuple(checkpoint.get("motion", unit))}))
+
+    def saved(self) -> dict[str, Any]:
+        """Return the state as a checkpoint (JSON)."""
+        return asdict(self) | {"unit": list(self.unit), "motion": list(self.motion)}
 
 
 @dataclass(frozen=True)
@@ -147,9 +160,9 @@ def iterate(
     if checkpoint is None:
         first = unit_at(genes, np.array([start.get(gene.name, problem.base[gene.name]) for gene in genes]))
         first, before = placed(problem, evaluator, first)
-        state = _State(tuple(first.tolist()))
+        state = _State(tuple(first.tolist()), tuple(first.tolist()))
     else:
-        state = _State(**(checkpoint | {"unit": tuple(checkpoint["unit"])}))
+        state = _State.resumed(checkpoint)
     while not state.converged and state.index + 1 < iterations:
         step, state = _iteration(problem, evaluator, genes, state)
         yield replace(step, evaluations=step.evaluations + before)
@@ -191,16 +204,17 @@ def at_bounds(genes: list[Gene], values: Mapping[str, float]) -> tuple[str, ...]
 
 
 def _iteration(problem: Problem, evaluator: Evaluator, genes: list[Gene], state: _State) -> tuple[Step, _State]:
-    unit = np.array(state.unit)
-    problem = beside_problem(problem, values_at(genes, unit[None])[0])
-    linear = linearise(problem, evaluator, unit)
+    unit, motion = np.array(state.unit), np.array(state.motion)
+    problem = beside_problem(problem, values_at(genes, motion[None])[0])
+    linear = linearise(problem, evaluator, unit, motion)
     noise = [Noise.of(record, v) for record, v in zip(problem.recordings, linear.residuals, strict=True)]
     quadratic, power = _quadratic(noise, linear)
-    move = _better(problem, evaluator, unit, noise, quadratic, power, state.damping)
+    move = _better(problem, evaluator, unit, noise, quadratic, state.damping)
     stays = move.gain == 0.0
     flat = state.flat + 1 if move.decrease <= COST * 0.5 * power else 0
     converged = stays or (flat > 0 and move.step <= STEP) or flat > 1
-    after = _State(tuple(move.unit.tolist()), move.damping, state.index + 1, flat, converged)
+    motion = initial_motion(motion, move.unit)
+    after = _State(tuple(move.unit.tolist()), tuple(motion.tolist()), move.damping, state.index + 1, flat, converged)
     step = Step(
         index=after.index,
         values=dict(zip(problem.free, values_at(genes, move.unit[None])[0].tolist(), strict=True)),
@@ -212,7 +226,7 @@ def _iteration(problem: Problem, evaluator: Evaluator, genes: list[Gene], state:
         evaluations=linear.evaluations + move.evaluations,
         reasons=(*linear.reasons, *move.reasons),
         converged=converged,
-        checkpoint=asdict(after) | {"unit": list(after.unit)},
+        checkpoint=after.saved(),
     )
     return step, after
 
@@ -223,26 +237,27 @@ def _better(
     unit: Array,
     noise: list[Noise],
     quadratic: Quadratic,
-    power: float,
     damping: float,
 ) -> _Move:
     """Try steps with dampings around ``damping``, and return the best that lowers the cost; no move if none does.
 
     Larger dampings are tried until one succeeds or they reach a limit. ``unit`` [F]: present genes, scaled to
-    0..1. ``quadratic``: second-order model of the cost there; ``power``: sum of v^T R^-1 v there (v residuals, R
-    covariance in ``noise``).
+    0..1. ``quadratic``: second-order model of the cost there, with the
+    covariances of the residuals in ``noise``.
     """
     genes, evaluations, reasons = free_genes(problem), 0, list[str]()
     while True:
         dampings, scale = damping * DAMPINGS, np.diag(quadratic.curvature) + LEAST_CURVATURE
         steps = np.array([quadratic.step(unit, one * scale) for one in dampings])
         units = np.clip(unit + steps, 0.0, 1.0)
-        evaluation = evaluator.evaluate(problem, values_at(genes, units), residuals=True)
-        after = np.zeros(len(steps))
+        # The present genome is simulated again, in the same way: errors of the solver must not look like a decrease.
+        every = values_at(genes, np.vstack([units, unit]))
+        evaluation = evaluator.evaluate(problem, every, residuals=True)
+        after = np.zeros(len(every))
         for n, part in zip(noise, residuals_of(evaluation), strict=True):
             after += 0.5 * (n.whitened(part) ** 2).sum(axis=(1, 2))
-        trials = Trials.of(units, quadratic.decrease(steps), 0.5 * power, after, evaluation.reasons)
-        evaluations += len(steps)
+        trials = Trials.of(units, quadratic.decrease(steps), after[-1], after[:-1], evaluation.reasons[:-1])
+        evaluations += len(every)
         reasons += [reason for reason in evaluation.reasons if reason]
         k = trials.best(LEAST_GAIN)
         if k is not None:

@@ -21,6 +21,7 @@ from wingfit.sim.model import DifferentiableModel
 
 AT_BOUND = 1e-6  # in unit coordinates
 SHORTER = 0.125  # of the step, where both neighbours fail
+SAME_MOTION_DISTANCE = 0.05  # in unit coordinates: an initial motion of genes this near is reused
 
 
 @dataclass(frozen=True)
@@ -76,6 +77,14 @@ def residuals_of(evaluation: Evaluation) -> list[Array]:
     return [part for part in parts if part is not None]
 
 
+def initial_motion(before: Array, unit: Array) -> Array:
+    """Return the genes [F], scaled to 0..1, from whose motion simulations near ``unit`` [F] start.
+
+    Those are ``before`` [F], from whose motion earlier simulations started, as long as they are near.
+    """
+    return before if np.abs(unit - before).max() <= SAME_MOTION_DISTANCE else unit
+
+
 def beside_problem(problem: Problem, values: Array) -> Problem:
     """Return ``problem`` with simulations that start from the motion at ``values`` [F] of the free genes."""
     if not isinstance(problem.model, DifferentiableModel):
@@ -93,9 +102,10 @@ def tangent_problem(problem: Problem, values: Array) -> Problem | None:
     return replace(problem, model=problem.model.tangent(problem.genomes(values)[0]))
 
 
-def linearise(problem: Problem, evaluator: Evaluator, unit: Array) -> Linearised:
+def linearise(problem: Problem, evaluator: Evaluator, unit: Array, motion: Array | None = None) -> Linearised:
     """Linearise about ``unit`` [F], genes scaled to 0..1.
 
+    ``motion`` [F]: genes from whose motion derivatives start (:func:`initial_motion`); None: ``unit``.
     ValueError if the genome there cannot be simulated. A model that is differentiable is differentiated in steps of
     TANGENT_STEP; for the genes that have no derivative, and for other models, central differences are taken. Their
     steps end at the bounds, and a displaced genome that fails is replaced by the one at ``unit``, so that differences
@@ -111,7 +121,8 @@ def linearise(problem: Problem, evaluator: Evaluator, unit: Array) -> Linearised
 
         return simulate
 
-    simulate, tangent = simulated_by(problem), tangent_problem(problem, values_at(genes, unit[None])[0])
+    near = unit if motion is None else motion
+    simulate, tangent = simulated_by(problem), tangent_problem(problem, values_at(genes, near[None])[0])
     found = derivatives(simulate, simulated_by(tangent) if tangent else None, unit, every)
     found = with_more(found, simulate, unit, every, step=STEP * SHORTER)
     # The first batch begins with the point itself; if it cannot be differentiated, so does the second.

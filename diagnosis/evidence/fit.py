@@ -13,7 +13,7 @@ from functools import partial
 
 import numpy as np
 
-from wingfit.calibration.estimates.linearised import free_genes, tangent_problem, values_at
+from wingfit.calibration.estimates.linearised import free_genes, initial_motion, tangent_problem, values_at
 from wingfit.calibration.problem import Problem
 from wingfit.diagnosis.evidence.context import FitContext
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
@@ -33,7 +33,6 @@ RELATIVE_TOLERANCE = 2e-3  # of the weighted chi-squared; a fit has converged wh
 COST_TOLERANCE = 0.3  # least decrease of the cost that is worth another step
 SLOW_FACTOR = 5.0  # times these: a step that gains less is slow, as the valley is curved or the Jacobian inexact
 ACCELERATION_STEP = 0.02  # of the box: length along a step over which the second derivative is measured
-SAME_MOTION_DISTANCE = 0.05  # of the box: an initial motion of genes this near is reused
 FAILED_COEFFICIENT = 1e12  # coefficient of an individual that cannot be simulated
 
 
@@ -272,7 +271,7 @@ def _step(simulator: _Simulator, fit: Fit, *, accelerated: bool = False) -> tupl
         jacobian,
         tuple(r[k] for r in residuals),
         float(fit.cost - trials.decrease[k]),
-        fit.motion_genes if np.abs(units[k] - fit.motion_genes).max() <= SAME_MOTION_DISTANCE else units[k],
+        initial_motion(fit.motion_genes, units[k]),
         float(damped.own[k]) if k < len(damped.own) else fit.damping,
     )
     return better, trials.gain(k)

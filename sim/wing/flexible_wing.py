@@ -213,7 +213,7 @@ class FlexibleWing:
 
     @cached_property
     def _plain_wing(self) -> FlexibleWing:
-        return self._share_structure(replace(self, effects=(), probe=None))
+        return self._share_structure(replace(self, effects=(), probe=None, differentiates=False))
 
     @cached_property
     def _plain_key(self) -> bytes:
