@@ -209,7 +209,7 @@ def _iteration(problem: Problem, evaluator: Evaluator, genes: list[Gene], state:
     linear = linearise(problem, evaluator, unit, motion)
     noise = [Noise.of(record, v) for record, v in zip(problem.recordings, linear.residuals, strict=True)]
     quadratic, power = _quadratic(noise, linear)
-    move = _better(problem, evaluator, unit, noise, quadratic, state.damping)
+    move = _better(problem, evaluator, unit, noise, quadratic, power, state.damping)
     stays = move.gain == 0.0
     flat = state.flat + 1 if move.decrease <= COST * 0.5 * power else 0
     converged = stays or (flat > 0 and move.step <= STEP) or flat > 1
@@ -237,13 +237,14 @@ def _better(
     unit: Array,
     noise: list[Noise],
     quadratic: Quadratic,
+    power: float,
     damping: float,
 ) -> _Move:
     """Try steps with dampings around ``damping``, and return the best that lowers the cost; no move if none does.
 
     Larger dampings are tried until one succeeds or they reach a limit. ``unit`` [F]: present genes, scaled to
-    0..1. ``quadratic``: second-order model of the cost there, with the
-    covariances of the residuals in ``noise``.
+    0..1. ``quadratic``: second-order model of the cost there; ``power``: sum of v^T R^-1 v there (v residuals, R
+    covariance in ``noise``), which counts if the present genome fails from the initial motion of the trials.
     """
     genes, evaluations, reasons = free_genes(problem), 0, list[str]()
     while True:
@@ -256,7 +257,8 @@ def _better(
         after = np.zeros(len(every))
         for n, part in zip(noise, residuals_of(evaluation), strict=True):
             after += 0.5 * (n.whitened(part) ** 2).sum(axis=(1, 2))
-        trials = Trials.of(units, quadratic.decrease(steps), after[-1], after[:-1], evaluation.reasons[:-1])
+        now = float(after[-1]) if evaluation.reasons[-1] is None else 0.5 * power
+        trials = Trials.of(units, quadratic.decrease(steps), now, after[:-1], evaluation.reasons[:-1])
         evaluations += len(every)
         reasons += [reason for reason in evaluation.reasons if reason]
         k = trials.best(LEAST_GAIN)

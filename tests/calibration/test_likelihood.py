@@ -16,6 +16,10 @@ from wingfit.calibration.problem import Problem, base_genome, compared, misfit
 from wingfit.inference.differences import STEP
 from wingfit.records import Dataset, Genome, Recording
 from wingfit.sim.model import Array, Observation
+from wingfit.sim.solver.numerics import Numerics
+from wingfit.sim.solver.settle import Course, Subject
+from wingfit.sim.solver.simulate import settled_course
+from wingfit.sim.wing import flexible_wing
 from wingfit.sim.wing.flexible_wing import FlexibleWing
 from wingfit.workers.in_process import InProcessEvaluator
 
@@ -152,6 +156,29 @@ def test_a_finished_iteration_is_not_taken_up_again() -> None:
     assert list(iterate(given, HERE, {}, run(given)[-1].checkpoint)) == []
 
 
+def test_a_checkpoint_without_an_initial_motion_goes_on_from_its_genes() -> None:
+    given, start = pendulum.problem(), {"length": 0.6, "damping": 1.0}
+    whole = list(iterate(given, HERE, start))
+    old = {name: value for name, value in whole[0].checkpoint.items() if name != "motion"}
+    assert list(iterate(given, HERE, {}, old)) == whole[1:]
+
+
+def test_steps_are_judged_where_the_present_genome_fails_beside_them() -> None:
+    class Stubborn(Linear):
+        def observe(self, genomes: Array, recording: Recording) -> Observation:
+            found = super().observe(genomes, recording)
+            if len(genomes) == 1 or (genomes[-1] != 1.0).any():  # the start comes last, beside the steps from it
+                return found
+            found.channels[-1] = np.nan
+            return Observation(found.channels, (*found.reasons[:-1], "broken"))
+
+    record = recorded(white())
+    expected = np.linalg.lstsq(Linear().shapes(record)[:, 0], record.values[:, 0], rcond=None)[0]
+    steps = run(problem(record, Stubborn()))
+    assert "broken" in steps[0].reasons
+    assert list(steps[-1].values.values()) == pytest.approx(expected, abs=1e-8)
+
+
 def test_noise_free_data_are_fitted_and_nothing_breaks() -> None:
     found = estimate(problem(recorded(np.zeros((300, 2)), "xz")), HERE, {"a": -3.0})
     assert found.values == pytest.approx(TRUTH, abs=1e-6)
@@ -197,6 +224,24 @@ def test_a_wing_converges_from_its_estimates(small: tuple[Dataset, Genome]) -> N
     for name in names:
         off = np.log(steps[-1].values[name] / truth[name])
         assert abs(off) < 4 * known.standing[name].standard_error, name
+
+
+def test_an_initial_motion_is_settled_once_and_kept(
+    small: tuple[Dataset, Genome], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    dataset, truth = small
+    settled: list[Array] = []
+
+    def counted(subject: Subject, genome: Array, numerics: Numerics) -> Course | None:
+        settled.append(genome)
+        return settled_course(subject, genome, numerics)
+
+    monkeypatch.setattr(flexible_wing, "settled_course", counted)
+    names = ("E_r", "G_f")
+    base = base_genome(FlexibleWing(dataset.wing, "4"), truth.as_dict() | {"E_r": 1.01 * truth["E_r"]})
+    given = Problem(FlexibleWing(dataset.wing, "4"), (dataset.recordings[0],), names, base)
+    assert len(run(given, base.as_dict())) > 1
+    assert len(settled) == 1
 
 
 def test_several_dampings_are_tried_at_once() -> None:
