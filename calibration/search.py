@@ -14,6 +14,7 @@ from wingfit.calibration.genetic import FAILED
 from wingfit.calibration.preparation import Prepared, prepare
 from wingfit.calibration.problem import Problem, base_genome
 from wingfit.calibration.spec import CalibrationSpec, model_for, resolved
+from wingfit.calibration.starts import SEARCHED, End, Ends, apart
 from wingfit.records import Dataset, Gene
 from wingfit.records.array_types import Array
 from wingfit.records.blas_threads import one_blas_thread
@@ -74,11 +75,13 @@ def calibrate(
         run = _Run(ready, state, evaluator)
         if spec.method != "gauss_newton":
             yield from run.search()
-        if spec.method == "gauss_newton" or spec.finish:
+        if spec.method == "auto":
+            yield from run.starts()
+        elif spec.method == "gauss_newton" or spec.finish:
             yield from run.iterations()
         if spec.mode != "local":
             state.base |= {name: state.found[run.stage.name][name] for name in run.stage.free}
-        state.stage, state.population, state.newton = state.stage + 1, _empty(spec), None
+        state.stage, state.population, state.newton, state.ends = state.stage + 1, _empty(spec), None, Ends()
 
 
 def found(spec: CalibrationSpec, dataset: Dataset, checkpoint: dict[str, Any]) -> dict[str, dict[str, float]]:
@@ -91,7 +94,8 @@ class _State:
     """State of a calibration between generations, from which it continues; ``stage`` is the number of the stage.
 
     ``base`` is the genome from which the stage starts, ``population`` the state of its search, ``found`` the best
-    genome of each stage, ``newton`` the checkpoint of its Gauss-Newton iterations (None before the first).
+    genome of each stage, ``newton`` the checkpoint of its Gauss-Newton iterations (None before the first), ``ends``
+    those of a method that has several starts.
     """
 
     stage: int
@@ -101,6 +105,7 @@ class _State:
     progress: float = 0.0
     found: dict[str, dict[str, float]] = field(default_factory=dict)
     newton: dict[str, Any] | None = None
+    ends: Ends = field(default_factory=Ends)
 
     @classmethod
     def start(cls, spec: CalibrationSpec, model: Model) -> _State:
@@ -110,11 +115,14 @@ class _State:
     def from_json(cls, state: dict[str, Any], spec: CalibrationSpec) -> _State:
         population = type(_empty(spec))(**state["population"])
         found = {name: dict(genome) for name, genome in state["found"].items()}
-        return cls(**dict(state) | {"population": population, "base": dict(state["base"]), "found": found})
+        ends = Ends(**state.get("ends", {}))
+        own = {"population": population, "base": dict(state["base"]), "found": found, "ends": ends}
+        return cls(**dict(state) | own)
 
     def as_json(self) -> dict[str, Any]:
         found = {name: dict(genome) for name, genome in self.found.items()}
-        return vars(self) | {"population": dict(vars(self.population)), "base": dict(self.base), "found": found}
+        own = {"population": dict(vars(self.population)), "base": dict(self.base), "ends": dict(vars(self.ends))}
+        return vars(self) | own | {"found": found}
 
 
 def _empty(spec: CalibrationSpec) -> Population:
@@ -144,6 +152,24 @@ class _Run:
             limit = min(ITERATIONS, self.spec.max_generations)
         for step in iterate(self.problem, self.evaluator, start, self.state.newton, limit):
             yield self._iteration(step, step.converged or step.index + 1 >= limit)
+
+    def starts(self) -> Iterator[Generation]:
+        """Yield Gauss-Newton iterations from the best individuals of the search until two starts end at one cost.
+
+        The best genome is that of the least cost so far; the checkpoint of a start's last iteration ends it.
+        """
+        population, ends = self.state.population, self.state.ends
+        if not isinstance(population, genetic.Population):
+            raise TypeError("starts are taken from a genetic search")
+        chosen = apart(population)
+        while len(ends.done) < len(chosen) and not ends.agreed:
+            start = _named(self.genes, chosen[len(ends.done)])
+            for step in iterate(self.problem, self.evaluator, start, ends.newton):
+                best = ends.best()
+                ends.add(step, step.converged or step.index + 1 >= ITERATIONS)
+                if best is None or step.cost < best.cost:
+                    best = End.of(step)
+                yield self._start(step, best, len(chosen))
 
     def _generation(self) -> Generation:
         """Compute one generation: draw individuals, simulate them, and update the population."""
@@ -181,11 +207,20 @@ class _Run:
     def _iteration(self, step: Step, last: bool) -> Generation:
         self.state.newton = step.checkpoint
         searched = 1.0 - FINISHING if self.spec.method != "gauss_newton" else 0.0
-        done = step.index + 1
-        part = 1.0 if last else searched + (1.0 - searched) * done / max(done + 1, EXPECTED_ITERATIONS)
+        part = 1.0 if last else _share(step.index + 1, EXPECTED_ITERATIONS, searched)
         return self._seen(
             self.state.base | step.values, step.evaluations, (self.state.stage + part) / len(self.stages),
             self.stage.name + NEWTON, step.index, step.fitness, step.fitness, step.step, step.distance,
+            list(step.reasons),
+        )  # fmt: skip
+
+    def _start(self, step: Step, best: End, starts: int) -> Generation:
+        """Report an iteration from one of several ``starts``; ``best``: the least cost so far, which may be its own."""
+        ends = self.state.ends
+        part = 1.0 if ends.agreed or len(ends.done) == starts else _share(ends.iterations, 2 * EXPECTED_ITERATIONS)
+        return self._seen(
+            self.state.base | best.values, step.evaluations, (self.state.stage + part) / len(self.stages),
+            self.stage.name + NEWTON, ends.iterations - 1, best.fitness, step.fitness, step.step, best.distance,
             list(step.reasons),
         )  # fmt: skip
 
@@ -221,13 +256,23 @@ class _Run:
         population, spec = self.state.population, self.spec
         done = population.generation + 1
         left = 0 if _ended(population, spec) else max(spec.stall - population.stall, EXPECTED_GENERATIONS - done)
-        total = min(done + left, spec.max_generations)
-        share = 1.0 - FINISHING if spec.finish else 1.0
+        total = min(done + left, _most(spec))
+        share = 1.0 - FINISHING if spec.finish or spec.method == "auto" else 1.0
         return (self.state.stage + share * (done / total)) / len(self.stages)
 
 
+def _share(done: int, expected: int, before: float = 1.0 - FINISHING) -> float:
+    """Estimate the finished part of a stage with ``done`` of ``expected`` iterations, after the part ``before``."""
+    return before + (1.0 - before) * done / max(done + 1, expected)
+
+
 def _ended(population: Population, spec: CalibrationSpec) -> bool:
-    return population.stall >= spec.stall or population.generation + 1 >= spec.max_generations
+    return population.stall >= spec.stall or population.generation + 1 >= _most(spec)
+
+
+def _most(spec: CalibrationSpec) -> int:
+    """Return the largest number of generations of a search."""
+    return min(SEARCHED, spec.max_generations) if spec.method == "auto" else spec.max_generations
 
 
 def _leader(population: Population) -> tuple[float, float, list[float]]:

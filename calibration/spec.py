@@ -13,7 +13,7 @@ from wingfit.sim.vehicle.terms import chosen
 from wingfit.sim.wing.flexible_wing import FlexibleWing
 
 Mode = Literal["staged", "joint", "local"]
-Method = Literal["genetic", "cma_es", "gauss_newton"]
+Method = Literal["genetic", "cma_es", "gauss_newton", "auto"]
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,8 @@ class CalibrationSpec:
         recordings: names of recordings to fit; empty means all that are not held out.
         genes: names of genes to search; empty means those that the model searches by default.
         fixed: values, by name, of genes that are not searched and have these values instead of their estimates.
-        method: how a stage is searched. None: genetic for a wing, Gauss-Newton for a vehicle.
+        method: how a stage is searched. None: genetic for a wing, Gauss-Newton for a vehicle. "auto": a short genetic
+            search, then Gauss-Newton from its best individuals (:mod:`wingfit.calibration.starts`).
         finish: whether Gauss-Newton follows each stage's search.
         preset: blade-element model (:data:`wingfit.sim.vehicle.terms.PRESETS`); for vehicles only.
         without: names of terms of the preset that are omitted.

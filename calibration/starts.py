@@ -1,0 +1,76 @@
+"""Gauss-Newton from several starts: from the best of a population, until two of them end at the same least cost.
+
+Gauss-Newton ends at the minimum of the valley in which it starts. The best individuals of a short search that lie well
+apart are tried in turn; that two of them agree about the least cost is taken as a sign that it is the least of all.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import numpy as np
+
+from wingfit.calibration.estimates.likelihood import Step
+from wingfit.calibration.genetic import Population
+
+SEARCHED = 8  # generations of the search before
+MOST = 5  # starts
+APART = 0.1  # largest difference of a gene between two starts, genes scaled to 0..1
+AGREE = 1.0  # difference of two costs that count as the same: data do not tell a smaller one of the log-likelihood
+
+
+@dataclass(frozen=True)
+class End:
+    """Where Gauss-Newton is from one start: ``cost`` J, sum of squares and misfit (m or N), and values by name."""
+
+    cost: float
+    fitness: float
+    distance: float
+    values: dict[str, float]
+
+    @classmethod
+    def of(cls, step: Step) -> End:
+        """Return where an iteration ended; its cost is that before the iteration, which is the last of a start."""
+        return cls(step.cost, step.fitness, step.distance, step.values)
+
+
+@dataclass
+class Ends:
+    """Progress from start to start; plain numbers, stored as part of a checkpoint.
+
+    ``done``: ends of the starts that have converged; ``newton``: checkpoint of the iterations of the present one;
+    ``iterations``: number of iterations of all starts so far.
+    """
+
+    done: list[dict[str, Any]] = field(default_factory=list)
+    newton: dict[str, Any] | None = None
+    iterations: int = 0
+
+    def best(self) -> End | None:
+        """Return the end with the least cost; None before the first start has converged."""
+        ends = [End(**one) for one in self.done]
+        return min(ends, key=lambda end: end.cost) if ends else None
+
+    def add(self, step: Step, last: bool) -> None:
+        """Take one more iteration; ``last``: with it, a start has ended."""
+        self.newton, self.iterations = step.checkpoint, self.iterations + 1
+        if last:
+            self.done, self.newton = [*self.done, asdict(End.of(step))], None
+
+    @property
+    def agreed(self) -> bool:
+        """Whether two starts have ended at the least cost."""
+        costs = sorted(one["cost"] for one in self.done)
+        return len(costs) > 1 and bool(costs[1] - costs[0] <= AGREE)
+
+
+def apart(population: Population) -> list[list[float]]:
+    """Return up to MOST individuals (genes scaled to 0..1), best first, that lie APART from each other."""
+    chosen: list[list[float]] = []
+    for unit in population.unit:
+        if all(np.abs(np.subtract(unit, other)).max() >= APART for other in chosen):
+            chosen.append(unit)
+        if len(chosen) == MOST:
+            break
+    return chosen
