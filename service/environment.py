@@ -12,7 +12,7 @@ PREFIX = "WINGFIT_"
 OF_CLIENTS = ("URL", "API_KEY")
 OF_COMPOSE = ("CPUS_PER_WORKER", "WORKER_MEMORY", "API_MEMORY", "HEAD_MEMORY", "PIDS", "IMAGE")
 OF_SLURM = ("VENV", "STATE", "SCRATCH", "BACKUP_SECONDS", "RAY_PORT", "RAY_OPTIONS", "HEAD_CPUS")
-OF_TESTS = ("FAIL_POINT", "TEST_NODE", "FUZZ_GOOD")
+OF_TESTS = ("FAIL_POINT", "TEST_NODE", "FUZZ_GOOD", "LANES")
 OF_OTHERS = frozenset(f"{PREFIX}{name}" for name in (*OF_CLIENTS, *OF_COMPOSE, *OF_SLURM, *OF_TESTS))
 # Kubernetes sets these in every container for each Service whose name begins with "wingfit".
 OF_KUBERNETES = re.compile(

@@ -1,4 +1,4 @@
-"""Rosenbrock integration of the wing over a beat, for eight individuals at a time.
+"""Rosenbrock integration of the wing over a beat, for LANES individuals at a time.
 
 The method is RODAS4P2 (Steinebach, *Improvement of Rosenbrock-Wanner Method RODASP*, 2020): six stages, fourth order,
 L-stable, stiffly accurate, without order reduction on stiff problems and robust to an inexact Jacobian. The Jacobian is

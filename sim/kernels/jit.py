@@ -19,13 +19,15 @@ from typing import Any, TypeVar, cast
 
 import numba
 
+from wingfit.sim.kernels import LANES
+
 F = TypeVar("F", bound=Callable[..., object])
 
 _MAX_VERSIONS = 8  # versions of the kernels whose compiled code is stored
 
 
 def kernel(function: F) -> F:
-    """Compile ``function``, which works on arrays of eight individuals and allocates no array, and cache it on disk.
+    """Compile ``function``, which works on arrays of LANES individuals and allocates no array, and cache it on disk.
 
     The cache depends on the source of all kernels. The function is compiled without reference counting, which would
     take a third of the time of a small wing's step. Functions that allocate or copy whole arrays need
@@ -79,10 +81,11 @@ def inlined(function: F) -> F:
 def _cache_folder(source: Path) -> Path:
     """Create, if needed, and return the cache folder for the kernels of ``source``, a file or folder.
 
-    It is named after a hash of the sources: those of this folder and of ``source``, which means all files of a folder,
-    or a file and its neighbours whose names start with an underscore (shared code). OSError if no folder is writable.
+    It is named after a hash of LANES and of the sources: those of this folder and of ``source``, which means all files
+    of a folder, or a file and its neighbours whose names start with an underscore (shared code). OSError if no folder
+    is writable.
     """
-    digest = hashlib.sha256()
+    digest = hashlib.sha256(f"{LANES} lanes".encode())
     alone = source.is_file()
     own = {source, *source.parent.glob("_*.py")} if alone else set(source.glob("*.py"))
     for file in sorted({*own, *Path(__file__).resolve().parent.rglob("*.py")}):

@@ -31,6 +31,8 @@ from wingfit.sim.vehicle.sampling import basis_of, passed, phases, series_of
 from wingfit.sim.vehicle.terms import SEARCHED, TERMS, chosen
 
 ADDED_MASS_POINT = 0.5  # d, chords: point whose acceleration the added mass has (Armanini et al. 2016, below Eq. 19)
+MULTIPLE = 8  # of instants, on any processor
+BLOCK = 8  # individuals whose forces stay in the cache
 _MAX_MOTIONS = 64  # per recording, whose elements are cached
 _DEFINITION = ("vehicle", "terms", "elements", "instants", "peel_width", "effects")
 
@@ -55,10 +57,10 @@ class BladeElementWing:
         for name in self.terms:
             if name not in TERMS:
                 raise ValueError(f"unknown term {name!r}; there are {', '.join(TERMS)}")
-        if self.elements < 1 or self.instants < LANES or self.instants % LANES:
+        if self.elements < 1 or self.instants < 1 or self.instants % MULTIPLE:
             raise ValueError(
                 f"{self.elements} elements and {self.instants} instants; there must be at least one element, and a "
-                f"positive multiple of {LANES} instants"
+                f"positive multiple of {MULTIPLE} instants"
             )
         if not 0 <= self.peel_width <= 0.5:
             raise ValueError(f"peel_width is {self.peel_width:g} beats; it must lie in [0, 0.5]")
@@ -106,8 +108,8 @@ class BladeElementWing:
         batch = genome_batch(self.genes, genomes)
         out = np.empty((len(batch), 2, self.instants))
         for effects, members in self._by_active_effects(batch):
-            for start in range(0, len(members), LANES):  # blocks that stay in the cache
-                block = members[start : start + LANES]
+            for start in range(0, len(members), BLOCK):
+                block = members[start : start + BLOCK]
                 if effects:
                     weights, rows, added = self._rows_with_effects(effects, batch[block], recording)
                     out[block] = [_sum(w, row) + more for w, row, more in zip(weights, rows, added, strict=True)]

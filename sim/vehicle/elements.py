@@ -89,9 +89,9 @@ def _element_forces(
     motion: Array, side: Side, r: Array, chord: Array, mass: Array, rho: float, loading: Array, constants: Constants,
     out: Array,
 ) -> None:  # fmt: skip
-    """Add to ``out`` [7, 2, n / 8, 8] the forces (N, body x and z) of one wing at n instants, in the order of ROWS.
+    """Add to ``out`` [7, 2, n / W, W] the forces (N, body x and z) of one wing at n instants, in the order of ROWS.
 
-    ``motion`` [14, n / 8, 8]: rows FLAP_RATE to DOWNWARD; ``rho``: density of the air, kg/m^3; ``mass`` [E] and
+    ``motion`` [14, n / W, W]: rows FLAP_RATE to DOWNWARD; ``rho``: density of the air, kg/m^3; ``mass`` [E] and
     ``loading`` [E]: of this individual; others as in :func:`wing_forces`.
     """
     dr, d = constants.width, constants.point
@@ -169,7 +169,7 @@ def curve_drag(alpha: float) -> float:
 def _curve_forces(
     motion: Array, side: Side, r: Array, chord: Array, rho: float, loading: Array, constants: Constants, out: Array
 ) -> None:
-    """Add to ``out`` [2, 2, n / 8, 8] forces (N, body x and z) by measured steady curves, in the order of CURVE_ROWS.
+    """Add to ``out`` [2, 2, n / W, W] forces (N, body x and z) by measured steady curves, in the order of CURVE_ROWS.
 
     The curves of lift and drag were measured on a revolving wing; the angle of attack is folded into 0 to 90 degrees.
     Arguments as in :func:`_element_forces`.
@@ -202,9 +202,9 @@ def wing_forces(
     motion: Array, side: Side, r: Array, chord: Array, mass: Array, density: Array, loading: Array,
     constants: Constants, out: Array,
 ) -> None:  # fmt: skip
-    """Add the forces of one wing of each of B individuals to ``out`` [B, 7 or 9, 2, n / 8, 8] along body x and z, N.
+    """Add the forces of one wing of each of B individuals to ``out`` [B, 7 or 9, 2, n / W, W] along body x and z, N.
 
-    ``motion`` [B, 14, n / 8, 8]: rows FLAP_RATE to DOWNWARD; ``r`` [E]: distances of E elements from the flapping axis
+    ``motion`` [B, 14, n / W, W]: rows FLAP_RATE to DOWNWARD; ``r`` [E]: distances of E elements from the flapping axis
     in equal steps, m; ``chord`` [E], m; ``mass`` [B, E] of the wing per length, kg/m; ``density`` [B] of the air,
     kg/m^3; ``loading`` [B, E]: factor on the circulation. ``out`` is in the order of ROWS, then of CURVE_ROWS if it has
     9 rows.

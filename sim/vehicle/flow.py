@@ -8,10 +8,9 @@ from functools import cached_property
 import numpy as np
 
 from wingfit.records.array_types import Array
-from wingfit.sim.kernels import LANES
 from wingfit.sim.vehicle import stations
 from wingfit.sim.vehicle.elements import FORWARD, Side
-from wingfit.sim.vehicle.stations import Stations
+from wingfit.sim.vehicle.stations import STATIONS, Stations
 
 
 @dataclass
@@ -69,7 +68,7 @@ class StationedWings:
     @cached_property
     def turns(self) -> tuple[Array, Array]:
         """Cosine and sine of the wing's pitch at the stations, [B, n, 8] each."""
-        cosine, sine = np.empty((2, *self.turning.shape, LANES))
+        cosine, sine = np.empty((2, *self.turning.shape, STATIONS))
         stations.station_turns(self.sides[0][0], cosine, sine)
         return cosine, sine
 
@@ -80,7 +79,7 @@ class StationedWings:
 
     def flow(self, forward: Array) -> Flow:
         """Quasi-steady flow at the stations in a stream of ``forward`` [B, n] (m/s) along body x, set in ``sides``."""
-        flow = Flow(*np.empty((4, len(self.sides), *self.turning.shape, LANES)))
+        flow = Flow(*np.empty((4, len(self.sides), *self.turning.shape, STATIONS)))
         for k, (rows, side) in enumerate(self.sides):
             rows[:, FORWARD] = forward
             stations.station_velocities(rows, side, self.places.r, *self.turns, flow.along[k], flow.normal[k])

@@ -12,8 +12,9 @@ import numpy as np
 from wingfit.records.array_types import Array
 from wingfit.sim.kernels import LANES
 from wingfit.sim.kernels.jit import allocating, inlined, kernel
-from wingfit.sim.kernels.lanes.vector import Vector, greatest, least, load0, load1, magnitude, root, store0, store1
+from wingfit.sim.kernels.lanes.vector import Vector, greatest, least, load, load0, load1, magnitude, root, store, store0
 from wingfit.sim.vehicle.elements import STILL
+from wingfit.sim.vehicle.stations import GROUPS
 
 _MIN_DECAY = 1e-9  # of a state in a step: in still air the state is the mean of its target
 _ROUNDS = 60  # iterations for the mean inflow, without its correlation with the force
@@ -47,21 +48,22 @@ def followed(speed: Array, share: Array, target: Array, step: float, out: Array)
     start, kept = np.zeros(LANES), np.ones(LANES)
     for k in range(len(speed)):
         for b in range(speed.shape[1]):
-            half = load0(share[b]) * (0.5 * step)
             V, y, found = speed[k, b], target[k, b], out[k, b]
-            for again in range(2):
-                x = load0(start) * float(again)
-                product = x * 0.0 + 1.0
-                for t in range(n):
-                    if again:
-                        store1(found, t, x)
-                    later = t + 1 if t + 1 < n else 0
-                    decay, old, new = _step(load1(V, t) * half, load1(V, later) * half)
-                    x = x * decay + load1(y, t) * old + load1(y, later) * new
-                    product *= decay
-                store0(kept, product)
-                if not again:
-                    store0(start, x / (1.0 - product))
+            for g in range(GROUPS):
+                half = load1(share[b], g) * (0.5 * step)
+                for again in range(2):
+                    x = load0(start) * float(again)
+                    product = x * 0.0 + 1.0
+                    for t in range(n):
+                        if again:
+                            store(found, t, g, x)
+                        later = t + 1 if t + 1 < n else 0
+                        decay, old, new = _step(load(V, t, g) * half, load(V, later, g) * half)
+                        x = x * decay + load(y, t, g) * old + load(y, later, g) * new
+                        product *= decay
+                    store0(kept, product)
+                    if not again:
+                        store0(start, x / (1.0 - product))
 
 
 @inlined
@@ -107,15 +109,17 @@ def steady_attachment(
         for b in range(speed.shape[1]):
             angle, width, advance = stall[b]
             x, z, V = along[k, b], normal[k, b], speed[k, b]
-            lead = load0(chord) * (advance * 0.5 / step)
             for t in range(n):
                 before, after = t - 1 if t else n - 1, t + 1 if t + 1 < n else 0
-                vx, vz, v = load1(x, t), load1(z, t), load1(V, t)
-                turned = vx * (load1(z, after) - load1(z, before)) - vz * (load1(x, after) - load1(x, before))
-                both = vx * vz
-                turned *= both / (magnitude(both) + STILL)  # folded: it rises where the flow turns to the normal
-                late = _angle(vx, vz, v) - turned * lead / (v * v * v)
-                store1(out[k, b], t, _logistic((late - angle) / width))
+                for g in range(GROUPS):
+                    lead = load1(chord, g) * (advance * 0.5 / step)
+                    vx, vz, v = load(x, t, g), load(z, t, g), load(V, t, g)
+                    rise, gain = load(z, after, g) - load(z, before, g), load(x, after, g) - load(x, before, g)
+                    turned = vx * rise - vz * gain
+                    both = vx * vz
+                    turned *= both / (magnitude(both) + STILL)  # folded: it rises where the flow turns to the normal
+                    late = _angle(vx, vz, v) - turned * lead / (v * v * v)
+                    store(out[k, b], t, g, _logistic((late - angle) / width))
 
 
 @kernel
@@ -130,9 +134,10 @@ def separate(attached: Array, share: Array, rotation: Array, circulation: Array)
         for b in range(len(share)):
             lost, found, turned = share[b], circulation[k, b], rotation[b]
             for t in range(attached.shape[2]):
-                half = root(greatest(load1(attached[k, b], t), 0.0)) * 0.5 + 0.5
-                stays = load1(turned, t)
-                store1(found, t, (load1(found, t) - stays) * (half * half * lost + (1.0 - lost)) + stays)
+                for g in range(GROUPS):
+                    half = root(greatest(load(attached[k, b], t, g), 0.0)) * 0.5 + 0.5
+                    stays = load(turned, t, g)
+                    store(found, t, g, (load(found, t, g) - stays) * (half * half * lost + (1.0 - lost)) + stays)
 
 
 @kernel
@@ -146,10 +151,11 @@ def overtake(wing: Array, share: Array, wake: Array) -> None:
         for b in range(len(share)):
             part = share[b]
             for t in range(wake.shape[2]):
-                u, w = load1(wing[k, b], t), load1(wake[k, b], t)
-                ahead = greatest(greatest(w, 0.0) - greatest(u, 0.0), 0.0)
-                behind = least(least(w, 0.0) - least(u, 0.0), 0.0)
-                store1(wake[k, b], t, (ahead + behind) * part)
+                for g in range(GROUPS):
+                    u, w = load(wing[k, b], t, g), load(wake[k, b], t, g)
+                    ahead = greatest(greatest(w, 0.0) - greatest(u, 0.0), 0.0)
+                    behind = least(least(w, 0.0) - least(u, 0.0), 0.0)
+                    store(wake[k, b], t, g, (ahead + behind) * part)
 
 
 @kernel

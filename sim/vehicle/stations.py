@@ -1,7 +1,8 @@
 """The flow at eight stations along each wing over the beat, for effects that change the flow, and the resulting forces.
 
-Eight stations fill a vector register of the processor, so that states which depend on the flow are integrated for all
-stations at the same time. The laws are those of the elements (Armanini et al. 2016, Eqs. 2-8, 11, 15, 18-19).
+States that depend on the flow are integrated for several stations at the same time, as many as the kernels have lanes;
+a group of stations is such a number of neighbours. The laws are those of the elements (Armanini et al. 2016, Eqs. 2-8,
+11, 15, 18-19).
 """
 
 from __future__ import annotations
@@ -15,9 +16,12 @@ from wingfit.records import Vehicle, WingMotion
 from wingfit.records.array_types import Array
 from wingfit.sim.kernels import LANES
 from wingfit.sim.kernels.jit import allocating, inlined, kernel
-from wingfit.sim.kernels.lanes.vector import load0, load1, root, store1
+from wingfit.sim.kernels.lanes.vector import load, load1, root, store
 from wingfit.sim.vehicle import elements
 from wingfit.sim.vehicle.elements import DEGREE, STILL, Side, curve_drag, curve_lift, velocities
+
+STATIONS = 8  # on each wing
+GROUPS = STATIONS // LANES
 
 
 class Stations(NamedTuple):
@@ -42,10 +46,10 @@ def _weights() -> Array:
     """Quadrature weights [8] at the middles of eighths of 0 to 1: exact for cubics, else as equal as possible."""
     powers = _MIDDLES ** np.arange(4)[:, None]
     defect = 1.0 / np.arange(1, 5) - powers.mean(axis=1)
-    return 1.0 / LANES + powers.T @ np.linalg.solve(powers @ powers.T, defect)
+    return 1.0 / STATIONS + powers.T @ np.linalg.solve(powers @ powers.T, defect)
 
 
-_MIDDLES: Array = (np.arange(LANES) + 0.5) / LANES
+_MIDDLES: Array = (np.arange(STATIONS) + 0.5) / STATIONS
 _WEIGHTS = _weights()
 
 
@@ -63,7 +67,7 @@ def span_sums(values: Array, weight: Array, out: Array) -> None:
     for b in range(len(values)):
         for t in range(values.shape[1]):
             total = 0.0
-            for e in range(LANES):
+            for e in range(STATIONS):
                 total += values[b, t, e] * weight[e]
             out[b, t] = total
 
@@ -94,17 +98,16 @@ def station_velocities(
     """
     for b in range(len(motion)):
         for t in range(motion.shape[2]):
-            ct, st = load1(cosine[b], t), load1(sine[b], t)
-            lam, w = motion[b, elements.DIHEDRAL, t], motion[b, elements.DOWNWARD, t]
+            lam, w, u = motion[b, elements.DIHEDRAL, t], motion[b, elements.DOWNWARD, t], motion[b, elements.FORWARD, t]
             whole = lam * side.printed + (1.0 - side.printed)
             w *= lam * (1.0 - side.printed) + side.printed
-            nothing = ct * 0.0
-            swing = load0(r) * motion[b, elements.FLAP_RATE, t]
-            vx, vz = velocities(
-                ct, st, swing, nothing + motion[b, elements.FORWARD, t], nothing + w, nothing + whole, side.stream
-            )
-            store1(along[b], t, vx)
-            store1(normal[b], t, vz)
+            for g in range(GROUPS):
+                ct, st = load(cosine[b], t, g), load(sine[b], t, g)
+                nothing = ct * 0.0
+                swing = load1(r, g) * motion[b, elements.FLAP_RATE, t]
+                vx, vz = velocities(ct, st, swing, nothing + u, nothing + w, nothing + whole, side.stream)
+                store(along[b], t, g, vx)
+                store(normal[b], t, g, vz)
 
 
 @kernel
@@ -115,9 +118,10 @@ def station_gust(cosine: Array, sine: Array, air: Array, along: Array, normal: A
     """
     for b in range(len(air)):
         for t in range(air.shape[1]):
-            moved = load1(air[b], t)
-            store1(along[b], t, load1(along[b], t) - moved * load1(cosine[b], t))
-            store1(normal[b], t, load1(normal[b], t) + moved * load1(sine[b], t))
+            for g in range(GROUPS):
+                moved = load(air[b], t, g)
+                store(along[b], t, g, load(along[b], t, g) - moved * load(cosine[b], t, g))
+                store(normal[b], t, g, load(normal[b], t, g) + moved * load(sine[b], t, g))
 
 
 @inlined
@@ -140,16 +144,15 @@ def station_circulation(
     """
     for b in range(len(along)):
         C_l, K_l = coefficient[b, 0], coefficient[b, 1]
-        half = load0(chord) * 0.5
-        share = load0(loading[b])
         for t in range(along.shape[1]):
-            vx, vz = load1(along[b], t), load1(normal[b], t)
-            V = root(vx * vx + vz * vz + STILL)
-            gamma = half * (load0(chord) * load0(twist) * turning[b, t] - vx * vz / V * (2.0 * C_l))
-            store1(speed[b], t, V)
-            store1(circulation[b], t, gamma * share)
+            for g in range(GROUPS):
+                c, vx, vz = load1(chord, g), load(along[b], t, g), load(normal[b], t, g)
+                V = root(vx * vx + vz * vz + STILL)
+                gamma = c * 0.5 * (c * load1(twist, g) * turning[b, t] - vx * vz / V * (2.0 * C_l))
+                store(speed[b], t, g, V)
+                store(circulation[b], t, g, gamma * load1(loading[b], g))
             if K_l != 0.0:
-                for e in range(LANES):
+                for e in range(STATIONS):
                     x, z = along[b, t, e], normal[b, t, e]
                     lift = 0.5 * chord[e] * speed[b, t, e] * K_l * curve_lift(_attack(x, z)) * loading[b, e]
                     circulation[b, t, e] += math.copysign(lift, -x * z)
@@ -167,26 +170,28 @@ def station_forces(
     rows as in :mod:`wingfit.sim.vehicle.elements`; ``density`` [B] of the air, kg/m^3; ``drag`` [B, 3]: C_D0, C_Dpi2
     and the factor on the measured drag curve.
     """
-    part = np.empty((2, LANES))
-    curve = np.empty(LANES)
+    part = np.empty((2, STATIONS))
+    curve = np.empty(STATIONS)
     for b in range(len(motion)):
-        chord, weight = load0(places.chord), load0(places.weight) * density[b]
         C_D0, C_D90, K_d = drag[b, 0], drag[b, 1], drag[b, 2]
         for t in range(motion.shape[2]):
-            ct, st = load1(cosine[b], t), load1(sine[b], t)
-            vx, vz, V = load1(along[b], t), load1(normal[b], t), load1(speed[b], t)
-            gamma = load1(circulation[b], t) * weight
-            friction = chord * weight * (vx * vx * C_D0 + vz * vz * C_D90) * 0.5 / V
             if K_d != 0.0:
-                for e in range(LANES):
+                for e in range(STATIONS):
                     angle = _attack(along[b, t, e], normal[b, t, e])
                     curve[e] = 0.5 * K_d * places.chord[e] * curve_drag(angle)
-                friction += load0(curve) * weight * V
-            ub, wb = vx * st + vz * ct, vx * ct - vz * st
-            store1(part, 0, gamma * wb - friction * ub)
-            store1(part, 1, -(gamma * ub) - friction * wb)
+            for g in range(GROUPS):
+                chord, weight = load1(places.chord, g), load1(places.weight, g) * density[b]
+                ct, st = load(cosine[b], t, g), load(sine[b], t, g)
+                vx, vz, V = load(along[b], t, g), load(normal[b], t, g), load(speed[b], t, g)
+                gamma = load(circulation[b], t, g) * weight
+                friction = chord * weight * (vx * vx * C_D0 + vz * vz * C_D90) * 0.5 / V
+                if K_d != 0.0:
+                    friction += load1(curve, g) * weight * V
+                ub, wb = vx * st + vz * ct, vx * ct - vz * st
+                store(part, 0, g, gamma * wb - friction * ub)
+                store(part, 1, g, -(gamma * ub) - friction * wb)
             x = z = 0.0
-            for e in range(LANES):
+            for e in range(STATIONS):
                 x += part[0, e]
                 z += part[1, e]
             out[b, 0, t] += x

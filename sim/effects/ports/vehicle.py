@@ -12,13 +12,12 @@ import numpy as np
 from wingfit.records import Condition, Vehicle, WingMotion
 from wingfit.records.array_types import Array, Complex
 from wingfit.sim.atmosphere import density
-from wingfit.sim.kernels import LANES
 from wingfit.sim.vehicle.elements import PROJECTION, Side
 from wingfit.sim.vehicle.flow import Flow, StationedWings
 from wingfit.sim.vehicle.motion import Angles, angles_of, flap_series
 from wingfit.sim.vehicle.rows import mirrored, motion_rows, set_side, uppers
 from wingfit.sim.vehicle.states import followed
-from wingfit.sim.vehicle.stations import Stations, span_sums, stations
+from wingfit.sim.vehicle.stations import STATIONS, Stations, span_sums, stations
 
 ROTATION_POINT = 0.75  # Eq. 4
 # Stages of a scene, in order: each reads what the stages before have changed.
@@ -93,7 +92,8 @@ class VehicleScene:
         if len(flap) < count:
             flap = np.repeat(flap, count, axis=0)
         airspeed, rho = np.full(count, air.airspeed), np.full(count, density(air.pressure, air.temperature))
-        loading, inflow, added = np.ones((count, len(setting.r) + LANES)), np.zeros((count, n)), np.zeros((count, 2, n))
+        loading = np.ones((count, len(setting.r) + STATIONS))
+        inflow, added = np.zeros((count, n)), np.zeros((count, 2, n))
         one, none = np.ones(count), np.zeros(count)
         return cls(setting, genes, flap, airspeed, rho, one, inflow, loading, none, added)
 
@@ -153,7 +153,7 @@ class VehicleScene:
         rows = self.rows(float(self.stations.twist[0]))
         sides = tuple((rows.copy(), side) for side in self.each_side(rows))
         lift, drag = self._coefficients("C_l", "K_l"), self._coefficients("C_D0", "C_Dpi2", "K_d")
-        loading = self.loading[:, -LANES:].copy()
+        loading = self.loading[:, -STATIONS:].copy()
         turning, fling = self._turning()
         return StationedWings(
             self.stations, sides, turning, fling, loading, self.density.copy(), lift, drag, mirrored(own)

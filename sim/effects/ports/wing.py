@@ -1,4 +1,4 @@
-"""The scene of a wing: the input of its simulation, eight individuals at a time, which effects change."""
+"""The scene of a wing: the input of its simulation, LANES individuals at a time, which effects change."""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
-"""Vectors of eight lanes as values inside kernels, so that arithmetic on eight individuals is written as for one.
+"""Vectors of LANES lanes as values inside kernels, so that arithmetic on several individuals is written as for one.
 
 Inside a compiled kernel ``load(array, i, j)`` gives the lanes of ``array[i, j, :]`` as a vector of the processor
-(LLVM's ``<8 x double>``); ``+ - *`` and ``/`` work on vectors and on a vector with a float; ``store`` writes one back.
-The automatic vectorisation of the compiler does not achieve this: it unrolls a loop over eight lanes first, and with a
-variable number of lanes the checks for aliasing take longer than the arithmetic.
+(LLVM's ``<8 x double>`` for eight lanes); ``+ - *`` and ``/`` work on vectors and on a vector with a float; ``store``
+writes one back. The automatic vectorisation of the compiler does not achieve this: it unrolls a loop over the lanes
+first, and with a variable number of lanes the checks for aliasing take longer than the arithmetic.
 
 Kernels run only compiled; annotations are for the reader and for mypy.
 """

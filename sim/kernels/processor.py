@@ -1,0 +1,27 @@
+"""How many individuals the kernels compute at a time on this processor."""
+
+from __future__ import annotations
+
+import os
+
+import llvmlite.binding as llvm
+import numba
+
+VARIABLE = "WINGFIT_LANES"  # sets the number, for tests: results do not depend on it
+POSSIBLE = (2, 4, 8)
+
+
+def lanes() -> int:
+    """Return how many individuals to compute at a time, as many as fit the processor's vector registers.
+
+    AVX-512 has 32 registers of eight floats: eight. AVX2 has 16 of four floats, NEON 32 of two: four, since with more
+    the values of a body do not stay in registers. ValueError if the environment asks for another number than POSSIBLE.
+    """
+    asked = os.environ.get(VARIABLE, "").strip()
+    if asked:
+        if asked not in map(str, POSSIBLE):
+            raise ValueError(f"{VARIABLE} is {asked!r}; it must be one of {', '.join(map(str, POSSIBLE))}, or unset")
+        return int(asked)
+    given = numba.config.CPU_FEATURES  # for which numba compiles; None: for this processor
+    wide = llvm.get_host_cpu_features().get("avx512f", False) if given is None else "+avx512f" in given.split(",")
+    return 8 if wide else 4
