@@ -17,7 +17,7 @@ from wingfit.calibration.genetic import Population
 SEARCHED = 8  # generations of the search before
 MOST = 5  # starts
 APART = 0.1  # largest difference of a gene between two starts, genes scaled to 0..1
-AGREE = 1.0  # difference of two costs that count as the same: data do not tell a smaller one of the log-likelihood
+AGREE = 1.0  # difference of two negative log-likelihoods up to which they count as the same
 
 
 @dataclass(frozen=True)
