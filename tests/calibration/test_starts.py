@@ -155,7 +155,7 @@ def valleys(monkeypatch: pytest.MonkeyPatch) -> Prepared:
     model, empty = Valleys(), blank()
     truth = base_genome(model, {"a": RIGHT, "c": 1.5}).values
     noise = 0.003 * np.random.default_rng(1).normal(size=(len(empty.times), 1))
-    record = replace(empty, values=model.observe([truth], empty).channels[0] + noise)
+    record = replace(empty, values=model.observe(np.array([truth]), empty).channels[0] + noise)
     spec = CalibrationSpec(method="auto", mode="joint", population=8, seed=3)
     ready = Prepared(spec, model, (Stage("joint", NAMES, (record,)),), ())  # type: ignore[arg-type]
     monkeypatch.setattr(search, "prepare", lambda *_: ready)
