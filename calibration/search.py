@@ -14,7 +14,7 @@ from wingfit.calibration.genetic import FAILED
 from wingfit.calibration.preparation import Prepared, prepare
 from wingfit.calibration.problem import Problem, base_genome
 from wingfit.calibration.spec import CalibrationSpec, model_for, resolved
-from wingfit.calibration.starts import SEARCHED, End, Ends, apart
+from wingfit.calibration.starts import SEARCHED, Ends, apart
 from wingfit.records import Dataset, Gene
 from wingfit.records.array_types import Array
 from wingfit.records.blas_threads import one_blas_thread
@@ -156,20 +156,29 @@ class _Run:
     def starts(self) -> Iterator[Generation]:
         """Yield Gauss-Newton iterations from the best individuals of the search until two starts end at one cost.
 
-        The best genome is that of the least cost so far; the checkpoint of a start's last iteration ends it.
+        The best genome is that of the least cost so far; the checkpoint of a start's last iteration ends it. A start
+        that fails is passed over, and its individuals are not counted; ValueError if all of them fail.
         """
         population, ends = self.state.population, self.state.ends
         if not isinstance(population, genetic.Population):
             raise TypeError("starts are taken from a genetic search")
-        chosen = apart(population)
-        while len(ends.done) < len(chosen) and not ends.agreed:
-            start = _named(self.genes, chosen[len(ends.done)])
-            for step in iterate(self.problem, self.evaluator, start, ends.newton):
-                best = ends.best()
+        chosen, reasons = apart(population), list[str]()
+        while ends.tried < len(chosen) and not ends.agreed:
+            for step in self._steps(_named(self.genes, chosen[ends.tried]), reasons):
                 ends.add(step, step.converged or step.index + 1 >= ITERATIONS)
-                if best is None or step.cost < best.cost:
-                    best = End.of(step)
-                yield self._start(step, best, len(chosen))
+                yield self._start(step, len(chosen))
+        if not ends.done:
+            stage = self.stage.name
+            raise ValueError(f"stage {stage!r}: Gauss-Newton failed from every start, the first: {reasons[0]}")
+
+    def _steps(self, start: dict[str, float], reasons: list[str]) -> Iterator[Step]:
+        """Yield iterations from one of several starts; if one fails, the start ends, and why is put in ``reasons``."""
+        ends = self.state.ends
+        try:
+            yield from iterate(self.problem, self.evaluator, start, ends.newton)
+        except ValueError as error:
+            reasons.append(str(error))
+            ends.close()
 
     def _generation(self) -> Generation:
         """Compute one generation: draw individuals, simulate them, and update the population."""
@@ -214,10 +223,10 @@ class _Run:
             list(step.reasons),
         )  # fmt: skip
 
-    def _start(self, step: Step, best: End, starts: int) -> Generation:
-        """Report an iteration from one of several ``starts``; ``best``: the least cost so far, which may be its own."""
-        ends = self.state.ends
-        part = 1.0 if ends.agreed or len(ends.done) == starts else _share(ends.iterations, 2 * EXPECTED_ITERATIONS)
+    def _start(self, step: Step, starts: int) -> Generation:
+        """Report an iteration from one of several ``starts``, with the place of the least cost so far."""
+        ends, best = self.state.ends, self.state.ends.best()
+        part = 1.0 if ends.agreed or ends.tried == starts else _share(ends.iterations, 2 * EXPECTED_ITERATIONS)
         return self._seen(
             self.state.base | best.values, step.evaluations, (self.state.stage + part) / len(self.stages),
             self.stage.name + NEWTON, ends.iterations - 1, best.fitness, step.fitness, step.step, best.distance,

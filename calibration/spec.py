@@ -31,7 +31,8 @@ class CalibrationSpec:
         population: individuals per generation.
         stall: generations without improvement of the best fitness after which a search ends.
         tolerance: smallest relative decrease of the best fitness that counts as an improvement.
-        max_generations: largest number of generations of a stage, or of Gauss-Newton iterations.
+        max_generations: largest number of generations of a stage's search, or of Gauss-Newton iterations where there
+            is no search.
         seed: of the random generators; the same seed gives the same results, bit for bit.
         bounds_factor: genes are searched in [estimate / factor, estimate * factor]; for wings only.
         accuracy: largest numerical error (m) of any simulated marker at any instant (`sim/solver/numerics.py`).
@@ -40,7 +41,7 @@ class CalibrationSpec:
         fixed: values, by name, of genes that are not searched and have these values instead of their estimates.
         method: how a stage is searched. None: genetic for a wing, Gauss-Newton for a vehicle. "auto": a short genetic
             search, then Gauss-Newton from its best individuals (:mod:`wingfit.calibration.starts`).
-        finish: whether Gauss-Newton follows each stage's search.
+        finish: whether Gauss-Newton follows each stage's search; with "auto", it does in any case.
         preset: blade-element model (:data:`wingfit.sim.vehicle.terms.PRESETS`); for vehicles only.
         without: names of terms of the preset that are omitted.
         axes: force axes that are fitted, of "x" and "z".

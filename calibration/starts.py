@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from wingfit.calibration.estimates.likelihood import Step
-from wingfit.calibration.genetic import Population
+from wingfit.calibration.genetic import FAILED, Population
 
 SEARCHED = 8  # generations of the search before
 MOST = 5  # starts
@@ -39,24 +39,32 @@ class End:
 class Ends:
     """Progress from start to start; plain numbers, stored as part of a checkpoint.
 
-    ``done``: ends of the starts that have converged; ``newton``: checkpoint of the iterations of the present one;
-    ``iterations``: number of iterations of all starts so far.
+    ``done``: ends of the starts that have converged, or got somewhere before they failed; ``tried``: number of starts
+    that are over, with those that failed at once; ``present``: where the present one is; ``newton``: checkpoint of its
+    iterations; ``iterations``: number of iterations of all starts so far.
     """
 
     done: list[dict[str, Any]] = field(default_factory=list)
+    tried: int = 0
+    present: dict[str, Any] | None = None
     newton: dict[str, Any] | None = None
     iterations: int = 0
 
-    def best(self) -> End | None:
-        """Return the end with the least cost; None before the first start has converged."""
-        ends = [End(**one) for one in self.done]
-        return min(ends, key=lambda end: end.cost) if ends else None
+    def best(self) -> End:
+        """Return the place with the least cost, also of the present start; ValueError before the first iteration."""
+        places = [*self.done, *([self.present] if self.present else [])]
+        return min((End(**place) for place in places), key=lambda end: end.cost)
 
     def add(self, step: Step, last: bool) -> None:
         """Take one more iteration; ``last``: with it, a start has ended."""
-        self.newton, self.iterations = step.checkpoint, self.iterations + 1
+        self.present, self.newton, self.iterations = asdict(End.of(step)), step.checkpoint, self.iterations + 1
         if last:
-            self.done, self.newton = [*self.done, asdict(End.of(step))], None
+            self.close()
+
+    def close(self) -> None:
+        """End the present start where it is; one that failed before its first iteration leaves no end."""
+        self.done = [*self.done, *([self.present] if self.present else [])]
+        self.tried, self.present, self.newton = self.tried + 1, None, None
 
     @property
     def agreed(self) -> bool:
@@ -66,10 +74,10 @@ class Ends:
 
 
 def apart(population: Population) -> list[list[float]]:
-    """Return up to MOST individuals (genes scaled to 0..1), best first, that lie APART from each other."""
+    """Return up to MOST individuals (genes scaled to 0..1), best first, that lie APART from each other; none failed."""
     chosen: list[list[float]] = []
-    for unit in population.unit:
-        if all(np.abs(np.subtract(unit, other)).max() >= APART for other in chosen):
+    for unit, fitness in zip(population.unit, population.fitness, strict=True):
+        if fitness < FAILED and all(np.abs(np.subtract(unit, other)).max() >= APART for other in chosen):
             chosen.append(unit)
         if len(chosen) == MOST:
             break

@@ -18,7 +18,7 @@ from wingfit.cli.jobs import JobKind, check_ended_well, commands, dataset_id, fo
 from wingfit.cli.results import print_genes, print_result
 from wingfit.client import answers as a
 from wingfit.client.client import DEFAULT_URL, Client
-from wingfit.service.runs.spec_fields_by_kind import SEARCH_ONLY, VEHICLE_ONLY, WING_ONLY
+from wingfit.service.runs.spec_fields_by_kind import IDLE, VEHICLE_ONLY, WING_ONLY
 from wingfit.service.units import MN
 
 
@@ -63,7 +63,7 @@ def submit(
     mode: Annotated[
         str | None, typer.Option(help="staged (vacuum, then tunnel), joint, or local (each recording on its own).")
     ] = None,
-    method: Annotated[str | None, typer.Option(help="genetic, cma_es or gauss_newton.")] = None,
+    method: Annotated[str | None, typer.Option(help="genetic, cma_es, gauss_newton or auto.")] = None,
     finish: Annotated[bool, typer.Option("--finish", help="Gauss-Newton after the search of each stage.")] = False,
     population: Annotated[int | None, typer.Option(help="Individuals per generation.")] = None,
     stall: Annotated[int | None, typer.Option(help="Generations without improvement that end a stage.")] = None,
@@ -186,8 +186,7 @@ def _settings(run: a.Run) -> list[str]:
     """Return "name value" for each setting that the run's kind of dataset and its method use."""
     spec = run["spec"]
     unused = set(VEHICLE_ONLY if run["kind"] == "tracks" else WING_ONLY)
-    if spec["method"] == "gauss_newton":
-        unused |= {*SEARCH_ONLY, "seed"}
+    unused |= {*IDLE.get(spec["method"], ()), *(["seed"] if spec["method"] == "gauss_newton" else [])}
     words: dict[type, Callable[..., str]] = {
         bool: lambda value: "yes" if value else "no",
         list: lambda value: " ".join(map(str, value)),

@@ -142,7 +142,7 @@ class RunSpec(JobSpec):
     max_generations: int
     finish: bool
     mode: Literal["staged", "joint", "local"]
-    method: Literal["genetic", "cma_es", "gauss_newton"]
+    method: Literal["genetic", "cma_es", "gauss_newton", "auto"]
 
 
 class Checked(TypedDict):

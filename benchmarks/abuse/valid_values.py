@@ -19,13 +19,16 @@ ID = re.compile(r"(?:ds|run|dx|key)_[0-9a-f]{16}")
 ABSENT = "0" * 16
 OFTEN, SELDOM = 0.8, 0.3
 REPEAT_KEY = "Idempotency-Key"
-# Fields with which a request would be refused: by kind of dataset, those of the other kind; IDLE: those of a search,
-# in a request for Gauss-Newton.
+# Fields with which a request would be refused: by kind of dataset, those of the other kind; IDLE: by method, those
+# that mean nothing for it.
 FOREIGN: Mapping[str, tuple[str, ...]] = {
     "tracks": ("preset", "without", "axes", "low_pass_hz", "peel_width_beats"),
     "forces": ("division", "bounds_factor", "accuracy_mm", "outputs"),
 }
-IDLE = ("population", "stall", "tolerance", "finish")
+IDLE: Mapping[str, tuple[str, ...]] = {
+    "gauss_newton": ("population", "stall", "tolerance", "finish"),
+    "auto": ("finish",),
+}
 OF_KIND = {"/comparison": "tracks", "/loads": "tracks", "/forces": "forces", "/predictions": "forces"}
 SMALL_DIVISIONS = ("4", "2,2", "3x1", "11")
 LARGEST: Mapping[str, int] = {"population": 8, "max_generations": 2, "stall": 2, "refits": 1}
@@ -98,7 +101,7 @@ class ValidValues:
         """Return the body ``given`` with valid values, without fields that do not belong to ``kind``."""
         fillers = _fillers(self._good, kind, dice)
         filled = {name: fillers[name]() if name in fillers else value for name, value in given.items()}
-        excluded = FOREIGN[kind] + (IDLE if filled.get("method") == "gauss_newton" else ())
+        excluded = FOREIGN[kind] + IDLE.get(str(filled.get("method")), ())
         return {name: value for name, value in filled.items() if name not in excluded}
 
 

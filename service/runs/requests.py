@@ -9,7 +9,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StrictBool
 from pydantic_core import PydanticCustomError
 
 Mode = Literal["staged", "joint", "local"]
-Method = Literal["genetic", "cma_es", "gauss_newton"]
+Method = Literal["genetic", "cma_es", "gauss_newton", "auto"]
 Preset = Literal["proposed", "berman_wang", "dickinson"]
 ForceAxis = Literal["x", "z"]
 AnyName = TypeVar("AnyName", bound=str)
@@ -150,5 +150,7 @@ class RunIn(JobSettings):
     genes: Annotated[
         list[Name], Field(max_length=1000, description="empty: all of a wing; lift, rotation and fling of a vehicle")
     ] = []
-    finish: Annotated[StrictBool, Field(description="Gauss-Newton after the search of each stage")] = False
+    finish: Annotated[
+        StrictBool, Field(description="Gauss-Newton after the search of each stage; auto ends so anyway")
+    ] = False
     axes: Axes = ["x"]

@@ -71,7 +71,7 @@ def _history(root: Any, database: Database, row: RunRow) -> None:
     }
     reals = {
         "best": (square, "fitness of the best individual"),
-        "mean": (square, "mean fitness of the individuals that did not fail"),
+        "mean": (square, "mean fitness of the individuals that did not fail; of Gauss-Newton that of the iteration"),
         "diversity": (nc.NO_UNIT, "diversity of the generation; of Gauss-Newton its largest step"),
         misfit[0]: (misfit[1], "misfit of the best individual"),
         "elapsed_seconds": ("s", "computing time since the run began"),

@@ -16,7 +16,7 @@ from wingfit.service.answers import answer, in_si
 from wingfit.service.http.problems import ErrorItem, error_item, invalid
 from wingfit.service.outcomes.requests import WingIn
 from wingfit.service.runs.requests import RunIn, VehicleModel
-from wingfit.service.runs.spec_fields_by_kind import SEARCH_ONLY, VEHICLE_ONLY, WING_ONLY
+from wingfit.service.runs.spec_fields_by_kind import IDLE, VEHICLE_ONLY, WING_ONLY
 from wingfit.service.units import tidy_mm
 from wingfit.sim.effects.registry import chosen
 from wingfit.sim.vehicle.blade_element_wing import BladeElementWing
@@ -26,7 +26,11 @@ from wingfit.sim.vehicle.terms import chosen as terms_of
 SPEC_FIELDS = {field.name for field in fields(CalibrationSpec)}
 # Genes of a simulated wing may lie outside the bounds of a search, up to the limit of `bounds_factor`.
 WIDEST_BOUNDS = 100.0
-METHODS = {"genetic": "genetic", "cma_es": "CMA-ES", "gauss_newton": "Gauss-Newton"}
+METHODS = {"genetic": "genetic", "cma_es": "CMA-ES", "gauss_newton": "Gauss-Newton", "auto": "auto"}
+WHY_IDLE = {
+    "gauss_newton": "which searches nothing; leave it out, or use genetic or cma_es",
+    "auto": "which ends with Gauss-Newton in any case; leave it out",
+}
 USUAL = {"tracks": "genetic", "forces": "gauss_newton"}
 LONGEST_NAME = 200
 
@@ -118,17 +122,15 @@ def refuse_foreign(body: BaseModel, dataset: Dataset) -> None:
 
 
 def refuse_idle(body: RunIn, method: str | None) -> None:
-    """Raise a 422 for settings that apply only to a population search, if ``method`` is Gauss-Newton.
+    """Raise a 422 for settings that mean nothing for the ``method``: of a search, if it is Gauss-Newton.
 
     Settings that have their default value are ignored.
     """
-    if method != "gauss_newton":
+    if method not in IDLE:
         return
-    message = (
-        "means nothing for the method gauss_newton, which searches nothing; leave it out, or use genetic or cma_es"
-    )
-    if faults := _given(body, SEARCH_ONLY, message):
-        raise invalid("the request has settings of a search, and asks for none", faults)
+    message = f"means nothing for the method {method}, {WHY_IDLE[method]}"
+    if faults := _given(body, IDLE[method], message):
+        raise invalid("the request has settings that its method does not use", faults)
 
 
 def run_name(dataset: Dataset, spec: CalibrationSpec) -> str:

@@ -4,7 +4,7 @@ import { forceUnit, mm, significant } from "./format.js";
 
 export const isForces = (thing) => thing?.kind === "forces";
 
-export const METHODS = { genetic: "genetic", cma_es: "CMA-ES", gauss_newton: "Gauss-Newton" };
+export const METHODS = { genetic: "genetic", cma_es: "CMA-ES", gauss_newton: "Gauss-Newton", auto: "auto" };
 export const MODES = {
   staged: "staged, vacuum first", joint: "joint, all recordings together", local: "local, each recording by itself",
 };
@@ -19,7 +19,8 @@ export const QUANTITIES = { lift: "Lift", drag: "Drag", x: "Force along x", z: "
 
 const WING_ONLY = ["division", "bounds_factor", "accuracy_mm"];
 const VEHICLE_ONLY = ["preset", "without", "axes", "low_pass_hz", "peel_width_beats"];
-const SEARCH_ONLY = ["population", "stall", "tolerance", "seed", "finish"];
+// By method, settings that it does not use.
+const IDLE = { gauss_newton: ["population", "stall", "tolerance", "seed", "finish"], auto: ["finish"] };
 
 export const spoken = (name) => name.replaceAll("_", " ");
 
@@ -45,7 +46,7 @@ export const newtons = (mn) => (mn === null || mn === undefined ? null : mn / 1e
 
 // The settings of a run as a request, without those that its kind of dataset or its method does not use.
 export function request(run) {
-  const idle = [...(isForces(run) ? WING_ONLY : VEHICLE_ONLY), ...(run.spec.method === "gauss_newton" ? SEARCH_ONLY : [])];
+  const idle = [...(isForces(run) ? WING_ONLY : VEHICLE_ONLY), ...(IDLE[run.spec.method] ?? [])];
   return Object.fromEntries(Object.entries(run.spec).filter(([name]) => !idle.includes(name)));
 }
 

@@ -7,6 +7,7 @@ import { showErrors } from "../base/form_errors.js";
 import { isForces, METHODS, MODES, PRESETS, setup, spoken } from "../base/labels.js";
 
 const TYPED_MS = 350;
+const CHOICES = { ...METHODS, auto: "auto, recommended" };
 // Sent for a field with invalid text, whose value the browser reports as empty: empty would mean the default.
 export const NO_NUMBER = "not a number";
 
@@ -102,7 +103,7 @@ function values(form) {
   if (forces) Object.assign(body, { preset: form.preset.value, without: unticked("terms"), axes: ticked("axes") });
   else body.division = form.division.value;
   if (ticked("effect-choices").length) body.effects = ticked("effect-choices");
-  if (searches(form)) body.finish = form.finish.checked;
+  if (finishes(form)) body.finish = form.finish.checked;
   // Invalid numbers are sent as text, so that the server explains the error.
   for (const name of numbers(form, forces)) {
     if (form[name].validity.badInput) body[name] = NO_NUMBER;
@@ -117,6 +118,7 @@ const numbers = (form, forces) => [
 ];
 
 const searches = (form) => form.method.value !== "gauss_newton";
+const finishes = (form) => searches(form) && form.method.value !== "auto";
 const boxes = (id) => [...$(id).querySelectorAll("input")];
 const ticked = (id) => boxes(id).filter((box) => box.checked).map((box) => box.value);
 const unticked = (id) => boxes(id).filter((box) => !box.checked).map((box) => box.value);
@@ -127,7 +129,7 @@ async function showFieldsFor(form) {
   const dataset = chosenDataset(form);
   const forces = isForces(dataset);
   for (const node of form.querySelectorAll("[data-kind]")) node.hidden = node.dataset.kind !== (forces ? "forces" : "tracks");
-  options(form.method, METHODS, forces ? ["gauss_newton", "genetic", "cma_es"] : ["genetic", "cma_es", "gauss_newton"]);
+  options(form.method, CHOICES, forces ? ["gauss_newton", "auto", "genetic", "cma_es"] : ["genetic", "auto", "cma_es", "gauss_newton"]);
   options(form.mode, MODES, forces ? ["local", "joint"] : ["staged", "joint", "local"]);
   showMethodFields(form);
   await showEffectChoices(form, forces ? "vehicle" : "wing");
@@ -146,6 +148,7 @@ async function showFieldsFor(form) {
 
 function showMethodFields(form) {
   for (const node of form.querySelectorAll("[data-search]")) node.hidden = !searches(form);
+  for (const node of form.querySelectorAll("[data-finish]")) node.hidden = !finishes(form);
 }
 
 // Effects that apply to the rig of the dataset, by family; none is selected.

@@ -1,4 +1,4 @@
-// Chart of the fitness by generation: best and mean on a log axis, with the boundaries of the stages.
+// Chart of the fitness by generation: best, mean and present start on a log axis, with the boundaries of the stages.
 
 import { mm, plain, significant, withForceUnit } from "../base/format.js";
 import { axis, draw } from "../base/plots.js";
@@ -14,9 +14,11 @@ const FEWEST_TICKS = 3;
 const EVEN_TICKS = 8; // at most; of steps of 1, 2 and 5 at least three fall into the range
 const NARROWEST = 0.02; // decades left free at either end, at least
 
+const NEWTON = ", Gauss-Newton";
+
 // "test-1, Gauss-Newton" is named by its recording, unless it finishes a search on the same one.
 function stageLabel(name, stages, upright) {
-  const base = name.replace(", Gauss-Newton", "");
+  const base = name.replace(NEWTON, "");
   if (base !== name && stages.has(base)) return upright ? "" : "Gauss-Newton";
   if (!upright) return base === name ? `${name} stage` : base;
   return base.length > LONGEST_UPRIGHT ? `${base.slice(0, LONGEST_UPRIGHT - 1)}…` : base;
@@ -50,10 +52,11 @@ function chart(look, items, forces) {
     hovertemplate: `%{y:.4g} ${shown.unit}${labels ? "%{text}" : ""}<extra>${name}</extra>`,
   });
   const traces = [
-    // A Gauss-Newton iteration has one individual and no mean.
-    line("mean", (item) => (item.mean === item.best ? null : item.mean), look.faint, 1.5),
+    // A Gauss-Newton iteration has one individual and no mean; from a second start, it may lie above the best.
+    line("mean", (item) => (item.stage?.endsWith(NEWTON) || item.mean === item.best ? null : item.mean), look.faint, 1.5),
     line("best", (item) => item.best, look.accent, 2.5, points.map((item) => (item === GAP ? "" : shown.hover(item)))),
-  ];
+    line("this start", (item) => (item.stage?.endsWith(NEWTON) && item.mean !== item.best ? item.mean : null), look.quiet, 1.5),
+  ].filter((trace) => trace.name !== "this start" || trace.y.some((value) => value !== null));
   return {
     traces, margin: { l: 10, r: 52, t: 26, b: 10 }, hovermode: "x unified",
     xaxis: axis(look, "generation", { showgrid: false, range: span(x), ...wholeTicks(x) }),
@@ -112,9 +115,10 @@ function endLabels(traces) {
   const labels = traces.map(endLabel).filter(Boolean);
   const known = traces.flatMap((trace) => trace.y).filter((value) => value > 0).map(Math.log10);
   const height = Math.max(...known) - Math.min(...known);
-  if (labels.length === 2 && labels[0].y - labels[1].y < 0.1 * height) {
-    labels[0].yshift = 8;
-    labels[1].yshift = -6;
+  const [upper, lower] = labels.slice(-2).sort((a, b) => b.y - a.y);
+  if (lower && upper.y - lower.y < 0.1 * height) {
+    upper.yshift = 8;
+    lower.yshift = -6;
   }
   return labels;
 }

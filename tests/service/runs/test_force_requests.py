@@ -90,7 +90,7 @@ def test_a_simulation_that_cannot_be_meant(api: Api, dataset: Json, body: Json, 
     ("body", "where", "said"),
     [
         ({"mode": "staged"}, "body", "use 'local'"),
-        ({"method": "annealing"}, "body.method", "'genetic', 'cma_es' or 'gauss_newton'"),
+        ({"method": "annealing"}, "body.method", "'genetic', 'cma_es', 'gauss_newton' or 'auto'"),
         ({"preset": "blade"}, "body.preset", "'proposed', 'berman_wang' or 'dickinson'"),
         ({"without": ["fling"]}, "body.without", "has no term 'fling' to leave out; it has inertial, translation"),
         ({"axes": ["y"]}, "body.axes.0", "'x' or 'z'"),
@@ -108,6 +108,7 @@ def test_a_simulation_that_cannot_be_meant(api: Api, dataset: Json, body: Json, 
         ({"finish": True}, "body.finish", "gauss_newton, which searches nothing"),
         ({"method": "gauss_newton", "population": 20}, "body.population", "leave it out, or use genetic or cma_es"),
         ({"stall": 3}, "body.stall", "searches nothing"),
+        ({"method": "auto", "finish": True}, "body.finish", "auto, which ends with Gauss-Newton in any case; leave it"),
     ],
 )
 def test_a_specification_that_does_not_fit_is_refused(
@@ -130,6 +131,23 @@ def test_a_search_followed_by_gauss_newton(api: Api, dataset: Json) -> None:
     (estimate,) = api.get(f"/v1/runs/{run['id']}/result")["estimates"]
     assert [c["name"] for c in estimate["coefficients"]] == ["C_l", "C_F"]
     assert np.shape(estimate["noise_mn2"]) == (1, 2, 2)
+
+
+def test_gauss_newton_from_several_starts(api: Api, dataset: Json) -> None:
+    options: Json = {"method": "auto", "population": 6, "stall": 9, "tolerance": 0.01, "seed": 2, "max_generations": 3}
+    run = finished(api, dataset, recordings=["test-4"], genes=["C_l", "C_F"], finish=False, **options)
+    assert run["name"] == "delfly, proposed, local, auto"
+    assert {name: run["spec"][name] for name in options} == options
+    history = api.history(run["id"])
+    assert [(item["stage"], item["generation"]) for item in history[:3]] == [("test-4", k) for k in range(3)]
+    iterations = history[3:]
+    assert {item["stage"] for item in iterations} == {"test-4, Gauss-Newton"}
+    assert [item["generation"] for item in iterations] == list(range(len(iterations)))
+    (estimate,) = api.get(f"/v1/runs/{run['id']}/result")["estimates"]
+    assert [c["name"] for c in estimate["coefficients"]] == ["C_l", "C_F"]
+    for coefficient in estimate["coefficients"]:
+        truth = TRUTH["test-4"][coefficient["name"]]
+        assert coefficient["low_90"] - 0.05 * truth < truth < coefficient["high_90"] + 0.05 * truth
 
 
 def test_the_models_are_those_of_the_simulator(api: Api) -> None:

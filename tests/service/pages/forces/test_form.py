@@ -40,6 +40,12 @@ def test_the_form_has_what_belongs_to_forces_and_says_what_is_wrong(
     assert not page.is_visible("[name=population]"), "Gauss-Newton has none"
     page.select_option("[name=method]", "genetic")
     assert page.is_visible("[name=population]")
+    assert page.is_visible("[name=finish]")
+    page.select_option("[name=method]", "auto")
+    assert page.is_visible("[name=population]")
+    assert not page.is_visible("[name=finish]"), "auto ends with Gauss-Newton in any case"
+    assert page.inner_text("[name=method] option[value=auto]") == "auto, recommended"
+    seen.wait("document.getElementById('submit-preview').textContent.includes('local, auto')")
     page.select_option("[name=method]", "gauss_newton")
     page.fill("[name=low_pass_hz]", "1000")
     page.click("#submit-form [type=submit]")
@@ -68,6 +74,27 @@ def test_the_form_has_what_belongs_to_forces_and_says_what_is_wrong(
     assert (spec["without"], spec["low_pass_hz"], sorted(spec["axes"])) == (["clap_and_peel"], 60.0, ["x", "z"])
     seen.wait("document.getElementById('run-about').textContent.includes('without clap and peel')")
     api.finish(run_id, PATIENCE)
+
+
+def test_a_run_from_several_starts_shows_the_present_one_beside_the_best(
+    seen: Seen, api: Api, dataset: dict[str, Any]
+) -> None:
+    run_id = submitted(api, dataset, method="auto", mode="joint", population=8, max_generations=3)
+    assert api.finish(run_id, PATIENCE)["state"] == "SUCCEEDED"
+    seen.open(run_id)
+    seen.wait("document.getElementById('history').data?.length === 3")
+    name, mean, best, start = (
+        seen.page.evaluate(f"document.getElementById('history').data[{k}].{what}")
+        for k, what in ((2, "name"), (0, "y"), (1, "y"), (2, "y"))
+    )
+    items = api.history(run_id)
+    assert name == "this start"
+    assert len([y for y in mean if y is not None]) == 3, "the generations of the search"
+    behind = [item for item in items[3:] if item["mean"] != item["best"]]
+    assert behind
+    assert [y for y in start if y is not None] == pytest.approx([item["mean"] for item in behind])
+    assert [y for y in best if y is not None] == pytest.approx([item["best"] for item in items])
+    assert seen.errors == []
 
 
 def test_the_terms_follow_the_model(seen: Seen, api: Api, dataset: dict[str, Any]) -> None:
