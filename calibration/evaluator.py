@@ -48,13 +48,29 @@ def units(problem: Problem, individuals: int) -> list[Unit]:
 
     The individuals of a model that is differentiated (``DifferentiableModel.tangent``) stay together.
     """
-    together = isinstance(problem.model, DifferentiableModel) and problem.model.differentiates
-    size = individuals if together else LANES
+    size = individuals if _differentiated(problem) else LANES
     return [
         Unit(start, min(start + size, individuals), recording)
         for recording in range(len(problem.recordings))
         for start in range(0, individuals, size)
     ]
+
+
+def distinct(problem: Problem, batch: Array) -> tuple[Array, list[int]]:
+    """Return the individuals of ``batch`` [B, F] without repetitions [D, F], and the place of each of the B among them.
+
+    A batch for a model that is differentiated stays as it is, since its rows are a genome and its neighbours.
+    """
+    if _differentiated(problem):
+        return batch, list(range(len(batch)))
+    places: dict[bytes, int] = {}
+    of_each = [places.setdefault(row.tobytes(), len(places)) for row in batch]
+    first = [of_each.index(place) for place in range(len(places))]
+    return batch[first], of_each
+
+
+def _differentiated(problem: Problem) -> bool:
+    return isinstance(problem.model, DifferentiableModel) and problem.model.differentiates
 
 
 @one_blas_thread

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import pickle
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -73,6 +73,17 @@ class Misfit:
     residuals: Array | None = None
     kind: Kind = "tracks"
 
+    def taken(self, places: Sequence[int]) -> Misfit:
+        """Return the misfits of the individuals at ``places``, which may be repeated."""
+        at = np.asarray(places, int)
+        return replace(
+            self,
+            squares=self.squares[at],
+            distance=self.distance[at],
+            reasons=tuple(self.reasons[place] for place in places),
+            residuals=None if self.residuals is None else self.residuals[at],
+        )
+
 
 def misfit(problem: Problem, values: ArrayLike, recording: int, *, residuals: bool = False) -> Misfit:
     """Simulate B individuals, ``values`` [B, F] of the free genes, and compare with recording no. ``recording``."""
@@ -122,6 +133,10 @@ class Evaluation:
     """Misfits of B individuals to all recordings of a problem, one Misfit for each recording."""
 
     per_recording: tuple[Misfit, ...]
+
+    def taken(self, places: Sequence[int]) -> Evaluation:
+        """Return the evaluation of the individuals at ``places``, which may be repeated."""
+        return Evaluation(tuple(part.taken(places) for part in self.per_recording))
 
     @property
     def fitness(self) -> Array:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import sys
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,6 +20,7 @@ from wingfit.client.client import DEFAULT_URL, Client, WingfitError
 from wingfit.client.export_answers import Format
 from wingfit.client.transport import ENDINGS
 
+START_SECONDS = 1.0  # between two looks at a server that starts
 INTERRUPTED = 130  # exit code after Ctrl-C
 STANDARD_OUTPUT = Path("-")
 FormatName = Annotated[
@@ -107,6 +109,9 @@ def follow(client: Client, kind: JobKind, job_id: str) -> Any:
     """Show the progress of a job until it ends, and return the job; Ctrl-C ends the command, and the job continues."""
     try:
         with progress(kind.work) as report:
+            while (health := client.health())["status"] == "starting" and health["detail"]:
+                report(None, note=health["detail"])
+                time.sleep(START_SECONDS)
             return kind.wait(
                 client, job_id, lambda job: report(job["progress"], job["eta_seconds"], kind.stage_of(job))
             )

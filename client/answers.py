@@ -60,7 +60,7 @@ class Problem(TypedDict):
 
 
 class Health(TypedDict):
-    """Status of the service; ``detail`` gives the cause if ``status`` is "degraded".
+    """Status of the service; ``detail``: the cause if ``status`` is "degraded", or what a "starting" service does.
 
     ``evaluator`` says how simulations are run: ray, processes or in_process. ``runs_active`` and ``diagnoses_active``
     count jobs that have not ended; they are null if the database does not answer.

@@ -76,8 +76,9 @@ class Service:
             database, self.changes, kinds, settings.max_runs, settings.max_runs_per_owner, settings.max_starts
         )
         self._housekeeping = Housekeeping(database, settings.keep_days, self.changes.publish)
-        make_evaluator = parts.get("make_evaluator") or partial(_evaluator, settings)
-        self._pool = Pool(make_evaluator, self.runner.attach)
+        make = parts.get("make_evaluator")
+        prepare = None if make or settings.ray_address else _compile  # the nodes of a cluster compile for themselves
+        self._pool = Pool(make or partial(_evaluator, settings), self.runner.attach, prepare)
         self.health = Health(settings, database, self._pool, kinds)
         self._metrics_text = threads.SharedCall("metrics", self.metrics.text)
 
@@ -173,6 +174,12 @@ class Service:
             ("database_bytes", "Size of the database and its log.", size),
         ):
             yield GaugeMetricFamily(f"wingfit_{name}", description, value)
+
+
+def _compile(say: Callable[[str], None], stopped: Callable[[], bool]) -> None:
+    from wingfit.workers.compiling import compile_simulator
+
+    compile_simulator(say, stopped)
 
 
 def _evaluator(settings: Settings) -> RunningEvaluator:

@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy.typing as npt
 
-from wingfit.calibration.evaluator import as_batch, gather, units
+from wingfit.calibration.evaluator import as_batch, distinct, gather, units
 from wingfit.calibration.problem import Evaluation, Misfit, Problem
 from wingfit.workers.errors import EvaluationInterruptedError, EvaluatorClosedError
 from wingfit.workers.share import Task
@@ -39,12 +39,14 @@ class RunningEvaluator(ABC):
     ) -> Evaluation:
         """Simulate the individuals ``values`` [B, F] (B individuals, F free genes), and return their misfits.
 
-        There is a misfit to every recording of ``problem``, with the residuals if ``residuals``. Several threads may
-        call. EvaluationInterruptedError is raised soon after ``interrupted()`` returns True; waiting tasks are dropped.
+        There is a misfit to every recording of ``problem``, with the residuals if ``residuals``. Individuals that are
+        equal are simulated once. Several threads may call. EvaluationInterruptedError is raised soon after
+        ``interrupted()`` returns True; waiting tasks are dropped.
         """
-        batch = as_batch(values)
+        batch, place = distinct(problem, as_batch(values))
         tasks = [Task.cut(batch, unit) for unit in units(problem, len(batch))]
-        return gather(problem, self._misfits(problem, tasks, residuals, interrupted))
+        found = gather(problem, self._misfits(problem, tasks, residuals, interrupted))
+        return found if len(batch) == len(place) else found.taken(place)
 
     @abstractmethod
     def close(self) -> None:

@@ -20,21 +20,32 @@ NO_WORKER = (
     "there is no worker: of a Ray cluster all nodes that compute are gone, or its head does not answer; jobs are "
     "accepted, and wait until a node joins (ray start --address=...)"
 )
+Prepare = Callable[[Callable[[str], None], Callable[[], bool]], None]
 
 
 class Pool:
     """Starts and holds the evaluator (worker processes that simulate), which all jobs share.
 
+    ``prepare``, if given, runs before the first attempt, with a function to say what it does, and another that returns
+    whether to stop.
+
     Attributes:
         error: why the last attempt to start the evaluator failed; None before the first failure and once it runs.
+        doing: what the start does at present, for the user; None if nothing is to be said.
     """
 
-    def __init__(self, make: Callable[[], RunningEvaluator], on_ready: Callable[[RunningEvaluator], None]) -> None:
-        self._make, self._on_ready = make, on_ready
+    def __init__(
+        self,
+        make: Callable[[], RunningEvaluator],
+        on_ready: Callable[[RunningEvaluator], None],
+        prepare: Prepare | None = None,
+    ) -> None:
+        self._make, self._on_ready, self._prepare = make, on_ready, prepare
         self._stop = threading.Event()
         self._lock = threading.Lock()
         self._evaluator: RunningEvaluator | None = None
         self.error: str | None = None
+        self.doing: str | None = None
         self._thread = threading.Thread(target=self._start, name="evaluator-start", daemon=True)
 
     def start(self) -> None:
@@ -51,7 +62,7 @@ class Pool:
     @property
     def detail(self) -> str | None:
         """Why no job is computed at present, for the user; None if no reason is known."""
-        return NO_WORKER if self._evaluator and self.workers == 0 else self.error
+        return NO_WORKER if self._evaluator and self.workers == 0 else self.error or self.doing
 
     @property
     def workers(self) -> int | None:
@@ -80,6 +91,8 @@ class Pool:
         # Worker processes inherit the priority of the thread that starts them.
         lower_priority()
         attempt = 0
+        if self._prepare:
+            self._prepare(self._say, self._stop.is_set)
         while not self._stop.is_set():
             try:
                 self._adopt(self._make())
@@ -90,10 +103,13 @@ class Pool:
             self._stop.wait(RETRY_SECONDS[min(attempt, len(RETRY_SECONDS) - 1)])
             attempt += 1
 
+    def _say(self, doing: str) -> None:
+        self.doing = doing
+
     def _adopt(self, evaluator: RunningEvaluator) -> None:
         with self._lock:
             if not self._stop.is_set():
-                self._evaluator, self.error = evaluator, None
+                self._evaluator, self.error, self.doing = evaluator, None, None
         if self._stop.is_set():
             evaluator.close()
             return

@@ -42,7 +42,7 @@ def allocating(function: F) -> F:
 
 
 def _compiled(function: F, *, counting: bool) -> F:
-    folder = _cache_folder(Path(inspect.getfile(function)).resolve().parent)
+    folder = cache_folder(Path(inspect.getfile(function)).resolve().parent)
     with _cached_in(folder):
         compiled = numba.njit(
             cache=True, _nrt=counting, fastmath={"contract"}, error_model="numpy", nogil=True
@@ -65,7 +65,7 @@ def callback(function: F, signature: Any) -> Any:
 
     It is cached on disk under a hash of the source of its file and of all kernels. Returns numba's compiled function.
     """
-    folder = _cache_folder(Path(inspect.getfile(function)).resolve())
+    folder = cache_folder(Path(inspect.getfile(function)).resolve())
     with _cached_in(folder):
         compiled = numba.cfunc(signature, cache=True, fastmath={"contract"}, error_model="numpy", nogil=True)(function)
     _check(function, compiled._cache.cache_path, folder)
@@ -78,7 +78,7 @@ def inlined(function: F) -> F:
 
 
 @cache
-def _cache_folder(source: Path) -> Path:
+def cache_folder(source: Path) -> Path:
     """Create, if needed, and return the cache folder for the kernels of ``source``, a file or folder.
 
     It is named after a hash of LANES and of the sources: those of this folder and of ``source``, which means all files

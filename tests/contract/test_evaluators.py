@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 
 from tests.workers import pendulum
-from wingfit.calibration.evaluator import gather, run_unit, units
+from wingfit.calibration.evaluator import distinct, gather, run_unit, units
 from wingfit.calibration.problem import Evaluation, Problem
 from wingfit.workers import (
     EvaluationInterruptedError,
@@ -29,7 +29,9 @@ from wingfit.workers import (
     WorkerLostError,
     make_evaluator,
 )
+from wingfit.workers.in_process import InProcessEvaluator
 from wingfit.workers.ray_batches import UNDER_WAY, UNKNOWN_TASKS
+from wingfit.workers.share import Task
 from wingfit.workers.watch import ATTEMPTS
 
 KINDS: tuple[EvaluatorKind, ...] = ("in_process", "processes", "ray")
@@ -87,6 +89,23 @@ def test_same_bits_everywhere(any_evaluator: RunningEvaluator, individuals: int)
     assert wanted.reasons[0] == "overdamped"
     assert wanted.fitness[0] == np.inf
     assert all(np.isfinite(wanted.fitness[1:]))
+
+
+def test_equal_individuals_are_simulated_once(any_evaluator: RunningEvaluator) -> None:
+    problem, values = pendulum.problem(), pendulum.population(11)
+    values = values[[3, 0, 3, 7, 0, 10, 3, 3]]
+    assert_same_bits(any_evaluator.evaluate(problem, values, residuals=True), reference(problem, values))
+    rows, place = distinct(problem, values)
+    assert (rows[place] == values).all()
+    assert (len(rows), place) == (4, [0, 1, 0, 2, 1, 3, 0, 0])
+
+
+def test_only_distinct_individuals_become_work(monkeypatch: pytest.MonkeyPatch) -> None:
+    evaluator, rows = InProcessEvaluator(), []
+    monkeypatch.setattr(Task, "run", lambda task, *_, **__: rows.append(len(task.values)))
+    monkeypatch.setattr("wingfit.workers.running_evaluator.gather", lambda *_: Evaluation(()))
+    evaluator.evaluate(pendulum.problem(), np.repeat(pendulum.population(3), 20, axis=0))
+    assert set(rows) == {3}
 
 
 def test_residuals_only_on_request(any_evaluator: RunningEvaluator) -> None:

@@ -92,10 +92,10 @@ def test_where_no_cache_can_be_written(tmp_path: Path, monkeypatch: pytest.Monke
     (tmp_path / "file").touch()
     monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path / "file"))
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    assert jit._cache_folder.__wrapped__(tmp_path).parent == tmp_path / "wingfit" / tmp_path.stem
+    assert jit.cache_folder.__wrapped__(tmp_path).parent == tmp_path / "wingfit" / tmp_path.stem
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
     with pytest.raises(OSError, match="NUMBA_CACHE_DIR"):
-        jit._cache_folder.__wrapped__(tmp_path)
+        jit.cache_folder.__wrapped__(tmp_path)
 
 
 def test_old_caches_are_forgotten(tmp_path: Path) -> None:
