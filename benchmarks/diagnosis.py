@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.common import machine
+from benchmarks.common.kernel_time import kernel_time
 from benchmarks.concealed.bench import WingBench, record_all
 from benchmarks.concealed.plant.law import Concealed
 from benchmarks.concealed.trials import FREQUENCIES, LAGS, THICK_PA, THIN_PA, Build, chamber, name_of, tunnel
@@ -83,6 +84,21 @@ def measured(path: Path, division: str, evaluator: EvaluatorKind, workers: int) 
     }
 
 
+def profiled(path: Path, division: str) -> dict[str, Any]:
+    """Diagnose the file at ``path`` in this process; return the figures of :func:`measured` and the kernels' share."""
+    began = time.thread_time()
+    with kernel_time() as kernels:
+        found = measured(path, division, "in_process", 1)
+    processor = time.thread_time() - began
+    return found | {
+        "processor_seconds": processor,
+        "kernels_percent": 100 * kernels.seconds / processor,
+        "group_beats": kernels.beats,
+        "lanes_in_use_percent": kernels.lanes_in_use_percent,
+        "one_lane_in_use_percent": 100 * kernels.alone / kernels.seconds,
+    }
+
+
 def _stages(reports: Sequence[tuple[float, Progress]]) -> dict[str, float]:
     """Return the seconds spent in each kind of stage: the first two words of the stage's name in ``reports``.
 
@@ -104,11 +120,15 @@ def main() -> None:
     parser.add_argument("--evaluator", choices=("processes", "ray", "in_process"), default="ray")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--profile", action="store_true", help="compute in one process, and say where the time goes")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as scratch:
         path = Path(scratch) / "twelve.nc"
         save_dataset(recorded(options.division, options.plant, options.seed), path)
-        found = measured(path, options.division, options.evaluator, options.workers)
+        if options.profile:
+            found = profiled(path, options.division)
+        else:
+            found = measured(path, options.division, options.evaluator, options.workers)
     figures = {"cpu": machine.cpu(), "commit": machine.commit(), **found}
     width = max(map(len, figures))
     for name, value in figures.items():
