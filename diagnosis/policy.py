@@ -36,6 +36,9 @@ class Policy:
     predicted_weight: float = _threshold(
         0.25, "fraction", "weight of cross-validated against fitted residuals: the cross-validation is linearised"
     )
+    drift_left: float = _threshold(
+        0.5, "slow change of the beat", "a hypothesis that leaves more does not explain a drift of the rig"
+    )
     least_evidence: float = _threshold(2.0, "evidence", "no effect is searched for, or added to the model, for less")
     single: float = _threshold(0.85, "probability", "share of all effects from which one hypothesis is named")
     listed: float = _threshold(

@@ -64,6 +64,17 @@ class WhitenedData:
         return max(float(np.sqrt(square)), self.tolerance)
 
     @cached_property
+    def drift(self) -> float:
+        """Root mean square (m or N) over all used channels of slow changes of the beat that noise does not explain."""
+        sizes = [fit.drift.size if fit.drift and fit.drift.found else 0.0 for fit in self.beat_fits]
+        return float(np.sqrt(self.recording_weights @ np.square(sizes)))
+
+    def change_of_beat(self, coefficients: Float[Array, " D"]) -> float:
+        """Return the mean square (m^2 or N^2) of a residual's linear change of the first harmonic."""
+        slow = np.concatenate([np.tile(v.trend & (v.order > 0), int(v.used.sum())) for v in self.beat_fits])
+        return float(self.weight[slow] @ coefficients[slow] ** 2)
+
+    @cached_property
     def recording_slices(self) -> tuple[slice, ...]:
         """Where the coefficients of each recording are in a coefficient vector [D]."""
         ends = np.cumsum([0, *(fit.used.sum() * len(fit.order) for fit in self.beat_fits)]).tolist()

@@ -38,9 +38,9 @@ from wingfit.diagnosis.location.missing_physics import (
 from wingfit.diagnosis.location.pulse_phase import locate_pulse
 from wingfit.diagnosis.search_state import SearchState
 from wingfit.diagnosis.verdict.next_experiment import rank_conditions, separations
+from wingfit.diagnosis.verdict.noise_remarks import drift_sentence, noise_remarks
 from wingfit.diagnosis.verdict.proof import ResidualPair, predict_held_out, proof, recording_misfits
 from wingfit.diagnosis.verdict.verdict import Decision, decide, hypotheses, summary
-from wingfit.inference.noise.harmonic import still_markers
 from wingfit.records import Recording
 
 Step = tuple[float, str, Finding | None]
@@ -164,7 +164,8 @@ def _finding(
         unit=unit,
         model=subject.description,
         verdict=decision.verdict,
-        summary=summary(decision, suspects, _summary_texts(data, nominal, best, location.words, proved)),
+        summary=summary(decision, suspects, _summary_texts(data, nominal, best, location.words, proved))
+        + drift_sentence(data),
         probabilities=decision.probabilities,
         named=decision.named,
         added_effects=best.names,
@@ -186,7 +187,7 @@ def _finding(
         remarks=(
             *state.fitted_nominal.remarks,
             *_refinement_remarks(state.fitted_nominal),
-            *_noise_remarks(data),
+            *noise_remarks(data, unit),
             *_unidentified_sizes(genes, best),
             *_worsened(rows, best, unit),
         ),
@@ -230,21 +231,6 @@ def _summary_texts(
 def _refinement_remarks(nominal: Nominal) -> tuple[str, ...]:
     remark = f"a finer discretisation ({nominal.tried_finer}) hardly fits better: the discretisation is not the cause"
     return (remark,) if nominal.tried_finer else ()
-
-
-def _noise_remarks(data: WhitenedData) -> tuple[str, ...]:
-    within_beats = [r.name for r, v in zip(data.recordings, data.beat_fits, strict=True) if not v.between_beats]
-    remarks = [
-        f"{one.name}: the recorded position of {', '.join(markers)} never changes; ignored: check the export of tracks"
-        for one in data.recordings
-        if (markers := still_markers(one))
-    ]
-    if within_beats:
-        remarks.append(
-            f"{', '.join(within_beats)}: fewer than two beats in the order of the frames; noise is estimated only "
-            "from the residual of the beat's harmonics, and slow noise may look like misfit: record longer"
-        )
-    return tuple(remarks)
 
 
 def _unidentified_sizes(genes: Sequence[GeneValue], best: Refit) -> tuple[str, ...]:

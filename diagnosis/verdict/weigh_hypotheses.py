@@ -65,6 +65,8 @@ def weigh(
     weight, other = np.exp(evidence - top), np.exp(unknown - top)
     if nominal_refuted(data, nominal.excess, floor):
         weight[0] = 0.0
+    elif drifts(data):
+        weight *= [_explains_drift(data, nominal, one) for one in hypotheses]
     total = weight.sum() + other
     return HypothesisWeights(
         hypotheses, evidence - evidence[0], weight / total, float(other / total), excess, data.policy
@@ -80,6 +82,19 @@ def nominal_refuted(data: WhitenedData, excess: float, floor: float) -> bool:
     return excess - explainable > data.policy.refuting_excess * data.excess_standard_error
 
 
+def drifts(data: WhitenedData) -> bool:
+    """Return whether the beat changes slowly by more than what counts as none.
+
+    The nominal model is the same in every beat, so something is missing even if the mean beat fits.
+    """
+    return data.drift > data.policy.negligible * data.noise
+
+
+def _explains_drift(data: WhitenedData, nominal: Refit, refit: Refit) -> bool:
+    left, before = (data.change_of_beat(one.fit.coefficients) for one in (refit, nominal))
+    return left < data.policy.drift_left * before
+
+
 def _evidence(data: WhitenedData, excess: Array, genes: Array, effects: Array, suspects: int) -> Array:
     """Return the log evidence [H] for ``excess`` [H], a multiple of the noise variance, with the tolerated part."""
     return np.asarray(
@@ -91,7 +106,7 @@ def _evidence(data: WhitenedData, excess: Array, genes: Array, effects: Array, s
 
 def nominal_suffices(data: WhitenedData, nominal: Refit, suspects: int) -> bool:
     """Return whether the nominal excess is too small for any effect to be worth its genes, even a perfect one."""
-    if nominal_refuted(data, nominal.excess, 0.0):
+    if nominal_refuted(data, nominal.excess, 0.0) or drifts(data):
         return False
     tau = tolerated_excess(data, nominal.excess, 0.0)
     excess = _misfit(data, nominal, tau)

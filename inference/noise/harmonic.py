@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import elliprg
 
+from wingfit.inference.noise.drift import Drift, drift_of, slow_basis
 from wingfit.inference.noise.mean_beat import fourier_basis, scatter_about
 from wingfit.inference.noise.spectrum import density_at_harmonics, lag1_autocorrelation
 from wingfit.records import Recording
@@ -49,6 +50,7 @@ class HarmonicFit:
             than
         two beats, if it was estimated from the part of the spectrum above the fitted harmonics.
         coefficients: [C, P] of the recording itself.
+        drift: slow change of the beat during the recording; None for too few beats.
     """
 
     order: Int[Index, " P"]
@@ -61,6 +63,7 @@ class HarmonicFit:
     lag1: float
     between_beats: bool
     coefficients: Float[Array, "C P"]
+    drift: Drift | None = None
 
     def of(self, residuals: Float[Array, "*B T C"]) -> Float[Array, "*B C P"]:
         """Fourier coefficients [..., C, P] of ``residuals`` [..., T, C] (NaN: not recorded); zero if not used."""
@@ -91,6 +94,7 @@ def harmonic_fit(recording: Recording, compared: Mask | None = None) -> Harmonic
         lag1_autocorrelation(scatter.values, valid),
         scatter.beats >= 2,
         np.einsum("cpt,tc->cp", inverse, np.where(valid, recording.values, 0.0)),
+        scatter.drift,
     )
 
 
@@ -126,7 +130,7 @@ class _Scatter:
     T samples, C channels, P basis functions (mean, harmonics, trends), H harmonics.
 
     Attributes:
-        values: [T, C] recorded values minus mean beat, zero where not valid.
+        values: [T, C] recorded values minus mean beat, and minus a drift that was found; zero where not valid.
         valid: [T, C], True for the samples used: of channels that move and have enough samples.
         basis: [T, P] basis functions at the samples.
         order: [P] harmonic of each basis function; 0 for the mean.
@@ -136,6 +140,7 @@ class _Scatter:
         density: relative spectral density of the noise at harmonics 0 .. H, [H + 1], and the scale [C] of each channel
         (a variance) by which it is multiplied.
         variance: [C] of the noise of one sample.
+        drift: slow change of the beat; None for too few beats.
     """
 
     values: Array
@@ -147,6 +152,7 @@ class _Scatter:
     inner: Array
     density: tuple[Array, Array]
     variance: Array
+    drift: Drift | None
 
     @classmethod
     def of(cls, recording: Recording, compared: Mask | None) -> _Scatter:
@@ -167,11 +173,19 @@ class _Scatter:
         valid = valid & used
         recorded = np.where(valid, recording.values, 0.0)
         # Trends are not subtracted: they would absorb some of the noise.
-        values = scatter_about(basis[:, ~trend], recorded, valid)
+        values, fitted = scatter_about(basis[:, ~trend], recorded, valid), order[~trend]
+        psi = 2 * np.pi * recording.condition.flap_frequency * recording.times
+        drift = drift_of(values, valid, psi, np.asarray(advance * number, float), harmonics, beats)
+        if drift and drift.found:  # not noise: what it is, the trends show
+            slow, of = slow_basis(psi, beats, harmonics)
+            columns = np.hstack([basis[:, ~trend], slow])
+            if SPARE * columns.shape[1] <= valid.sum(axis=0)[used].min():
+                widened = np.sqrt((beats - 1.0) / (beats - 1.0 - (of == 0).sum()))
+                values, fitted = widened * scatter_about(columns, recorded, valid), np.concatenate([fitted, of])
         density = density_at_harmonics(values, valid, advance, number, harmonics, beats)
-        taken = density[1] * density[0][order[~trend]].sum()  # power of the noise that the fit of the mean beat absorbs
+        taken = density[1] * density[0][fitted].sum()  # power of the noise that the fit of the mean beat absorbs
         variance = ((values**2).sum(axis=0) + taken) / np.maximum(valid.sum(axis=0), 1)
-        return cls(values, valid, basis, order, trend, beats, inner, density, variance)
+        return cls(values, valid, basis, order, trend, beats, inner, density, variance, drift)
 
 
 def _check_moves(recording: Recording, seen: Mask) -> None:

@@ -27,20 +27,34 @@ from wingfit.records import Condition
 
 
 def refit(
-    left: float, names: tuple[str, ...] = (), genes: int = 1, family: str = "structure", predicted: float | None = None
+    left: float,
+    names: tuple[str, ...] = (),
+    genes: int = 1,
+    family: str = "structure",
+    predicted: float | None = None,
+    drift: float = 1.0,
 ) -> Refit:
-    """A refit with a residual of ``left`` noises (RMS), cross-validated to the same unless ``predicted``."""
+    """A refit with a residual of ``left`` noises (RMS), cross-validated to the same unless ``predicted``.
+
+    ``drift``: mean square of the slow change of the beat that it leaves.
+    """
     trials = tuple(
         SimpleNamespace(suspect=SimpleNamespace(name=n, family=family, genes=()), freedom=genes) for n in names
     )
-    return Refit(cast("Any", trials), cast("Any", None), left**2, (left if predicted is None else predicted) ** 2)
+    fit = SimpleNamespace(coefficients=drift)
+    return Refit(cast("Any", trials), cast("Any", fit), left**2, (left if predicted is None else predicted) ** 2)
 
 
-def data(recordings: int = 6, excess_standard_error: float = 0.0) -> WhitenedData:
+def data(recordings: int = 6, excess_standard_error: float = 0.0, drift: float = 0.0) -> WhitenedData:
     return cast(
         "WhitenedData",
         SimpleNamespace(
-            noise=1.0, effective_samples=6.0 * recordings, excess_standard_error=excess_standard_error, policy=POLICY
+            noise=1.0,
+            effective_samples=6.0 * recordings,
+            excess_standard_error=excess_standard_error,
+            policy=POLICY,
+            drift=drift,
+            change_of_beat=float,
         ),
     )
 
@@ -53,6 +67,23 @@ def verdict(nominal: float, *others: Refit, floor: float = 0.0) -> tuple[str, tu
 
 def test_an_excess_below_the_noise_is_adequate() -> None:
     assert verdict(0.15, refit(0.1, ("a",)), refit(0.05, ("b",), 3)) == ("adequate", ())
+
+
+def test_a_drift_is_not_adequate_even_where_the_mean_beat_fits() -> None:
+    fits = refit(0.15), [refit(0.05, ("a",), drift=0.9)]
+    assert decide(weigh(data(drift=0.2), *fits, 0.0, 40)).verdict == "adequate", "too small to matter"
+    found = decide(weigh(data(drift=0.5), *fits, 0.0, 40))
+    assert found.verdict == "unnamed"
+    assert found.probabilities["unnamed"] == pytest.approx(1.0)
+    assert not nominal_suffices(data(drift=0.5), refit(0.05), 40)
+
+
+def test_an_effect_that_explains_the_drift_is_possible() -> None:
+    """A wrong rate of the strobe shifts the phase of the beat slowly."""
+    weights = weigh(data(drift=0.5), refit(0.25), [refit(0.05, ("a",), drift=0.1), refit(0.0, ("b",))], 0.0, 40)
+    assert weights.probabilities[0] == 0.0
+    assert weights.probabilities[1] > 0.0
+    assert weights.probabilities[2] == 0.0
 
 
 def test_an_effect_that_explains_nearly_all_is_named() -> None:

@@ -1,0 +1,74 @@
+"""Remarks on the noise of the recordings: slow, uneven, or not noise at all."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
+from wingfit.diagnosis.finding import in_milli
+from wingfit.inference.noise.drift import Drift
+from wingfit.inference.noise.harmonic import still_markers
+
+UNEVEN = 3.0  # times the median noise: recordings with more get a remark
+
+
+def noise_remarks(data: WhitenedData, unit: str) -> tuple[str, ...]:
+    """Return remarks on the noise of the recordings, and on what may be mistaken for it; ``unit``: "m" or "N"."""
+    within_beats = [r.name for r, v in zip(data.recordings, data.beat_fits, strict=True) if not v.between_beats]
+    remarks = [
+        f"{one.name}: the recorded position of {', '.join(markers)} never changes; ignored: check the export of tracks"
+        for one in data.recordings
+        if (markers := still_markers(one))
+    ]
+    if within_beats:
+        remarks.append(
+            f"{', '.join(within_beats)}: fewer than two beats in the order of the frames; noise is estimated only "
+            "from the residual of the beat's harmonics, and slow noise may look like misfit: record longer"
+        )
+    return (*remarks, *_drift_remarks(data, unit), *_uneven_noise_remarks(data, unit))
+
+
+def _drift_remarks(data: WhitenedData, unit: str) -> tuple[str, ...]:
+    """Return a remark on recordings during which the beat changes slowly; empty if there are none."""
+    found = [
+        f"{name} (by {in_milli(drift.size, unit)}, {drift.ratio:.2g} times the power of noise)"
+        for name, drift in _drifts(data)
+    ]
+    remark = (
+        f"the beat changes slowly during {', '.join(found)}: something drifts (a stiffness, a motor, a clock, a "
+        "camera), and a periodic model does not explain that unless a suspect drifts too; record when the rig has "
+        "settled, or shorter"
+    )
+    return (remark,) if found else ()
+
+
+def _uneven_noise_remarks(data: WhitenedData, unit: str) -> tuple[str, ...]:
+    """Return a remark on recordings with several times the noise of the others; empty if there are none."""
+    levels = np.array([float(np.sqrt(np.mean(fit.noise[fit.used] ** 2))) for fit in data.beat_fits])
+    usual = float(np.median(levels))
+    loud = [
+        f"{one.name} ({in_milli(level, unit)})"
+        for one, level in zip(data.recordings, levels, strict=True)
+        if level > UNEVEN * usual
+    ]
+    remark = (
+        f"the noise of {', '.join(loud)} is more than {UNEVEN:g} times the usual {in_milli(usual, unit)}: what happens "
+        "there but not in every beat is taken for noise, and missing physics may hide in it"
+    )
+    return (remark,) if loud else ()
+
+
+def drift_sentence(data: WhitenedData) -> str:
+    """Return a sentence for the summary if the beat changes slowly during recordings; empty if it does not."""
+    drifting, every = len(_drifts(data)), len(data.recordings)
+    return (
+        f" The beat changes slowly during {drifting} of {every} recordings: something drifts, which may be the cause."
+        if drifting
+        else ""
+    )
+
+
+def _drifts(data: WhitenedData) -> list[tuple[str, Drift]]:
+    """Name and drift of the recordings during which the beat changes slowly."""
+    fits = zip(data.recordings, data.beat_fits, strict=True)
+    return [(one.name, fit.drift) for one, fit in fits if fit.drift and fit.drift.found]
