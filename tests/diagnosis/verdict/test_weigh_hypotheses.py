@@ -255,12 +255,17 @@ def test_no_verdict_depends_on_the_unit_of_length(unit: float, nominal: float, e
         scaled = cast(
             "WhitenedData",
             SimpleNamespace(
-                noise=unit, effective_samples=36.0, excess_standard_error=excess_standard_error * unit**2, policy=POLICY
+                noise=unit,
+                effective_samples=36.0,
+                excess_standard_error=excess_standard_error * unit**2,
+                policy=POLICY,
+                drift=0.5 * unit,
+                change_of_beat=lambda power: power * unit**2,
             ),
         )
         before, *others = (
-            refit(unit * left, (name,), predicted=2.0 * unit * left)
-            for left, name in ((nominal, ""), (0.3, "a"), (0.2, "b"))
+            refit(unit * left, (name,), predicted=2.0 * unit * left, drift=drift)
+            for left, name, drift in ((nominal, "", 1.0), (0.3, "a", 0.1), (0.2, "b", 0.9))
         )
         found = weigh(scaled, before, others, 0.2 * unit, 40)
         shares = [*found.probabilities, found.unknown, *found.excess]
