@@ -19,7 +19,7 @@ from wingfit.records.array_types import Array, Bool, Float, Index, Int, Mask
 
 HARMONICS = 3  # compared: those in which a wing moves most
 FEWEST_BEATS = 3  # with which lines remain that the change does not use up
-LONG = 6  # beats from which a curved change is told from noise, too
+LONG = 6  # beats from which a curved change is removed, too
 CERTAIN = 1e-5  # probability of noise alone below which a change counts as found
 LEAST_RATIO = 1.5  # of its power to that of noise: less may come from noise whose density rises towards a harmonic
 _RANK = 1e-6
