@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+import random
 import shutil
 import signal
+import socket
 import sqlite3
 import stat
 import subprocess
@@ -18,7 +20,7 @@ from tempfile import TemporaryDirectory
 
 import pytest
 
-from tests.oracles.processes import EXAMPLES, IMPATIENT, MARK, REPOSITORY, environment, free_port, marked
+from tests.oracles.processes import EXAMPLES, IMPATIENT, MARK, REPOSITORY, environment, marked
 from wingfit.client.client import Client, ServerAwayError
 
 SCRIPT = REPOSITORY / "deploy" / "slurm" / "wingfit.sbatch"
@@ -49,16 +51,28 @@ def folder() -> Iterator[Path]:
         yield Path(short)
 
 
+def late_port() -> int:
+    """A free port that no other test gets meanwhile: the script uses it only after a minute on a busy machine.
+
+    It lies below those that the kernel gives to whoever asks for any, and above those of Ray's workers.
+    """
+    while True:
+        port = random.randrange(20_000, 32_000)
+        with socket.socket() as probe, suppress(OSError):
+            probe.bind(("127.0.0.1", port))
+            return port
+
+
 class Job:
     """One execution of the Slurm script."""
 
     def __init__(self, folder: Path, **more: str) -> None:
-        self.folder, self.mark, self.port = folder, uuid.uuid4().hex, free_port()
+        self.folder, self.mark, self.port = folder, uuid.uuid4().hex, late_port()
         settings = {
             "SLURM_JOB_ID": "4242", "SLURM_JOB_NUM_NODES": "2", "SLURM_CPUS_PER_TASK": "1",
             "SLURM_SUBMIT_DIR": str(folder), "SLURM_TEST_FOLDER": str(folder),
             "WINGFIT_VENV": sys.prefix, "WINGFIT_SCRATCH": str(folder / "scratch"),
-            "WINGFIT_PORT": str(self.port), "WINGFIT_RAY_PORT": str(free_port()),
+            "WINGFIT_PORT": str(self.port), "WINGFIT_RAY_PORT": str(late_port()),
             "WINGFIT_RAY_OPTIONS": "--object-store-memory=80000000",
             "PATH": f"{folder / 'bin'}:{os.environ['PATH']}", MARK: self.mark, **IMPATIENT, **more,
         }  # fmt: skip
