@@ -57,7 +57,7 @@ def late_port() -> int:
     It lies below those that the kernel gives to whoever asks for any, and above those of Ray's workers.
     """
     while True:
-        port = random.randrange(20_000, 32_000)
+        port = random.randrange(20_000, 32_000)  # noqa: S311 (not a secret)
         with socket.socket() as probe, suppress(OSError):
             probe.bind(("127.0.0.1", port))
             return port
