@@ -165,8 +165,8 @@ class _Run:
                 raise
             raise ValueError(
                 f"stage {self.stage.name!r}: Gauss-Newton with division {self.spec.division!r} cannot start at the "
-                f"best of the search with search_division {self.spec.search_division!r}: {error}; use method 'auto', which "
-                "has several starts, or leave search_division out"
+                f"best of the search with search_division {self.spec.search_division!r}: {error}; use method 'auto', "
+                "which has several starts, or leave search_division out"
             ) from error
 
     def starts(self) -> Iterator[Generation]:

@@ -118,7 +118,7 @@ def _refuse_search_division(spec: CalibrationSpec, method: Method, *, wing: bool
     if method != "auto" and not spec.finish:
         raise SearchDivisionError(
             f"{what} with method {method!r} would end at the minimum of that discretisation, and not at that of "
-            f"division {spec.division!r}; add finish (Gauss-Newton after the search), use method 'auto', or leave it out"
+            f"division {spec.division!r}; add finish (Gauss-Newton afterwards), use method 'auto', or leave it out"
         )
 
 

@@ -59,7 +59,7 @@ def ran(spec: CalibrationSpec, dataset: Dataset) -> tuple[list[Generation], list
 
 
 def resumes(spec: CalibrationSpec, dataset: Dataset, whole: list[Generation]) -> None:
-    """Taken up after any generation, the next one is the same to the bit, with its checkpoint; so all later ones are."""
+    """Taken up after any generation, the next is the same to the bit, with its checkpoint; so all later ones are."""
     for before, after in pairwise(whole):
         checkpoint = json.loads(json.dumps(before.checkpoint, allow_nan=False))
         assert next(calibrate(spec, dataset, Here(), checkpoint)) == after
