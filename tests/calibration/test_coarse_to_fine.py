@@ -167,7 +167,7 @@ def test_what_does_not_fit_is_refused_with_value_and_remedy(small: tuple[Dataset
         replace(SPEC, method="gauss_newton"), dataset, f"{what}.*'gauss_newton' has none; use method 'auto', or leave"
     )
     for method in (None, "genetic", "cma_es"):
-        spec = replace(SPEC, method=method)  # type: ignore[arg-type]
+        spec = replace(SPEC, method=method)
         refused(
             spec, dataset, f"{what} with method '{method or 'genetic'}'.*division '4'; add finish.*use method 'auto'"
         )
