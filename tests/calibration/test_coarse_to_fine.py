@@ -127,7 +127,7 @@ def test_finishing_starts_at_the_coarse_optimum_and_ends_at_the_fine_one(
     resumes(spec, dataset, whole)
 
 
-def test_a_start_that_the_fine_wing_cannot_take_is_told_with_a_remedy(small: tuple[Dataset, Genome]) -> None:
+def test_a_start_that_the_fine_wing_cannot_take_is_reported_with_a_remedy(small: tuple[Dataset, Genome]) -> None:
     dataset, _ = small
 
     class Fragile(Here):

@@ -1,4 +1,4 @@
-"""The discretisation of the search (``search_division``) in requests for runs, and in what is told of them."""
+"""The discretisation of the search (``search_division``) in requests for runs and in the answers about them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from wingfit.sim.virtual_rigs.campaign import robird_wing
 
 
 @pytest.mark.parametrize("how", [{"method": "auto"}, {"finish": True}, {"method": "cma_es", "finish": True}])
-def test_it_is_accepted_and_told(api: Api, how: dict[str, Any]) -> None:
+def test_it_is_accepted_and_reported(api: Api, how: dict[str, Any]) -> None:
     body = {"dataset_id": api.upload()["id"], "division": "11", "search_division": "4", **how}
     answer = api.client.post("/v1/runs?validate_only=true", json=body)
     assert answer.is_success, answer.text
