@@ -13,7 +13,7 @@ import numpy as np
 from wingfit.calibration.effects import group_of, refuse_idle
 from wingfit.calibration.forces.split_beats import Cut
 from wingfit.calibration.problem import base_genome, compared
-from wingfit.calibration.spec import CalibrationSpec, Mode, model_for, resolved
+from wingfit.calibration.spec import CalibrationSpec, Mode, model_for, resolved, search_model
 from wingfit.records import Dataset, LowPass, Recording
 from wingfit.sim.filtering import default_cutoff, low_passed
 from wingfit.sim.vehicle.blade_element_wing import BladeElementWing
@@ -41,12 +41,14 @@ class Prepared:
         model: the simulation, with the requested effects.
         stages: searches in their order; a joint calibration has one.
         held_out: recordings that are never fitted, filtered like those that are.
+        search_model: the simulation that the search before Gauss-Newton uses, with the same genes; None: ``model``.
     """
 
     spec: CalibrationSpec
     model: FlexibleWing | BladeElementWing
     stages: tuple[Stage, ...]
     held_out: tuple[Recording, ...]
+    search_model: FlexibleWing | None = None
 
     @property
     def searched(self) -> tuple[str, ...]:
@@ -57,7 +59,7 @@ class Prepared:
 def prepare(spec: CalibrationSpec, dataset: Dataset) -> Prepared:
     """Choose model, stages and filters, without simulating; ValueError if ``spec`` does not fit ``dataset``."""
     spec = resolved(spec, dataset)
-    model = model_for(dataset, spec)
+    model, coarse = model_for(dataset, spec), search_model(dataset, spec)
     known = [gene.name for gene in model.genes]
     for name in (*spec.genes, *spec.fixed):
         if name not in known:
@@ -73,7 +75,7 @@ def prepare(spec: CalibrationSpec, dataset: Dataset) -> Prepared:
     refuse_idle(spec.effects, free, spec.fixed)
     stages = _stages(spec.mode, free, tuple(as_fitted(spec, recording) for recording in fitted))
     held_out = tuple(as_fitted(spec, one) for one in dataset.recordings if one.name in dataset.held_out)
-    return Prepared(spec, model, stages, held_out)
+    return Prepared(spec, model, stages, held_out, coarse)
 
 
 def _fitted(spec: CalibrationSpec, dataset: Dataset) -> tuple[Recording, ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from wingfit.calibration import cma, genetic
@@ -35,7 +35,9 @@ class Generation:
     """Progress after one generation; a calibration can be resumed from its ``checkpoint`` (JSON).
 
     A Gauss-Newton iteration is a generation too. It minimises the cost of Armanini et al. 2016, Eq. 22, which weighs
-    recordings and channels by their noise, so that ``best`` need not fall in every iteration.
+    recordings and channels by their noise, so that ``best`` need not fall in every iteration. With a
+    ``search_division``, misfits of the search are those of that model and misfits of iterations those of the wanted
+    one: they are not comparable, and ``best`` may rise from the search to the first iteration.
 
     ``best`` and ``mean`` are sums of squares, m^2 or N^2; ``distance`` is the best individual's misfit, m or N
     (:class:`wingfit.calibration.problem.Misfit`); ``diversity`` is the standard deviation of the population, genes
@@ -130,13 +132,18 @@ def _empty(spec: CalibrationSpec) -> Population:
 
 
 class _Run:
-    """The search of one stage; ``state`` is updated after every generation."""
+    """The search of one stage; ``state`` is updated after every generation.
+
+    The population of a search simulates ``searched``, Gauss-Newton iterates on ``problem``; they may differ in the
+    discretisation of the wing. Between the two go values of genes; no misfit of one is compared with one of the other.
+    """
 
     def __init__(self, ready: Prepared, state: _State, evaluator: Evaluator) -> None:
         self.spec, self.stages, self.state, self.evaluator = ready.spec, ready.stages, state, evaluator
         self.stage = ready.stages[state.stage]
         base = base_genome(ready.model, state.base)
         self.problem = Problem(ready.model, self.stage.recordings, self.stage.free, base, ready.spec.axes)
+        self.searched = replace(self.problem, model=ready.search_model or ready.model)
         self.genes = free_genes(self.problem)
 
     def search(self) -> Iterator[Generation]:
@@ -150,8 +157,17 @@ class _Run:
         limit = ITERATIONS
         if self.spec.method == "gauss_newton":  # after a search, the limit of its generations does not apply
             limit = min(ITERATIONS, self.spec.max_generations)
-        for step in iterate(self.problem, self.evaluator, start, self.state.newton, limit):
-            yield self._iteration(step, step.converged or step.index + 1 >= limit)
+        try:
+            for step in iterate(self.problem, self.evaluator, start, self.state.newton, limit):
+                yield self._iteration(step, step.converged or step.index + 1 >= limit)
+        except ValueError as error:
+            if self.state.newton is not None or self.spec.search_division is None:
+                raise
+            raise ValueError(
+                f"stage {self.stage.name!r}: Gauss-Newton with division {self.spec.division!r} cannot start at the "
+                f"best of the search with search_division {self.spec.search_division!r}: {error}; use method 'auto', "
+                "which has several starts, or leave search_division out"
+            ) from error
 
     def starts(self) -> Iterator[Generation]:
         """Yield Gauss-Newton iterations from the best individuals of the search until two starts end at one cost.
@@ -184,7 +200,7 @@ class _Run:
         """Compute one generation: draw individuals, simulate them, and update the population."""
         spec, state, name = self.spec, self.state, self.stage.name
         unit = self._drawn()
-        evaluation = self.evaluator.evaluate(self.problem, values_at(self.genes, unit))
+        evaluation = self.evaluator.evaluate(self.searched, values_at(self.genes, unit))
         outcome = unit, evaluation.fitness, evaluation.distance, spec.tolerance
         if isinstance(state.population, cma.Distribution):
             state.population = cma.learnt(state.population, *outcome)

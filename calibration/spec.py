@@ -25,6 +25,9 @@ class CalibrationSpec:
     Attributes:
         division: rigid bodies of the simulated wing: a number ("4", "11", "24"), or bodies along the chord of each
             strip of the span, root first ("3,3,3,2").
+        search_division: for wings only, with a method that searches and then ends with Gauss-Newton ("auto", or
+            ``finish``): the search simulates the wing with this other, usually coarser discretisation, and Gauss-Newton
+            goes on with ``division`` from what it found. None: both have ``division``.
         mode: "staged" (wings) fits structural genes on vacuum recordings, then aerodynamic ones on the rest; "joint"
             fits all genes to all recordings; "local" (vehicles) fits each recording by itself. None: staged for a
             wing, local for a vehicle.
@@ -72,6 +75,11 @@ class CalibrationSpec:
     low_pass: float | None = None
     peel_width: float = 0.0
     effects: tuple[str, ...] = ()
+    search_division: str | None = None
+
+
+class SearchDivisionError(ValueError):
+    """The discretisation of the search (``search_division``) is impossible, or does not fit dataset or method."""
 
 
 def resolved(spec: CalibrationSpec, dataset: Dataset) -> CalibrationSpec:
@@ -91,7 +99,27 @@ def resolved(spec: CalibrationSpec, dataset: Dataset) -> CalibrationSpec:
             "mode 'local' fits each recording by itself, and a wing has one genome for all of them; "
             "use 'staged' or 'joint', and name a single recording to fit that alone"
         )
+    _refuse_search_division(spec, method, wing=wing)
     return replace(spec, mode=mode, method=method)
+
+
+def _refuse_search_division(spec: CalibrationSpec, method: Method, *, wing: bool) -> None:
+    what = f"search_division {spec.search_division!r}"
+    if spec.search_division is None:
+        return
+    if not wing:
+        raise SearchDivisionError(
+            f"{what} is a discretisation of a wing, and this dataset describes a vehicle; leave it out"
+        )
+    if method == "gauss_newton":
+        raise SearchDivisionError(
+            f"{what} is for a search, and method 'gauss_newton' has none; use method 'auto', or leave it out"
+        )
+    if method != "auto" and not spec.finish:
+        raise SearchDivisionError(
+            f"{what} with method {method!r} would end at the minimum of that discretisation, and not at that of "
+            f"division {spec.division!r}; add finish (Gauss-Newton afterwards), use method 'auto', or leave it out"
+        )
 
 
 def wing_model(dataset: Dataset, spec: CalibrationSpec) -> FlexibleWing:
@@ -100,6 +128,19 @@ def wing_model(dataset: Dataset, spec: CalibrationSpec) -> FlexibleWing:
     model = FlexibleWing(dataset.wing, spec.division, spec.bounds_factor, numerics, spec.effects)
     _ = model.structure, model.genes
     return model
+
+
+def search_model(dataset: Dataset, spec: CalibrationSpec) -> FlexibleWing | None:
+    """Return the model of a wing that only the search simulates, None if there is no ``search_division``.
+
+    It has the genes of :func:`wing_model`, with the same bounds. SearchDivisionError for an impossible discretisation.
+    """
+    if spec.search_division is None:
+        return None
+    try:
+        return wing_model(dataset, replace(spec, division=spec.search_division))
+    except ValueError as error:
+        raise SearchDivisionError(f"search_division: {error}; or leave it out") from None
 
 
 def vehicle_model(dataset: Dataset, spec: CalibrationSpec) -> BladeElementWing:

@@ -60,6 +60,9 @@ def submit(
     ctx: typer.Context,
     dataset: Annotated[str, typer.Argument(help="Id of a dataset, or a folder, .zip or .nc file to upload first.")],
     division: o.Division = None,
+    search_division: Annotated[
+        str | None, typer.Option(help="Search with this coarser division, then Gauss-Newton with --division.")
+    ] = None,
     mode: Annotated[
         str | None, typer.Option(help="staged (vacuum, then tunnel), joint, or local (each recording on its own).")
     ] = None,

@@ -140,6 +140,7 @@ class RunSpec(JobSpec):
     stall: int
     tolerance: float
     max_generations: int
+    search_division: str | None
     finish: bool
     mode: Literal["staged", "joint", "local"]
     method: Literal["genetic", "cma_es", "gauss_newton", "auto"]

@@ -110,8 +110,8 @@ class Client(DiagnosisCalls, KeyCalls):
         """Submit a calibration, and return the queued run.
 
         ``spec``: method, mode, finish, population, stall, tolerance, max_generations, seed, recordings, genes, effects,
-        name; for a wing also division, bounds_factor, accuracy_mm; for a vehicle also preset, without, axes,
-        low_pass_hz, peel_width_beats. Omitted settings have the server's defaults.
+        name; for a wing also division, search_division, bounds_factor, accuracy_mm; for a vehicle also preset, without,
+        axes, low_pass_hz, peel_width_beats. Omitted settings have the server's defaults.
         """
         body = given(dataset_id=dataset_id, **spec)
         return cast(a.Run, self._json("POST", "/v1/runs", json=body, key=str(uuid.uuid4())))

@@ -111,7 +111,8 @@ def _prepare(
     dataset: Dataset, spec: DiagnosisSpec
 ) -> tuple[Subject, tuple[Recording, ...], tuple[Recording, ...], tuple[str, ...]]:
     """Return the rig, the recordings to fit and those held out (all low-passed as for the fit), and the free genes."""
-    calibration = replace(spec.calibration, mode="joint", axes=_axes(dataset, spec) or spec.calibration.axes)
+    axes = _axes(dataset, spec) or spec.calibration.axes
+    calibration = replace(spec.calibration, mode="joint", axes=axes, search_division=None)  # there is no search
     ready = prepare(calibration, dataset)
     (stage,) = ready.stages
     return subject_of(dataset, calibration), stage.recordings, ready.held_out, stage.free

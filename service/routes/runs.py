@@ -8,6 +8,7 @@ from fastapi import APIRouter, Query, Request
 from starlette.responses import JSONResponse, Response
 
 from wingfit.calibration.search import CalibrationSpec
+from wingfit.calibration.spec import SearchDivisionError
 from wingfit.client.answers import Checked, Page, Run
 from wingfit.records import Dataset
 from wingfit.service.container import Service, ServiceDep
@@ -97,6 +98,9 @@ def _planned(service: Service, body: RunIn) -> tuple[Dataset, CalibrationSpec]:
     refuse_unknown(spec, dataset, gene_names(service.engine, spec, dataset))
     try:
         spec = service.engine.check(spec, dataset)
+    except SearchDivisionError as error:
+        fault = error_item("body.search_division", spec.search_division, str(error))
+        raise invalid("the specification does not fit the dataset", [fault]) from None
     except ValueError as error:
         raise invalid("the specification does not fit the dataset", [error_item("body", None, str(error))]) from None
     spec_views.refuse_idle(body, spec.method)

@@ -150,6 +150,13 @@ class RunIn(JobSettings):
     genes: Annotated[
         list[Name], Field(max_length=1000, description="empty: all of a wing; lift, rotation and fling of a vehicle")
     ] = []
+    search_division: Annotated[
+        Division | None,
+        Field(
+            description="wings only: discretisation that the search simulates, before Gauss-Newton with `division`; "
+            "with auto, or with finish; null: division"
+        ),
+    ] = None
     finish: Annotated[
         StrictBool, Field(description="Gauss-Newton after the search of each stage; auto ends so anyway")
     ] = False

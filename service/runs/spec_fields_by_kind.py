@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-WING_ONLY = ("division", "bounds_factor", "accuracy_mm", "outputs")
+WING_ONLY = ("division", "search_division", "bounds_factor", "accuracy_mm", "outputs")
 VEHICLE_ONLY = ("preset", "without", "axes", "low_pass_hz", "peel_width_beats")
 # Gauss-Newton has no population, and its own convergence criterion.
 SEARCH_ONLY = ("population", "stall", "tolerance", "finish")

@@ -139,7 +139,8 @@ def run_name(dataset: Dataset, spec: CalibrationSpec) -> str:
     method = METHODS.get(spec.method or "", spec.method) if unusual else None
     if spec.finish:
         method = f"{METHODS.get(spec.method or '', spec.method)} finished by Gauss-Newton"
-    parts = (dataset.name, model_name(dataset, spec), spec.mode, method)
+    coarse = f"searched with division {spec.search_division}" if spec.search_division else None
+    parts = (dataset.name, model_name(dataset, spec), spec.mode, method, coarse)
     return ", ".join(part for part in parts if part)[:LONGEST_NAME]
 
 

@@ -17,7 +17,7 @@ export const SOURCES = {
 };
 export const QUANTITIES = { lift: "Lift", drag: "Drag", x: "Force along x", z: "Force along z" };
 
-const WING_ONLY = ["division", "bounds_factor", "accuracy_mm"];
+const WING_ONLY = ["division", "search_division", "bounds_factor", "accuracy_mm"];
 const VEHICLE_ONLY = ["preset", "without", "axes", "low_pass_hz", "peel_width_beats"];
 // By method, settings that it does not use.
 const IDLE = { gauss_newton: ["population", "stall", "tolerance", "seed", "finish"], auto: ["finish"] };
@@ -55,7 +55,8 @@ export function setup(run) {
   const method = METHODS[spec.method] ?? spec.method ?? "genetic";
   const search = spec.method === "gauss_newton" ? null : `population ${spec.population}, seed ${spec.seed}`;
   const how = `${spec.mode}, ${method}${spec.finish && search ? " finished by Gauss-Newton" : ""}`;
-  return [modelOf(run), withEffects(spec), ...(isForces(run) ? forceSetup(spec) : []), how, search,
+  const coarse = spec.search_division ? `searched with division ${spec.search_division}` : null;
+  return [modelOf(run), withEffects(spec), ...(isForces(run) ? forceSetup(spec) : []), how, search, coarse,
     isForces(run) ? null : `solved to ${spec.accuracy_mm} mm`].filter(Boolean);
 }
 

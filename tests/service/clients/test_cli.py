@@ -146,6 +146,14 @@ def test_the_error_of_a_gene_that_starts_at_zero_is_in_its_unit(capsys: pytest.C
     assert results.identifiable(one) == "yes", "answers of earlier versions have no standard_error"
 
 
+def test_a_run_is_searched_with_a_coarser_division(wingfit: Wingfit, dataset_id: str) -> None:
+    words = ["runs", "submit", dataset_id, "--max-generations", "1", "--search-division", "4"]
+    assert "add finish (Gauss-Newton afterwards)" in " ".join(wingfit(*words)[2].split())
+    run = json.loads(wingfit(*words, "--finish", "--json")[1])
+    assert run["spec"]["search_division"] == "4"
+    assert "search_division 4" in " ".join(wingfit("runs", "show", run["id"])[1].split())
+
+
 def test_upload_submit_watch_fetch(wingfit: Wingfit, dataset_id: str, tmp_path: Path) -> None:
     words = ["runs", "submit", dataset_id, "--max-generations", "3", "--accuracy-mm", "0.05"]
     code, out, err = wingfit(*words, "--watch", "--name", "mine")
