@@ -18,21 +18,26 @@ SEARCHED = 8  # generations of the search before
 MOST = 5  # starts
 APART = 0.1  # largest difference of a gene between two starts, genes scaled to 0..1
 AGREE = 1.0  # difference of two negative log-likelihoods up to which they count as the same
+FLAT = 4.0  # the same, times the decrease at which iterations end
 
 
 @dataclass(frozen=True)
 class End:
-    """Where Gauss-Newton is from one start: ``cost`` J, sum of squares and misfit (m or N), and values by name."""
+    """Where Gauss-Newton is from one start: ``cost`` J, sum of squares and misfit (m or N), and values by name.
+
+    ``flat``: decrease of the cost at which iterations end.
+    """
 
     cost: float
     fitness: float
     distance: float
     values: dict[str, float]
+    flat: float = 0.0
 
     @classmethod
     def of(cls, step: Step) -> End:
         """Return where an iteration ended; its cost is that before the iteration, which is the last of a start."""
-        return cls(step.cost, step.fitness, step.distance, step.values)
+        return cls(step.cost, step.fitness, step.distance, step.values, step.flat)
 
 
 @dataclass
@@ -69,8 +74,8 @@ class Ends:
     @property
     def agreed(self) -> bool:
         """Whether two starts have ended at the least cost."""
-        costs = sorted(one["cost"] for one in self.done)
-        return len(costs) > 1 and bool(costs[1] - costs[0] <= AGREE)
+        ends = sorted((End(**one) for one in self.done), key=lambda end: end.cost)[:2]
+        return len(ends) == 2 and bool(ends[1].cost - ends[0].cost <= max(AGREE, FLAT * ends[0].flat))
 
 
 def apart(population: Population) -> list[list[float]]:

@@ -64,6 +64,7 @@ class Step:
         evaluations: individuals simulated in the iteration.
         reasons: why individuals failed.
         converged: whether this is the last iteration.
+        flat: decrease of the cost that counts as none; the ends of two estimations may differ by a few times as much.
     """
 
     index: int
@@ -77,6 +78,7 @@ class Step:
     reasons: tuple[str, ...]
     converged: bool
     checkpoint: dict[str, Any]
+    flat: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -211,7 +213,8 @@ def _iteration(problem: Problem, evaluator: Evaluator, genes: list[Gene], state:
     quadratic, power = _quadratic(noise, linear)
     move = _better(problem, evaluator, unit, noise, quadratic, power, state.damping)
     stays = move.gain == 0.0
-    flat = state.flat + 1 if move.decrease <= COST * 0.5 * power else 0
+    little = COST * 0.5 * power
+    flat = state.flat + 1 if move.decrease <= little else 0
     converged = stays or (flat > 0 and move.step <= STEP) or flat > 1
     motion = initial_motion(motion, move.unit)
     after = _State(tuple(move.unit.tolist()), tuple(motion.tolist()), move.damping, state.index + 1, flat, converged)
@@ -227,6 +230,7 @@ def _iteration(problem: Problem, evaluator: Evaluator, genes: list[Gene], state:
         reasons=(*linear.reasons, *move.reasons),
         converged=converged,
         checkpoint=after.saved(),
+        flat=little,
     )
     return step, after
 

@@ -84,6 +84,13 @@ def test_two_ends_agree_only_about_the_least_cost(costs: tuple[float, ...], agre
     assert ends(*costs).agreed is agreed
 
 
+def test_long_recordings_end_less_exactly_and_agree_within_that() -> None:
+    made = Ends()
+    for cost in (5.0, 5.0 + 2 * AGREE):
+        made.add(replace(step(cost), flat=0.6 * AGREE), last=True)
+    assert made.agreed
+
+
 def test_the_best_is_the_least_cost_of_all_starts() -> None:
     found = ends(5.0, 3.0, 4.0)
     assert (found.best().cost, found.best().fitness, found.best().distance) == (3.0, 6.0, 9.0)
