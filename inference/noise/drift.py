@@ -108,4 +108,4 @@ def _independent(values: Array) -> float:
     """Number of independent channels that scatter like ``values`` [T, C]: fewer than C where they scatter together."""
     covariance = values.T @ values
     size = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
-    return float(len(size) ** 2 / ((covariance / size / size[:, None]) ** 2).sum())
+    return float(len(size) ** 2 / max(float(((covariance / size / size[:, None]) ** 2).sum()), 1.0))

@@ -71,3 +71,15 @@ def test_it_is_not_taken_for_noise(beats: int) -> None:
 
 def test_two_beats_do_not_show_it() -> None:
     assert harmonic_fit(waving(2, 0.2, 1)).drift is None
+
+
+@pytest.mark.parametrize("still", [0, 1])
+def test_a_recording_without_noise_has_no_drift(still: int) -> None:
+    """Also where the scatter is exactly zero."""
+    given = waving(4, 0.0, 1, channels=3)
+    quiet = given.values - SIGMA * noise(len(given.values), 0.6, 1, 3)
+    if still:
+        quiet[:, 3 - 2 * still :] = 0.0
+    drift = harmonic_fit(recording(quiet)).drift
+    assert drift is not None
+    assert drift.size < 1e-12
