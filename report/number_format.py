@@ -90,7 +90,9 @@ def bounds(interval: Interval, scale: Scale, digits: int = 3) -> str:
 
 
 def condition(recording: RecordingMisfit) -> str:
-    """Return flap frequency, phase lag, pressure and airspeed of ``recording`` as text."""
+    """Return flap frequency, phase lag, pressure and airspeed, or settings, of ``recording`` as text."""
+    if recording.flap_frequency_hz is None or recording.pressure_mbar is None:
+        return ", ".join(f"{name} {number(value)}" for name, value in recording.settings.items())
     parts = [f"{number(recording.flap_frequency_hz)} Hz"]
     if recording.phase_lag_deg:
         parts.append(f"lag {number(recording.phase_lag_deg)}°")
