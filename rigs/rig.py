@@ -34,6 +34,8 @@ class Rig:
             suspects.
         faults: whether faults of the channels and inputs (gain, delay and so on) are suspects as well.
         description: the nominal model in one line, for reports.
+        reference: where the rig was loaded from (:func:`wingfit.rigs.load.load_rig`), so that other processes can load
+            it; "" if it was not.
     """
 
     name: str
@@ -47,6 +49,15 @@ class Rig:
     ports: tuple[Port, ...] = ()
     faults: bool = True
     description: str = ""
+    reference: str = ""
+
+    def __reduce__(self) -> str | tuple[object, ...]:
+        """Pickle a rig that was loaded as its reference: its functions may not be importable elsewhere."""
+        if not self.reference:
+            return super().__reduce__()
+        from wingfit.rigs.load import load_rig  # it imports this module
+
+        return load_rig, (self.reference,)
 
     def __post_init__(self) -> None:
         for name in ("genes", "suspects", "recording_genes", "ports"):
