@@ -78,6 +78,9 @@ class Rig:
             twice = [name for name, times in Counter(names).items() if times > 1]
             if twice:
                 raise ValueError(f"rig {self.name!r} has {what} {twice[0]!r} twice; give each a name of its own")
+        both = sorted(set(self.channels) & set(self.inputs))
+        if both:
+            raise ValueError(f"rig {self.name!r}: {both[0]!r} is a channel and an input; give one of them another name")
         for port in self.ports:
             if port.stiffness and port.stiffness not in own:
                 raise ValueError(
