@@ -93,7 +93,9 @@ class Run:
         self._memory, self._slip = [0.0] * len(remembering), [0.0] * len(remembering)
         size, times = len(first), np.asarray(self.times, float)
 
-        def derivative(t: float, state: Array) -> Array:
+        def derivative(t: float, state: Array) -> ArrayLike:
+            if not remembering:
+                return rate(t, state)
             self._memory = state[size:].tolist()
             return np.concatenate([np.asarray(rate(t, state[:size]), float).ravel(), self._slip])
 
