@@ -108,8 +108,8 @@ def linearise(problem: Problem, evaluator: Evaluator, unit: Array, motion: Array
     ``motion`` [F]: genes from whose motion derivatives start (:func:`initial_motion`); None: ``unit``.
     NotSimulatedError if the genome at ``unit`` cannot be simulated. A model that is differentiable is differentiated in
     steps of TANGENT_STEP; for the genes that have no derivative, and for other models, central differences are taken.
-    Their steps end at the bounds, and a displaced genome that fails is replaced by the one at ``unit``, so that differences
-    may become one-sided. For genes with a failure on both sides, shorter steps are tried once.
+    Their steps end at the bounds, and a displaced genome that fails is replaced by the one at ``unit``, so that
+    differences may become one-sided. For genes with a failure on both sides, shorter steps are tried once.
     """
     genes, evaluations, every = free_genes(problem), list[Evaluation](), np.arange(len(unit))
 
