@@ -10,9 +10,9 @@ from functools import cached_property
 
 import numpy as np
 
-from wingfit.records import Genome, Recording
+from wingfit.records import AnyRecording, Genome, Recording, Series
 from wingfit.records.array_types import Array, ArrayLike, Mask
-from wingfit.records.dataset import Kind
+from wingfit.records.dataset import AnyKind
 from wingfit.sim.model import Model
 
 DEFAULT_AXES = ("x",)  # Armanini et al. 2016 fit the X force only
@@ -27,7 +27,7 @@ class Problem:
     """
 
     model: Model
-    recordings: tuple[Recording, ...]
+    recordings: tuple[AnyRecording, ...]
     free: tuple[str, ...]
     base: Genome
     axes: tuple[str, ...] = ()
@@ -57,13 +57,14 @@ class Misfit:
     Attributes:
         squares: [B] sum of squares, inf for a failed individual. Of tracks: squared distance over frames and markers,
             m^2 (van der Grinten's thesis, Eq. 14); of forces: squared difference over instants and fitted axes,
-            N^2.
-        distance: [B] mean distance per marker and frame, m; of forces the RMS difference, N; inf for a failed one.
+            N^2; of a series: squared difference over samples and channels, relative to the range of the channel.
+        distance: [B] mean distance per marker and frame, m; of forces the RMS difference, N, of a series relative to
+            the ranges; inf for a failed one.
         samples: number of (frame, marker) pairs, or of (instant, axis) pairs, compared.
         reasons: [B] why an individual failed, None if it did not.
         residuals: [B, T, C] simulated minus recorded, m or N, NaN where not recorded or not fitted; None unless
             requested.
-        kind: "tracks" or "forces", which were compared.
+        kind: "tracks", "forces" or "series", which were compared.
     """
 
     squares: Array
@@ -71,7 +72,7 @@ class Misfit:
     samples: int
     reasons: tuple[str | None, ...]
     residuals: Array | None = None
-    kind: Kind = "tracks"
+    kind: AnyKind = "tracks"
 
     def taken(self, places: Sequence[int]) -> Misfit:
         """Return the misfits of the individuals at ``places``, which may be repeated."""
@@ -90,10 +91,13 @@ def misfit(problem: Problem, values: ArrayLike, recording: int, *, residuals: bo
     record = problem.recordings[recording]
     observed = problem.model.observe(problem.genomes(values), record)
     difference = observed.channels - record.values
-    if record.kind == "forces":
+    if isinstance(record, Series):
+        kept: Array = (difference[:, record.valid] / spans(record)[np.nonzero(record.valid)[1]]) ** 2
+        not_finite = "the simulated channels are not finite"
+    elif record.kind == "forces":
         fitted = compared(record, problem.axes)
         difference[:, ~fitted] = np.nan
-        kept: Array = difference[:, fitted] ** 2
+        kept = difference[:, fitted] ** 2
         not_finite = "the modelled forces are not finite"
     else:
         seen = np.isfinite(record.positions).all(axis=2).ravel()
@@ -106,9 +110,16 @@ def misfit(problem: Problem, values: ArrayLike, recording: int, *, residuals: bo
     failed = np.array([reason is not None for reason in reasons])
     # One row after the other: the order in which numpy sums along an axis depends on the number of rows.
     squares = np.where(failed, np.inf, [one.sum() for one in kept])
-    forces = record.kind == "forces"
-    distance = np.where(failed, np.inf, [np.sqrt(one.mean()) if forces else np.sqrt(one).mean() for one in kept])
+    tracks = record.kind == "tracks"
+    distance = np.where(failed, np.inf, [np.sqrt(one).mean() if tracks else np.sqrt(one.mean()) for one in kept])
     return Misfit(squares, distance, kept.shape[1], reasons, difference if residuals else None, record.kind)
+
+
+def spans(recording: Series) -> Array:
+    """Return the range [C] of the recorded values of each channel, in its unit; 1 for a channel that never changes."""
+    values, seen = recording.values, recording.valid
+    most, least = np.where(seen, values, -np.inf).max(axis=0), np.where(seen, values, np.inf).min(axis=0)
+    return np.where(most > least, most - least, 1.0)
 
 
 def compared(recording: Recording, axes: tuple[str, ...] = ()) -> Mask:
@@ -151,9 +162,9 @@ class Evaluation:
         """Misfit of each individual [B] over all recordings: mean distance per marker and frame, m; forces: RMS, N."""
         total = np.zeros_like(self.per_recording[0].distance)
         for part in self.per_recording:
-            total = total + (part.squares if part.kind == "forces" else part.distance * part.samples)
+            total = total + (part.distance * part.samples if part.kind == "tracks" else part.squares)
         mean = total / sum(part.samples for part in self.per_recording)
-        return np.asarray(np.sqrt(mean) if self.per_recording[0].kind == "forces" else mean)
+        return np.asarray(mean if self.per_recording[0].kind == "tracks" else np.sqrt(mean))
 
     @property
     def reasons(self) -> tuple[str | None, ...]:

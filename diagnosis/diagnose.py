@@ -14,14 +14,17 @@ from wingfit.calibration.problem import base_genome
 from wingfit.diagnosis.evidence.context import FitContext
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.finding import Finding
+from wingfit.diagnosis.rig_subject import RigSubject
 from wingfit.diagnosis.rigs import subject_of
 from wingfit.diagnosis.search import run_search, select_suspects
 from wingfit.diagnosis.search_state import CountingEvaluator, SearchState
 from wingfit.diagnosis.spec import DiagnosisSpec, Progress
 from wingfit.diagnosis.subject import Subject
 from wingfit.diagnosis.verdict.build_finding import build_finding
-from wingfit.records import Dataset, Recording
+from wingfit.inference.noise.series_fit import SeriesReduction
+from wingfit.records import AnyRecording, Dataset, Recording, SeriesDataset
 from wingfit.records.blas_threads import one_blas_thread
+from wingfit.rigs.rig import Rig
 
 SEARCH_FRACTION = 0.7  # of the work; the rest locates the missing physics and validates the hypothesis
 
@@ -50,27 +53,46 @@ def diagnose(dataset: Dataset, spec: DiagnosisSpec, evaluator: Evaluator) -> Ite
 
 
 @one_blas_thread
+def diagnose_rig(rig: Rig, dataset: SeriesDataset, spec: DiagnosisSpec, evaluator: Evaluator) -> Iterator[Progress]:
+    """Diagnose ``dataset`` with the user's simulation ``rig``; as :func:`diagnose`.
+
+    Of ``spec.calibration``, the genes, fixed values and recordings count; the rest describes wings and vehicles.
+    """
+    subject = RigSubject.of(rig, dataset)
+    wanted, chosen = spec.calibration.genes or subject.model.searched, spec.calibration.recordings
+    fitted = tuple(one for one in dataset.fitted if not chosen or one.name in chosen)
+    elsewhere = {gene.name for one in dataset.recordings if one not in fitted for gene in subject.model.genes_of(one)}
+    fixed = {*spec.calibration.fixed, *elsewhere}
+    free = tuple(name for name in subject.model.searched if name in wanted and name not in fixed)
+    held_out = dataset.select(dataset.held_out)
+    series = SeriesReduction.of(dataset.recordings)
+    yield from diagnose_subject(subject, dataset.name, fitted, held_out, spec, evaluator, free=free, series=series)
+
+
+@one_blas_thread
 def diagnose_subject(
     subject: Subject,
     name: str,
-    fitted: Sequence[Recording],
-    held_out: Sequence[Recording],
+    fitted: Sequence[AnyRecording],
+    held_out: Sequence[AnyRecording],
     spec: DiagnosisSpec,
     evaluator: Evaluator,
     *,
     free: tuple[str, ...] = (),
     axes: tuple[str, ...] = (),
+    series: SeriesReduction | None = None,
 ) -> Iterator[Progress]:
     """Diagnose any rig that implements :class:`Subject`; yields progress, the finding with the last report.
 
     ``name``: of the dataset; ``fitted``, ``held_out``: recordings to fit and to validate with; ``free``: nominal genes
-    to fit (empty: all that a calibration searches); ``axes``: force axes to fit (empty: the default).
+    to fit (empty: all that a calibration searches); ``axes``: force axes to fit (empty: the default); ``series``: how
+    recordings without a beat are reduced.
     """
     began = time.monotonic()
     yield Progress(0.0, "reading the recordings", 0)
     held_out, copies = _without_copies(fitted, held_out)
     counted = CountingEvaluator(evaluator)
-    state = SearchState(FitContext(subject, WhitenedData.of(fitted, axes, spec.policy), counted), spec)
+    state = SearchState(FitContext(subject, WhitenedData.of(fitted, axes, spec.policy, series), counted), spec)
     for fraction, stage in run_search(state, free or tuple(subject.model.searched)):
         yield Progress(SEARCH_FRACTION * fraction, stage, counted.evaluations)
     finding: Finding | None = None
@@ -86,8 +108,8 @@ def diagnose_subject(
 
 
 def _without_copies(
-    fitted: Sequence[Recording], held_out: Sequence[Recording]
-) -> tuple[tuple[Recording, ...], tuple[str, ...]]:
+    fitted: Sequence[AnyRecording], held_out: Sequence[AnyRecording]
+) -> tuple[tuple[AnyRecording, ...], tuple[str, ...]]:
     """Return ``held_out`` without copies of fitted recordings, which validate nothing, and a remark for each copy."""
     known = {one.values.tobytes(): one.name for one in reversed(fitted)}
     copies = {one.name: known[one.values.tobytes()] for one in held_out if one.values.tobytes() in known}

@@ -2,7 +2,8 @@
 
 Lengths are in m, forces in N, angles in rad, phases in beats (0 to 1, from the start of the beat as the dataset defines
 it), locations on a wing from 0 to 1 along the span (root to tip) and the chord (leading to trailing edge). ``unit`` is
-that of a channel: "m" for tracks, "N" for forces; all misfits are root mean squares of one channel in it.
+that of a channel: "m" for tracks, "N" for forces; all misfits are root mean squares of one channel in it. Channels of a
+series have units of their own, so there the unit is "noise": misfits are divided by the noise of their channel.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from wingfit.records.array_types import Array, Float
+from wingfit.records.dataset import AnyKind
 
 Verdict = Literal["adequate", "named", "ambiguous", "unnamed", "measurement fault"]
 VERDICTS: tuple[Verdict, ...] = ("adequate", "named", "ambiguous", "unnamed", "measurement fault")
@@ -122,8 +124,9 @@ class Where:
         words: all of the following as a sentence.
         span, chord: centre and extent on the wing; None where forces do not identify a location.
         phase: centre and extent in the beat; None where the misfit is spread over the whole beat.
-        axis: channel axis with most of the misfit ("x", "y" or "z").
-        harmonics: fraction of the misfit's mean square in each harmonic of the beat, from 0 (the mean).
+        axis: channel axis with most of the misfit ("x", "y" or "z"); of a series, the channel.
+        harmonics: fraction of the misfit's mean square in each harmonic of the beat, from 0 (the mean); empty for a
+            series.
         exponents: how the misfit scales with the condition; empty where the recordings do not show that.
     """
 
@@ -193,25 +196,28 @@ class MissingLoad:
 class RecordingMisfit:
     """Misfit to one recording before (nominal model, refitted) and after (effects added), with 90 % intervals.
 
-    ``airspeed`` in m/s; ``floor``: misfit to be expected from noise and discretisation error.
+    ``airspeed`` in m/s; ``floor``: misfit to be expected from noise and discretisation error. A series has ``settings``
+    by name instead of flap frequency, phase lag, pressure and airspeed, which are None.
     """
 
     name: str
     held_out: bool
-    flap_frequency_hz: float
-    phase_lag_deg: float
-    pressure_mbar: float
-    airspeed: float
+    flap_frequency_hz: float | None
+    phase_lag_deg: float | None
+    pressure_mbar: float | None
+    airspeed: float | None
     before: Interval
     after: Interval
     floor: float
+    settings: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
 class Overlay:
     """One channel over one beat: the recording, and the simulation before and after the diagnosis added effects.
 
-    ``recorded``, ``before`` and ``after`` are values (m or N) at each ``phase``; ``held_out``: not used for the fit.
+    ``recorded``, ``before`` and ``after`` are values in ``unit`` ("": that of the finding) at each ``phase``; of a
+    series, which has no beat, at each of ``times`` (s). ``held_out``: not used for the fit.
     """
 
     recording: str
@@ -221,6 +227,25 @@ class Overlay:
     recorded: Numbers
     before: Numbers
     after: Numbers
+    times: Numbers = ()
+    unit: str = ""
+
+
+@dataclass(frozen=True)
+class ChannelMisfit:
+    """Misfit of one channel of a series over all fitted recordings, in ``unit``, before and after effects are added.
+
+    ``before`` and ``after``: root mean square beyond the noise; ``noise``: standard deviation of one sample, known from
+    ``source``; ``place``: where the channel is measured, as text.
+    """
+
+    name: str
+    unit: str
+    place: str
+    noise: float
+    source: str
+    before: float
+    after: float
 
 
 @dataclass(frozen=True)
@@ -286,8 +311,8 @@ class Finding:
 
     Attributes:
         dataset: its name.
-        kind: "tracks" or "forces".
-        unit: "m" or "N".
+        kind: "tracks", "forces" or "series".
+        unit: "m", "N" or "noise".
         model: description of the nominal model and its discretisation.
         verdict: the decision.
         summary: the verdict in a few sentences.
@@ -307,15 +332,16 @@ class Finding:
         genes: of the best model, nominal ones included.
         law: free-form law of the missing load for an unnamed verdict; None where there is none.
         advice: what to record next, best first.
-        outline: of the wing, (x, y) in m; empty for forces.
+        outline: of the wing, (x, y) in m; empty for forces and series.
+        channels: misfit by channel of a series; empty for tracks and forces.
         remarks: everything else that a reader must know.
         seconds, evaluations: computing time, and number of individuals simulated.
         versions: of the packages that the numbers depend on.
     """
 
     dataset: str
-    kind: Literal["tracks", "forces"]
-    unit: Literal["m", "N"]
+    kind: AnyKind
+    unit: str
     model: str
     verdict: Verdict
     summary: str
@@ -337,15 +363,16 @@ class Finding:
     law: FreeLaw | None
     advice: tuple[Advice, ...]
     outline: Table = ()
+    channels: tuple[ChannelMisfit, ...] = ()
     remarks: tuple[str, ...] = ()
     seconds: float = 0.0
     evaluations: int = 0
     versions: dict[str, str] = field(default_factory=dict)
 
 
-def in_milli(value: float, unit: str) -> str:
-    """Return ``value`` in ``unit`` ("m" or "N") as text in mm or mN."""
-    return f"{1e3 * value:.3g} m{unit}"
+def amount(value: float, unit: str) -> str:
+    """Return the misfit ``value`` in ``unit`` ("m", "N" or "noise") as text, in mm, mN or multiples of the noise."""
+    return f"{value:.3g} times the noise" if unit == "noise" else f"{1e3 * value:.3g} m{unit}"
 
 
 def table(values: Float[Array, "N M"]) -> Table:

@@ -13,10 +13,11 @@ import numpy as np
 from wingfit.calibration.effects import sizes
 from wingfit.calibration.preparation import fitted_through
 from wingfit.calibration.spec import CalibrationSpec, model_for
-from wingfit.diagnosis.subject import ChannelLocation, Subject, Suspect
+from wingfit.diagnosis.subject import BeatSubject, ChannelLocation
 from wingfit.records import Condition, Dataset, Recording, Vehicle, Wing
 from wingfit.records.array_types import Array, Float
 from wingfit.records.dataset import ForceAxis
+from wingfit.rigs.suspect import Suspect
 from wingfit.sim.effects.contract import Effect
 from wingfit.sim.effects.probe import Probe
 from wingfit.sim.effects.registry import EFFECTS
@@ -38,7 +39,7 @@ MAX_MARKERS_TRIED = 64  # as candidates for the fault of a marker
 _LOCATION_GENES: dict[str, Literal["span", "chord"]] = {"station": "span", "chord": "chord"}
 
 
-def subject_of(dataset: Dataset, spec: CalibrationSpec) -> Subject:
+def subject_of(dataset: Dataset, spec: CalibrationSpec) -> BeatSubject:
     """Return the rig of ``dataset`` with the nominal model of ``spec``; ValueError where that model does not exist.
 
     Effects that ``spec`` names are part of the nominal model, and no suspects.

@@ -36,9 +36,10 @@ from wingfit.diagnosis.evidence.screen import Trial, score_tests
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.search_state import SearchState
 from wingfit.diagnosis.spec import DiagnosisSpec
-from wingfit.diagnosis.subject import Subject, Suspect
+from wingfit.diagnosis.subject import Subject
 from wingfit.diagnosis.verdict.verdict import decide
 from wingfit.diagnosis.verdict.weigh_hypotheses import HypothesisWeights, nominal_suffices, tolerated_excess, weigh
+from wingfit.rigs.suspect import Suspect
 
 Steps = Iterator[tuple[float, str]]  # fraction of the work done, and the next stage
 

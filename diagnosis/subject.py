@@ -1,60 +1,19 @@
 """The interface between a diagnosis and a rig: what a diagnosis must know of a rig.
 
-:mod:`wingfit.diagnosis.rigs` implements it for the two known rigs; any other class that implements :class:`Subject`
-works as well.
+:mod:`wingfit.diagnosis.rigs` implements it for a wing, a vehicle, and a rig that the user simulates.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Literal, NamedTuple, Protocol
+from collections.abc import Sequence
+from typing import NamedTuple, Protocol, cast
 
-from wingfit.records import Condition, Gene, Recording
+from wingfit.records import Condition, Recording
 from wingfit.records.array_types import Array
+from wingfit.rigs.suspect import Suspect
 from wingfit.sim.effects.probe import Probe
 from wingfit.sim.model import Model
 from wingfit.sim.wing.probing import Probed
-
-Family = Literal["structure", "inertia", "actuation", "aerodynamics", "measurement"]
-
-
-@dataclass(frozen=True)
-class Suspect:
-    """An effect that may be missing in the model: physics, or a fault of the measurement, that can be added to it.
-
-    Attributes:
-        name: identifier with which :meth:`Subject.extended` adds the effect.
-        title: display name.
-        family: kind of physics, or "measurement".
-        genes: the genes that the effect adds to the model; with all size genes at zero the effect is exactly off.
-        size_genes: names of those of ``genes`` that say how strong the effect is.
-        typical: value of each of ``genes`` for an effect as strong as in practice.
-        source: reference of its law.
-        signature: what the effect looks like in a recording, as text for the user.
-        location_genes: names of the genes that give its location along "span" and "chord" (0 to 1); empty if it has
-            none.
-        confused_with: names of suspects that look similar in a recording.
-        candidate_shapes: values of the shape genes (:attr:`shape_genes`), a tuple for each trial of the score test;
-            empty means that the score test spreads its own trials.
-    """
-
-    name: str
-    title: str
-    family: Family
-    genes: tuple[Gene, ...]
-    size_genes: tuple[str, ...]
-    typical: Mapping[str, float]
-    source: str
-    signature: str
-    location_genes: Mapping[Literal["span", "chord"], str]
-    confused_with: tuple[str, ...] = ()
-    candidate_shapes: tuple[tuple[float, ...], ...] = ()
-
-    @property
-    def shape_genes(self) -> tuple[str, ...]:
-        """Names of the genes that are not sizes, such as the location."""
-        return tuple(gene.name for gene in self.genes if gene.name not in self.size_genes)
 
 
 class ChannelLocation(NamedTuple):
@@ -73,7 +32,7 @@ class ChannelLocation(NamedTuple):
 
 
 class Subject(Protocol):
-    """The rig that is diagnosed: nominal model, suspects, finer discretisations, and where channels are measured."""
+    """The rig that is diagnosed: nominal model, suspects, and finer discretisations."""
 
     @property
     def model(self) -> Model:
@@ -83,11 +42,6 @@ class Subject(Protocol):
     @property
     def suspects(self) -> tuple[Suspect, ...]:
         """All effects that :meth:`extended` can add."""
-        ...
-
-    @property
-    def outline(self) -> tuple[tuple[float, float], ...]:
-        """Outline of the wing from above, a closed polygon of (x, y) in m; empty if there is nothing to draw."""
         ...
 
     @property
@@ -105,6 +59,15 @@ class Subject(Protocol):
 
     def finer_subjects(self) -> Sequence[Subject]:
         """Return the rig with finer discretisations, cheapest first; empty if none exists or all are too costly."""
+        ...
+
+
+class BeatSubject(Subject, Protocol):
+    """A rig that flaps: it also knows the beat, where on a wing channels are measured, and what could be recorded."""
+
+    @property
+    def outline(self) -> tuple[tuple[float, float], ...]:
+        """Outline of the wing from above, a closed polygon of (x, y) in m; empty if there is nothing to draw."""
         ...
 
     def channel_locations(self, recording: Recording) -> tuple[ChannelLocation, ...]:
@@ -126,3 +89,10 @@ class Subject(Protocol):
     def candidate_conditions(self) -> tuple[Condition, ...]:
         """Return conditions that the rig can run and that could be recorded next."""
         ...
+
+
+def beat_subject(subject: Subject) -> BeatSubject:
+    """Return ``subject``, a rig with a beat; TypeError for another."""
+    if not hasattr(subject, "beat_start_phase"):
+        raise TypeError(f"{subject.description} has no beat")
+    return cast("BeatSubject", subject)

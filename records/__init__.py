@@ -10,6 +10,7 @@ from wingfit.records.drive import Drive, FourBarDrive, FourierDrive
 from wingfit.records.errors import DatasetError, Fault
 from wingfit.records.files.storage import load_archive, load_dataset, save_dataset
 from wingfit.records.genes import EstimateError, Gene, Genome
+from wingfit.records.series import Channel, Quantity, Series, SeriesDataset
 from wingfit.records.vehicle import (
     ChordStation,
     Flap,
@@ -23,9 +24,13 @@ from wingfit.records.vehicle import (
 )
 from wingfit.records.wing import Hinge, Marker, Materials, Rod, Station, Wing
 
+AnyRecording = Recording | Series
+"""A recording of any rig."""
+
 __all__ = [
-    "ChordStation", "Condition", "Dataset", "DatasetError", "Drive", "EstimateError", "Fault", "Flap", "FourBarDrive",
-    "FourierDrive", "FourierFlap", "FourierPitch", "Gene", "Genome", "Hinge", "LowPass", "Marker", "Materials",
-    "PassivePitch", "Pitch", "Recording", "Rod", "SplitCycleFlap", "Station", "Vehicle", "Wing", "WingMotion",
-    "load_archive", "load_dataset", "save_dataset",
+    "AnyRecording", "Channel", "ChordStation", "Condition", "Dataset", "DatasetError", "Drive", "EstimateError",
+    "Fault", "Flap", "FourBarDrive", "FourierDrive", "FourierFlap", "FourierPitch", "Gene", "Genome", "Hinge",
+    "LowPass", "Marker", "Materials", "PassivePitch", "Pitch", "Quantity", "Recording", "Rod", "Series",
+    "SeriesDataset", "SplitCycleFlap", "Station", "Vehicle", "Wing", "WingMotion", "load_archive",
+    "load_dataset", "save_dataset",
 ]  # fmt: skip

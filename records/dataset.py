@@ -16,6 +16,7 @@ from wingfit.records.wing import Wing
 Rig = Literal["vacuum_chamber", "wind_tunnel", "free_flight"]
 ForceAxis = Literal["x", "z"]
 Kind = Literal["tracks", "forces"]
+AnyKind = Literal["tracks", "forces", "series"]
 STANDARD_GRAVITY = 9.80665
 
 

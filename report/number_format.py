@@ -24,7 +24,9 @@ class Scale(NamedTuple):
 
 
 def channel_scale(finding: Finding) -> Scale:
-    """Return the scale in which misfits and samples are shown: mm or mN."""
+    """Return the scale in which misfits are shown: mm, mN or, for series, multiples of the noise."""
+    if finding.unit == "noise":
+        return Scale(1.0, "× noise")
     return Scale(1e3, "mm" if finding.unit == "m" else "mN")
 
 
@@ -90,7 +92,9 @@ def bounds(interval: Interval, scale: Scale, digits: int = 3) -> str:
 
 
 def condition(recording: RecordingMisfit) -> str:
-    """Return flap frequency, phase lag, pressure and airspeed of ``recording`` as text."""
+    """Return flap frequency, phase lag, pressure and airspeed, or settings, of ``recording`` as text."""
+    if recording.flap_frequency_hz is None or recording.pressure_mbar is None:
+        return ", ".join(f"{name} {number(value)}" for name, value in recording.settings.items())
     parts = [f"{number(recording.flap_frequency_hz)} Hz"]
     if recording.phase_lag_deg:
         parts.append(f"lag {number(recording.phase_lag_deg)}°")

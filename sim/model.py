@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol, runtime_checkable
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
-from wingfit.records import Gene, Recording
+from wingfit.records import Gene
 from wingfit.records.array_types import Array as Array
 from wingfit.records.array_types import ArrayLike
 
@@ -53,10 +53,11 @@ class Model(Protocol):
         """Names of the genes that a calibration searches where the user names none."""
         ...
 
-    def observe(self, genomes: Array, recording: Recording) -> Observation:
+    def observe(self, genomes: Array, recording: Any) -> Observation:
         """Simulate ``genomes`` [B, G] under the recording's condition, at the recording's samples and channels.
 
-        Tracks are also aligned in phase with the recording; forces are filtered as the recording was.
+        ``recording`` is one of the rig that is simulated: of a wing, a vehicle, or a series. Tracks are also aligned in
+        phase with it; forces are filtered as it was.
         """
         ...
 

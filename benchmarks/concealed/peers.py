@@ -25,8 +25,8 @@ from benchmarks.concealed.score import WORSE, Mark, blank, side_of
 from benchmarks.concealed.strength import Refit, rms, stacked
 from wingfit.calibration.spec import CalibrationSpec, model_for
 from wingfit.diagnosis.rigs import subject_of
-from wingfit.diagnosis.subject import Suspect
 from wingfit.records import Recording, load_dataset
+from wingfit.rigs.suspect import Suspect
 from wingfit.sim.wing.flexible_wing import FlexibleWing
 
 Array = npt.NDArray[np.float64]

@@ -60,6 +60,7 @@ def missing_interval(problem: Problem, evaluator: Evaluator, recording: int = 0)
     of the recording, whose first fitted force axis is used.
     """
     genes, record = free_genes(problem), problem.recordings[recording]
+    assert isinstance(record, Recording)  # noqa: S101 - of a vehicle
     unit = unit_at(genes, np.array([problem.base[gene.name] for gene in genes]))
     linear = linearise(problem, evaluator, unit)
     axis = record.forces.index(problem.axes[0] if problem.axes else "x")

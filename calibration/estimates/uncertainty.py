@@ -20,7 +20,7 @@ from wingfit.inference.noise.between_beats import (
 )
 from wingfit.inference.noise.coloured import Block, score_covariances
 from wingfit.inference.noise.white import Noise, whitened_sensitivity
-from wingfit.records import Gene, Genome, Recording
+from wingfit.records import AnyRecording, Gene, Genome, Recording
 from wingfit.records.array_types import Array, Mask
 from wingfit.records.blas_threads import one_blas_thread
 
@@ -170,7 +170,7 @@ class _Part:
     genes; ``used`` is the fraction of the samples in these beats. ``seen`` [T, C] is True where values were compared.
     """
 
-    record: Recording
+    record: AnyRecording
     white: Array
     sensitivity: Array
     seen: Mask
@@ -178,12 +178,12 @@ class _Part:
     used: float
 
     @classmethod
-    def of(cls, record: Recording, noise: Noise, residual: Array, slope: Array) -> _Part:
+    def of(cls, record: AnyRecording, noise: Noise, residual: Array, slope: Array) -> _Part:
         seen = np.isfinite(residual)
         kept = seen.any(axis=0)
         white, sensitivity = noise.whitened(residual)[:, kept], whitened_sensitivity(noise, slope)[:, kept]
         scores, used = np.empty((0, slope.shape[2])), 1.0
-        if record.kind == "forces":
+        if isinstance(record, Recording) and record.kind == "forces":
             scores, used = beat_scores(record, white, sensitivity, seen)
         return cls(record, white, sensitivity, seen[:, kept], scores, used)
 
@@ -201,10 +201,11 @@ class _Part:
 
     def block(self) -> Block:
         """Return residuals and sensitivities on a regular grid of times, to estimate correlations between samples."""
-        white, forces = self.white, self.record.kind == "forces"
-        if forces:
-            white = without_mean_beat(self.record, white, len(self.scores))
-        return Block.of(self.record.times, white, self.sensitivity, self.seen, grouped=forces)
+        white, record = self.white, self.record
+        forces = isinstance(record, Recording) and record.kind == "forces"
+        if isinstance(record, Recording) and forces:
+            white = without_mean_beat(record, white, len(self.scores))
+        return Block.of(record.times, white, self.sensitivity, self.seen, grouped=forces)
 
 
 def _from_samples(parts: list[_Part], bread: Array) -> Array:

@@ -23,6 +23,7 @@ from wingfit.diagnosis.evidence.screen import Nuisance, Trial, off_units, size_c
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.inference.score_test import explained
 from wingfit.records.array_types import Array, Float, Mask
+from wingfit.records.series import belongs_to
 
 REFIT_STEPS = 6  # of a refit
 CONTINUED_STEPS = 10  # of a refit that is continued
@@ -67,7 +68,8 @@ def cross_validated_excess(data: WhitenedData, fit: Fit) -> float | None:
 
     Each prediction is that of the linearised model, fitted to the other recordings. A prior limits how far genes move,
     so that a gene that only one recording identifies does not count against the hypothesis; nor does the move that
-    noise in the other recordings makes. None for a single recording.
+    noise in the other recordings makes. Genes that belong to the recording alone (an initial state) are fitted to it
+    again. None for a single recording.
     """
     if len(data.recordings) < 2:
         return None
@@ -83,13 +85,25 @@ def cross_validated_excess(data: WhitenedData, fit: Fit) -> float | None:
         move = np.clip(fit.unit - spread @ (score - likelihood_weight * scores[r]), 0.0, 1.0) - fit.unit
         here, own = fit.coefficients[part], fit.jacobian[part]
         weight = data.weight[part]
-        worse = float(weight @ ((here + own @ move) ** 2 - here**2))
+        there = _refitted_alone(data, fit, r, here + own @ move)
+        worse = float(weight @ (there**2 - here**2))
         noisy = likelihood_weight**2 * spread @ others @ spread
         by_noise = float(weight @ np.einsum("df,fg,dg->d", own, noisy, own, optimize=True))
         total += float(weight @ (here**2 - data.variance[part])) + max(
             worse - data.policy.prediction_noise * by_noise, 0.0
         )
     return total
+
+
+def _refitted_alone(data: WhitenedData, fit: Fit, r: int, coefficients: Array) -> Array:
+    """Return ``coefficients`` of recording ``r`` after the genes that belong to it alone are fitted to them."""
+    recording, part = data.recordings[r], data.recording_slices[r]
+    own = [k for k, name in enumerate(fit.problem.free) if belongs_to(name, recording.name)]
+    if not own:
+        return coefficients
+    slopes, scale = fit.jacobian[part][:, own], data.scale[part]
+    move, *_ = np.linalg.lstsq(slopes / scale[:, None], coefficients / scale, rcond=None)
+    return np.asarray(coefficients - slopes @ move)
 
 
 def refit_with(context: FitContext, nominal: Fit, trials: Sequence[Trial], base: Fit | None = None) -> Refit | None:

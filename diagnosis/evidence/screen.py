@@ -17,10 +17,10 @@ from wingfit.calibration.problem import Problem, base_genome
 from wingfit.diagnosis.evidence.context import FitContext
 from wingfit.diagnosis.evidence.fit import PRIOR_SD, Fit
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
-from wingfit.diagnosis.subject import Suspect
 from wingfit.inference import score_test
 from wingfit.inference.score_test import amounts, remaining, spread
 from wingfit.records.array_types import Array, Float
+from wingfit.rigs.suspect import Suspect
 
 LOCATION_SAMPLES = 15  # besides the typical location; 16 in all fill the lanes of the processor twice
 SHAPE_SAMPLES = 7  # for a suspect with other shape genes

@@ -14,8 +14,22 @@ from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.problem import Problem, compared
 from wingfit.diagnosis.policy import POLICY, Policy
 from wingfit.inference.noise.harmonic import HarmonicFit, harmonic_fit, whole_markers
-from wingfit.records import Recording
+from wingfit.inference.noise.series_fit import SeriesFit, SeriesReduction
+from wingfit.records import AnyRecording, Recording
 from wingfit.records.array_types import Array, Float
+from wingfit.records.dataset import AnyKind
+
+Reduced = HarmonicFit | SeriesFit
+
+
+def _reduced(recording: AnyRecording, axes: tuple[str, ...], series: SeriesReduction | None) -> Reduced:
+    if isinstance(recording, Recording):
+        return harmonic_fit(
+            recording, compared(recording, axes) if recording.kind == "forces" else whole_markers(recording)
+        )
+    if series is None:
+        raise TypeError(f"recording {recording.name!r} has no beat; its noise must be given")
+    return series(recording)
 
 
 @dataclass(frozen=True)
@@ -27,45 +41,85 @@ class WhitenedData:
 
     Attributes:
         recordings: R of them.
-        beat_fits: for each recording, the linear map from samples to coefficients, and their noise.
-        axes: force axes that are compared; empty for tracks.
+        reduced: for each recording, the linear map from samples to coefficients, and their noise.
+        axes: force axes that are compared; empty for tracks and series.
         tolerance: root mean square (m or N) that any model may differ from the truth.
         policy: thresholds.
+        series: reduces recordings without a beat, with their noise; None for tracks and forces.
     """
 
-    recordings: tuple[Recording, ...]
-    beat_fits: tuple[HarmonicFit, ...]
+    recordings: tuple[AnyRecording, ...]
+    reduced: tuple[Reduced, ...]
     axes: tuple[str, ...]
     tolerance: float
     policy: Policy = POLICY
+    series: SeriesReduction | None = None
 
     @classmethod
-    def of(cls, recordings: Sequence[Recording], axes: tuple[str, ...] = (), policy: Policy = POLICY) -> WhitenedData:
-        """Reduce ``recordings`` (of forces: ``axes``) to coefficients; ValueError for an unusable one, or none."""
+    def of(
+        cls,
+        recordings: Sequence[AnyRecording],
+        axes: tuple[str, ...] = (),
+        policy: Policy = POLICY,
+        series: SeriesReduction | None = None,
+    ) -> WhitenedData:
+        """Reduce ``recordings`` (of forces: ``axes``) to coefficients; ValueError for an unusable one, or none.
+
+        ``series`` reduces recordings without a beat; None: none of the ``recordings`` is such a series.
+        """
         if not recordings:
             raise ValueError("no recording to diagnose: give at least one that is not held out")
-        beat_fits = tuple(
-            harmonic_fit(one, compared(one, axes) if one.kind == "forces" else whole_markers(one)) for one in recordings
-        )
-        noise = np.sqrt(np.mean(np.concatenate([fit.noise[fit.used] ** 2 for fit in beat_fits])))
-        largest = max(float(np.nanmax(np.abs(one.values))) for one in recordings)
-        return cls(tuple(recordings), beat_fits, axes, max(policy.tolerance * float(noise), 1e-6 * largest), policy)
+        reduced = tuple(_reduced(one, axes, series) for one in recordings)
+        noise = np.sqrt(np.mean(np.concatenate([fit.noise[fit.used] ** 2 for fit in reduced])))
+        largest = 0.0 if series else max(float(np.nanmax(np.abs(one.values))) for one in recordings)
+        tolerance = max(policy.tolerance * float(noise), 1e-6 * largest)
+        return cls(tuple(recordings), reduced, axes, tolerance, policy, series)
+
+    def like(self, recordings: Sequence[AnyRecording]) -> WhitenedData:
+        """Reduce other ``recordings`` of the same dataset in the same way."""
+        return WhitenedData.of(recordings, self.axes, self.policy, self.series)
+
+    @property
+    def kind(self) -> AnyKind:
+        """What the recordings hold: "tracks", "forces" or "series"."""
+        return self.recordings[0].kind
+
+    @property
+    def unit(self) -> str:
+        """Unit of coefficients: "m" of tracks, "N" of forces; of series "noise", as channels have different units."""
+        return {"tracks": "m", "forces": "N", "series": "noise"}[self.kind]
+
+    @cached_property
+    def beat_fits(self) -> tuple[HarmonicFit, ...]:
+        """Return ``reduced`` of recordings with a beat; TypeError for others."""
+        if not all(isinstance(one, HarmonicFit) for one in self.reduced):
+            raise TypeError("recordings without a beat have no harmonics")
+        return tuple(one for one in self.reduced if isinstance(one, HarmonicFit))
+
+    @cached_property
+    def beat_recordings(self) -> tuple[Recording, ...]:
+        """Return ``recordings`` of a wing or vehicle; TypeError for others."""
+        if not all(isinstance(one, Recording) for one in self.recordings):
+            raise TypeError("a recording of another rig has no beat")
+        return tuple(one for one in self.recordings if isinstance(one, Recording))
 
     @cached_property
     def noiseless(self) -> WhitenedData:
         """The same with zero noise variance, for coefficients that come from simulations alone."""
-        beat_fits = tuple(replace(fit, variance=np.zeros_like(fit.variance)) for fit in self.beat_fits)
-        return replace(self, beat_fits=beat_fits)
+        reduced = tuple(replace(fit, variance=np.zeros_like(fit.variance)) for fit in self.reduced)
+        return replace(self, reduced=reduced)
 
     @cached_property
     def noise(self) -> float:
         """Root mean square of the noise of a sample over all used channels, m or N; at least the tolerance."""
-        square = np.mean(np.concatenate([fit.noise[fit.used] ** 2 for fit in self.beat_fits]))
+        square = np.mean(np.concatenate([fit.noise[fit.used] ** 2 for fit in self.reduced]))
         return max(float(np.sqrt(square)), self.tolerance)
 
     @cached_property
     def drift(self) -> float:
         """Root mean square (m or N) over all used channels of slow changes of the beat that noise does not explain."""
+        if self.kind == "series":
+            return 0.0
         sizes = [fit.drift.size if fit.drift and fit.drift.found else 0.0 for fit in self.beat_fits]
         return float(np.sqrt(self.recording_weights @ np.square(sizes)))
 
@@ -77,29 +131,29 @@ class WhitenedData:
     @cached_property
     def recording_slices(self) -> tuple[slice, ...]:
         """Where the coefficients of each recording are in a coefficient vector [D]."""
-        ends = np.cumsum([0, *(fit.used.sum() * len(fit.order) for fit in self.beat_fits)]).tolist()
+        ends = np.cumsum([0, *(fit.used.sum() * len(fit.weight) for fit in self.reduced)]).tolist()
         return tuple(slice(a, b) for a, b in pairwise(ends))
 
     @cached_property
     def variance(self) -> Float[Array, " D"]:
         """Noise variance [D] of the coefficients, m^2 or N^2."""
-        return np.concatenate([fit.variance[fit.used].ravel() for fit in self.beat_fits])
+        return np.concatenate([fit.variance[fit.used].ravel() for fit in self.reduced])
 
     @cached_property
     def weight(self) -> Float[Array, " D"]:
         """Weights [D]: the sum of weight times squared coefficient is the mean square over all samples and channels."""
-        channels = sum(int(fit.used.sum()) for fit in self.beat_fits)
-        return np.concatenate([np.tile(fit.weight, int(fit.used.sum())) for fit in self.beat_fits]) / channels
+        channels = sum(int(fit.used.sum()) for fit in self.reduced)
+        return np.concatenate([np.tile(fit.weight, int(fit.used.sum())) for fit in self.reduced]) / channels
 
     @cached_property
     def scale(self) -> Float[Array, " D"]:
         """Standard deviation [D] of each coefficient by noise and tolerance together; whitening divides by it."""
-        allowed = [self.tolerance**2 / (len(v.order) * np.tile(v.weight, int(v.used.sum()))) for v in self.beat_fits]
+        allowed = [self.tolerance**2 / (len(v.weight) * np.tile(v.weight, int(v.used.sum()))) for v in self.reduced]
         return np.asarray(np.sqrt(self.variance + np.concatenate(allowed)))
 
     def coefficients_of(self, residuals: Sequence[Float[Array, "*B _ _"]]) -> Float[Array, "*B D"]:
         """Return the coefficients [..., D] of ``residuals``: for each recording [..., T, C], C channels at T times."""
-        found = [fit.of(one)[..., fit.used, :] for fit, one in zip(self.beat_fits, residuals, strict=True)]
+        found = [fit.of(one)[..., fit.used, :] for fit, one in zip(self.reduced, residuals, strict=True)]
         return np.concatenate([one.reshape(*one.shape[:-2], -1) for one in found], axis=-1)
 
     def chi_squared(self, coefficients: Float[Array, " D"]) -> float:
@@ -149,7 +203,7 @@ class WhitenedData:
     @cached_property
     def recording_weights(self) -> Float[Array, " R"]:
         """Fraction [R] of all used channels that belongs to each recording: its weight in the mean square."""
-        used = np.array([int(fit.used.sum()) for fit in self.beat_fits], float)
+        used = np.array([int(fit.used.sum()) for fit in self.reduced], float)
         return np.asarray(used / used.sum())
 
     @cached_property
@@ -160,12 +214,16 @@ class WhitenedData:
         its variance is known up to a factor only: half of it counts as error. The noise of different markers is
         independent. That of different harmonics is not, since beats differ in size or timing as a whole; so each
         marker, and a recording of forces as a whole, counts as one sample of its noise.
+        The coefficients of a series have independent noise, whose variance is known up to a relative error.
         """
+        every = self.weight * self.variance
+        if self.kind == "series":
+            error = max(one.relative_error for one in self.reduced if isinstance(one, SeriesFit))
+            return float(error * every.sum() + np.sqrt(2.0 * np.sum(every**2)))
         independent = sum(
             1.0 if recording.kind == "forces" else fit.used.sum() / 3.0
             for recording, fit in zip(self.recordings, self.beat_fits, strict=True)
         )
-        every = self.weight * self.variance
         slow = np.concatenate([np.tile((v.order == 0) | v.trend, int(v.used.sum())) for v in self.beat_fits])
         return float(every[slow].sum() / 2.0 + np.sqrt(2.0 / independent) * every.sum())
 

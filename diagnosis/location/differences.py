@@ -100,7 +100,9 @@ def _exponents(data: WhitenedData, coefficients: Array) -> tuple[Exponent, ...]:
     if len(excess) < 3 or level <= 0.0:
         return ()
     size = 0.5 * np.log(np.maximum(excess, level))
-    variables = [v for v in _variables([r.condition for r in data.recordings]) if v[3].max() > MIN_RATIO * v[3].min()]
+    variables = [
+        v for v in _variables([r.condition for r in data.beat_recordings]) if v[3].max() > MIN_RATIO * v[3].min()
+    ]
     while variables:
         design = np.stack([np.ones(len(size)), *(np.log(v[3]) for v in variables)], axis=1)
         scaled = design[:, 1:] - design[:, 1:].mean(axis=0)

@@ -9,7 +9,7 @@ import numpy as np
 
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.finding import MarkerMisfit, Overlay, PhaseMap, table
-from wingfit.diagnosis.subject import ChannelLocation, Subject
+from wingfit.diagnosis.subject import BeatSubject, ChannelLocation
 from wingfit.inference.noise.harmonic import HarmonicFit
 from wingfit.records.array_types import Array, Float
 
@@ -38,11 +38,11 @@ class RecordingResidual:
 
 
 def recording_residuals(
-    subject: Subject, data: WhitenedData, coefficients: Float[Array, " D"]
+    subject: BeatSubject, data: WhitenedData, coefficients: Float[Array, " D"]
 ) -> list[RecordingResidual]:
     """Split ``coefficients`` [D] of the residuals by recording."""
     found = []
-    for recording, beat_fit, part in zip(data.recordings, data.beat_fits, data.recording_slices, strict=True):
+    for recording, beat_fit, part in zip(data.beat_recordings, data.beat_fits, data.recording_slices, strict=True):
         own = coefficients[part].reshape(-1, len(beat_fit.order))
         places = [p for p, used in zip(subject.channel_locations(recording), beat_fit.used, strict=True) if used]
         beat = beat_series(beat_fit, subject.beat_start_phase(recording)) @ own.T
@@ -140,7 +140,12 @@ def harmonics(data: WhitenedData, coefficients: Float[Array, " D"]) -> tuple[flo
 
 
 def overlays(
-    subject: Subject, data: WhitenedData, before: Sequence[Array], after: Sequence[Array], held_out: bool, most: int = 2
+    subject: BeatSubject,
+    data: WhitenedData,
+    before: Sequence[Array],
+    after: Sequence[Array],
+    held_out: bool,
+    most: int = 2,
 ) -> Iterator[Overlay]:
     """Yield the channel that the added effects change most, of each of the ``most`` recordings that they change most.
 
@@ -149,7 +154,7 @@ def overlays(
     """
     change = [np.nanmean((b - a) ** 2) for b, a in zip(before, after, strict=True)]
     for r in np.argsort(change)[::-1][:most]:
-        recording = data.recordings[r]
+        recording = data.beat_recordings[r]
         apart = before[r] - after[r] if change[r] > 0.0 else before[r]
         square = np.where(data.beat_fits[r].used, np.nan_to_num(apart**2).sum(axis=0), 0.0)
         channel = int(np.argmax(square))

@@ -22,7 +22,7 @@ from wingfit.diagnosis.location.missing_load import (
     missing_loads,
     whitened,
 )
-from wingfit.diagnosis.subject import Subject
+from wingfit.diagnosis.subject import Subject, beat_subject
 from wingfit.records.array_types import Array, Float
 from wingfit.sim.effects.probe import Probe
 from wingfit.sim.wing.probing import Probed, StationMotion
@@ -71,7 +71,7 @@ def load_estimates(
         found = []
         for r in which:
             yield data.recordings[r].name, None
-            found.append((r, subject.probe_responses(nominal.fit.genome, data.recordings[r], PROBE)))
+            found.append((r, beat_subject(subject).probe_responses(nominal.fit.genome, data.beat_recordings[r], PROBE)))
         known = [(r, one) for r, one in found if one is not None]
         if known:
             cases = tuple(_case(data, nominal, r, one) for r, one in known)
@@ -119,10 +119,10 @@ def _case(data: WhitenedData, nominal: Refit, r: int, probed: Probed) -> Case:
 def missing_forces(context: FitContext, nominal: Refit) -> tuple[MissingLoad, ...]:
     """Return the missing force along the axis with the largest residual, for each recording of forces."""
     data, found = context.data, []
-    for recording, beat_fit, residuals in zip(data.recordings, data.beat_fits, nominal.fit.residuals, strict=True):
+    for recording, beat_fit, residuals in zip(data.beat_recordings, data.beat_fits, nominal.fit.residuals, strict=True):
         power = np.where(beat_fit.used, np.nansum(np.nan_to_num(residuals) ** 2, axis=0), 0.0)
         column = int(np.argmax(power))
-        origin = context.subject.beat_start_phase(recording) / (2 * np.pi)
+        origin = beat_subject(context.subject).beat_start_phase(recording) / (2 * np.pi)
         phase = recording.condition.flap_frequency * recording.times - origin
         noise = max(float(beat_fit.noise[column]), data.tolerance)
         lag1 = float(np.clip(beat_fit.lag1, 0.0, 0.99))

@@ -18,6 +18,7 @@ from wingfit.diagnosis.evidence.fit import Fit
 from wingfit.diagnosis.evidence.intervals import standard_errors
 from wingfit.diagnosis.evidence.screen import Nuisance
 from wingfit.diagnosis.finding import Interval
+from wingfit.diagnosis.subject import beat_subject
 from wingfit.inference.score_test import explained
 from wingfit.records.array_types import Array, Mask
 from wingfit.sim.filtering import gain, sampling_rate
@@ -66,9 +67,9 @@ def _pulses(context: FitContext, at: float, *, low_passed: bool = False) -> Arra
     Each pulse is in one channel of one recording only; it is sharp, or ``low_passed`` like the recording.
     """
     data, rows = context.data, []
-    for recording, beat_fit, part in zip(data.recordings, data.beat_fits, data.recording_slices, strict=True):
+    for recording, beat_fit, part in zip(data.beat_recordings, data.beat_fits, data.recording_slices, strict=True):
         order = np.arange(1, int(beat_fit.order[~beat_fit.trend].max()) + 1)
-        psi = context.subject.beat_start_phase(recording) + 2 * np.pi * at
+        psi = beat_subject(context.subject).beat_start_phase(recording) + 2 * np.pi * at
         size = 2 * np.exp(-0.5 * (2 * np.pi * WIDTH * order) ** 2)
         if low_passed and recording.low_pass is not None:
             frequency = order * recording.condition.flap_frequency

@@ -4,51 +4,32 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from itertools import islice
-from typing import Literal
 
 import numpy as np
 
 from wingfit.diagnosis.evidence.fit import with_measured_jacobian
 from wingfit.diagnosis.evidence.intervals import gene_values
 from wingfit.diagnosis.evidence.nominal import Nominal
-from wingfit.diagnosis.evidence.refit import Refit, contribution, refit_at
+from wingfit.diagnosis.evidence.refit import Refit
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
-from wingfit.diagnosis.finding import (
-    Advice,
-    Finding,
-    Floors,
-    GeneValue,
-    Interval,
-    Proof,
-    RecordingMisfit,
-    Where,
-    in_milli,
-)
-from wingfit.diagnosis.location import maps
-from wingfit.diagnosis.location.differences import cause_location, residual_location
-from wingfit.diagnosis.location.missing_load import LoadPlace
-from wingfit.diagnosis.location.missing_physics import (
-    MissingPhysics,
-    largest_residuals,
-    load_estimates,
-    missing_forces,
-    missing_physics,
-)
-from wingfit.diagnosis.location.pulse_phase import locate_pulse
+from wingfit.diagnosis.finding import Advice, Finding, Floors, GeneValue, Proof, RecordingMisfit, amount
+from wingfit.diagnosis.location.in_series import channel_misfits, series_location, series_overlays
+from wingfit.diagnosis.location.located import Located
 from wingfit.diagnosis.search_state import SearchState
+from wingfit.diagnosis.verdict.locate_in_beat import locate_in_beat
 from wingfit.diagnosis.verdict.next_experiment import rank_conditions, separations
 from wingfit.diagnosis.verdict.noise_remarks import drift_sentence, noise_remarks
 from wingfit.diagnosis.verdict.proof import ResidualPair, predict_held_out, proof, recording_misfits
+from wingfit.diagnosis.verdict.series_remarks import series_remarks
 from wingfit.diagnosis.verdict.verdict import Decision, decide, hypotheses, summary
-from wingfit.records import Recording
+from wingfit.records import AnyRecording
 
 Step = tuple[float, str, Finding | None]
 
 WORSE_FACTOR = 1.1  # times the misfit before: recordings that fit worse than that get a remark
 
 
-def build_finding(state: SearchState, name: str, held_out: Sequence[Recording]) -> Iterator[Step]:
+def build_finding(state: SearchState, name: str, held_out: Sequence[AnyRecording]) -> Iterator[Step]:
     """Build the finding of a finished search; yields the fraction of the work done, the stage, and the finding last.
 
     ``name``: of the dataset; ``held_out``: recordings with which the result is validated.
@@ -60,77 +41,37 @@ def build_finding(state: SearchState, name: str, held_out: Sequence[Recording]) 
     best = replace(best, fit=with_measured_jacobian(state.context, best.fit))
     yield 0.05, "predicting the held-out recordings", None
     validation, failed = predict_held_out(held_out, state.context, nominal.fit, best.fit)
-    missing = MissingPhysics()
-    if decision.verdict == "unnamed" or _is_load(decision, best):
-        for fraction, stage, located in _locate(state, unnamed=decision.verdict == "unnamed"):
-            missing = located
-            yield 0.15 + 0.6 * fraction, stage, None
+    own = ResidualPair(state.data, nominal.fit.residuals, best.fit.residuals)
+    located: Located | None = None
+    for fraction, stage, found in _locate(state, decision, best, own, validation):
+        located = found
+        yield 0.15 + 0.6 * fraction, stage, None
+    if located is None:
+        raise ValueError("the misfit was not located")
     advice: tuple[Advice, ...] = ()
-    if decision.verdict != "adequate":
+    if decision.verdict != "adequate" and state.data.kind != "series":
         apart = []
         for part, one in separations(state.context, weights):
             apart += [one] if one else []
             yield 0.75 + 0.2 * part, "comparing conditions to record next", None
         advice = rank_conditions(state.data, weights, apart)
-    location = _where(state, decision, best, missing)
-    found = _finding(state, name, decision, best, validation, missing, advice, location)
-    yield 1.0, "done", replace(found, remarks=(*found.remarks, *failed))
+    finding = _finding(state, name, decision, best, own, validation, advice, located)
+    yield 1.0, "done", replace(finding, remarks=(*finding.remarks, *failed))
 
 
-def _is_load(decision: Decision, best: Refit) -> bool:
-    """Return whether the named effects act as loads: faults of a drive or camera move markers without a load."""
-    families = {trial.suspect.family for trial in best.trials}
-    return decision.verdict in ("named", "ambiguous") and not families & {"actuation", "measurement"}
-
-
-def _locate(state: SearchState, *, unnamed: bool) -> Iterator[tuple[float, str, MissingPhysics]]:
-    """Locate the missing physics; yields the fraction done, the stage, and the result, which is empty until the last.
-
-    If no effect was named (``unnamed``), a finer model is probed too, and a free-form law is fitted.
-    """
-    data, nominal = state.data, state.fitted_nominal.refit
-    if data.recordings[0].kind == "forces":
-        when = locate_pulse(state.context, nominal.fit) if unnamed else None
-        loads = missing_forces(state.context, nominal)
-        yield 1.0, "locating the missing force", MissingPhysics(loads, LoadPlace(phase=when))
+def _locate(
+    state: SearchState, decision: Decision, best: Refit, fitted: ResidualPair, held_out: ResidualPair | None
+) -> Iterator[tuple[float, str, Located | None]]:
+    if state.data.kind != "series":
+        yield from locate_in_beat(state, decision, best, fitted, held_out)
         return
-    models, which = [(state.subject, nominal)], largest_residuals(data, nominal)
-    for finer in islice(state.context.finer(), int(unnamed)):
-        yield 0.0, f"fitting a {finer.subject.description}", MissingPhysics()
-        fitted = refit_at(finer, nominal)
-        models += [(finer.subject, fitted)] if fitted is not None else []
-    found = []
-    for k, (name, guess) in enumerate(load_estimates(models, data, which)):
-        yield k / ((len(which) + 1.0) * len(models)), f"probing the wing under {name}", MissingPhysics()
-        found += [guess] if guess is not None else []
-    yield 1.0, "locating the missing physics", missing_physics(found, law=unnamed)
-
-
-def _where(state: SearchState, decision: Decision, best: Refit, missing: MissingPhysics) -> Where:
-    """Return where the misfit lies or, for a named effect, where the effect acts (a fit spreads a misfit in time)."""
     data, coefficients = state.data, state.fitted_nominal.refit.fit.coefficients
-    if decision.verdict in ("named", "measurement fault"):
-        acts = contribution(state.context, best)
-        data, coefficients = (data, coefficients) if acts is None else (data.noiseless, acts)
-    found = residual_location(data, maps.recording_residuals(state.subject, data, coefficients), coefficients)
-    shown_refit = state.fitted_nominal.refit if decision.verdict == "unnamed" else best
-    own = {gene.name: gene.value for gene in gene_values(state.data, shown_refit)}
-    span = _effect_location(shown_refit, own, "span") or missing.place.span
-    chord = _effect_location(shown_refit, own, "chord") or missing.place.chord
-    phase = missing.place.phase if decision.verdict != "measurement fault" else None
-    return replace(
-        found,
-        words=found.words + cause_location(span, chord, phase, drive_error=missing.drive_error),
-        span=span or found.span,
-        chord=chord or found.chord,
-        phase=phase or found.phase,
-    )
-
-
-def _effect_location(best: Refit, genes: Mapping[str, Interval], along: Literal["span", "chord"]) -> Interval | None:
-    """Return the location ``along`` the wing from the effect's own ``genes`` (by name); None where it has none."""
-    named = (trial.suspect.location_genes for trial in best.trials)
-    return next((genes[one[along]] for one in named if along in one), None)
+    shown = list(series_overlays(data, fitted.before, fitted.after, held_out=False))
+    if held_out is not None:
+        shown += series_overlays(held_out.data, held_out.before, held_out.after, held_out=True)
+    where = series_location(data, coefficients, fitted.before)
+    channels = channel_misfits(data, coefficients, best.fit.coefficients)
+    yield 1.0, "locating the misfit", Located(where, tuple(shown), channels=channels)
 
 
 def _finding(
@@ -138,34 +79,28 @@ def _finding(
     name: str,
     decision: Decision,
     best: Refit,
+    fitted: ResidualPair,
     validation: ResidualPair | None,
-    missing: MissingPhysics,
     advice: tuple[Advice, ...],
-    location: Where,
+    located: Located,
 ) -> Finding:
     subject, data, weights = state.subject, state.data, state.final_weights
-    nominal, discretisation = state.fitted_nominal.refit, _discretisation_error(state)
-    own = ResidualPair(data, nominal.fit.residuals, best.fit.residuals)
-    rows = recording_misfits(own, held_out=False, floor=discretisation)
-    shown = list(maps.overlays(subject, data, own.before, own.after, held_out=False))
-    kind = data.recordings[0].kind
-    unit: Literal["m", "N"] = "m" if kind == "tracks" else "N"
+    nominal, discretisation, unit = state.fitted_nominal.refit, _discretisation_error(state), state.data.unit
+    rows = recording_misfits(fitted, held_out=False, floor=discretisation)
     proved = None
     if validation is not None:
         rows += recording_misfits(validation, held_out=True, floor=discretisation)
         proved = proof(validation, discretisation, unit, effects_added=bool(best.names))
-        shown += maps.overlays(subject, validation.data, validation.before, validation.after, held_out=True)
-    before, after = (maps.recording_residuals(subject, data, one.fit.coefficients) for one in (nominal, best))
     suspects, genes = {suspect.name: suspect for suspect in subject.suspects}, gene_values(data, best)
     weights = replace(weights, refits=tuple(best if one.names == best.names else one for one in weights.refits))
     return Finding(
         dataset=name,
-        kind=kind,
+        kind=data.kind,
         unit=unit,
         model=subject.description,
         verdict=decision.verdict,
-        summary=summary(decision, suspects, _summary_texts(data, nominal, best, location.words, proved))
-        + drift_sentence(data),
+        summary=summary(decision, suspects, _summary_texts(data, nominal, best, located, proved))
+        + ("" if data.kind == "series" else drift_sentence(data)),
         probabilities=decision.probabilities,
         named=decision.named,
         added_effects=best.names,
@@ -173,25 +108,32 @@ def _finding(
         floors=_floors(state, discretisation),
         hypotheses=hypotheses(data, weights, state.trials),
         indistinguishable=decision.alternatives,
-        where=location if decision.verdict != "adequate" else None,
-        markers=maps.markers(before, after),
-        phase_map=maps.phase_map(before, after),
-        missing=missing.loads,
+        where=located.where if decision.verdict != "adequate" else None,
+        markers=located.markers,
+        phase_map=located.phase_map,
+        missing=located.missing,
         recordings=rows,
         proof=proved,
-        overlays=tuple(shown),
+        overlays=located.overlays,
         genes=genes,
-        law=missing.law,
+        law=located.law,
         advice=advice,
-        outline=subject.outline,
+        outline=located.outline,
+        channels=located.channels,
         remarks=(
             *state.fitted_nominal.remarks,
             *_refinement_remarks(state.fitted_nominal),
-            *noise_remarks(data, unit),
+            *_noise_remarks(data, nominal, unit),
             *_unidentified_sizes(genes, best),
             *_worsened(rows, best, unit),
         ),
     )
+
+
+def _noise_remarks(data: WhitenedData, nominal: Refit, unit: str) -> tuple[str, ...]:
+    if data.kind == "series":
+        return series_remarks(data, nominal.fit.coefficients)
+    return noise_remarks(data, unit)
 
 
 def _discretisation_error(state: SearchState) -> float:
@@ -205,23 +147,26 @@ def _discretisation_error(state: SearchState) -> float:
 
 def _floors(state: SearchState, discretisation: float) -> Floors:
     data, nominal = state.data, state.fitted_nominal
-    lag1 = float(np.median([beat_fit.lag1 for beat_fit in data.beat_fits]))
+    lag1 = float(np.median([one.lag1 for one in data.reduced]))
     total = float(np.sqrt(data.noise**2 + discretisation**2 + data.tolerance**2))
     error = None if nominal.discretisation_error is None else discretisation
     return Floors(data.noise, lag1, error, nominal.finer, data.tolerance, total)
 
 
 def _summary_texts(
-    data: WhitenedData, nominal: Refit, best: Refit, place: str, proved: Proof | None
+    data: WhitenedData, nominal: Refit, best: Refit, located: Located, proved: Proof | None
 ) -> Mapping[str, str]:
-    """Return the parts of the summary as text, by the names that :func:`summary` uses; ``place``: of the misfit."""
-    unit = "m" if data.recordings[0].kind == "tracks" else "N"
+    """Return the parts of the summary as text, by the names that :func:`summary` uses."""
     before, after = (np.sqrt(data.noise**2 + max(one.excess, 0.0)) for one in (nominal, best))
+    if data.kind == "series":
+        noise = ", ".join(f"{one.noise:.3g} {one.unit} in {one.name}" for one in located.channels)
+    else:
+        noise = amount(data.noise, data.unit)
     return {
-        "before": in_milli(before, unit),
-        "after": in_milli(after, unit),
-        "noise": in_milli(data.noise, unit),
-        "where": place,
+        "before": amount(before, data.unit),
+        "after": amount(after, data.unit),
+        "noise": noise,
+        "where": located.where.words,
         "held_out": f"On {proved.words}."
         if proved
         else "No held-out recording could be predicted, so the result is not validated.",
@@ -243,7 +188,7 @@ def _unidentified_sizes(genes: Sequence[GeneValue], best: Refit) -> tuple[str, .
 def _worsened(rows: Sequence[RecordingMisfit], best: Refit, unit: str) -> tuple[str, ...]:
     """Return a remark on recordings that fit worse with the added effects; empty if there are none."""
     worse = [
-        f"{row.name} from {1e3 * row.before.value:.3g} to {in_milli(row.after.value, unit)}"
+        f"{row.name} from {amount(row.before.value, unit)} to {amount(row.after.value, unit)}"
         for row in rows
         if best.names and row.after.value > WORSE_FACTOR * row.before.value
     ]

@@ -13,6 +13,7 @@ from wingfit.diagnosis.evidence.fit import PRIOR_SD, Fit
 from wingfit.diagnosis.evidence.refit import Refit
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.finding import Advice
+from wingfit.diagnosis.subject import beat_subject
 from wingfit.diagnosis.verdict.weigh_hypotheses import HypothesisWeights, tolerated_excess
 from wingfit.inference.differences import Outputs, differences
 from wingfit.records import Condition, Recording
@@ -41,15 +42,16 @@ def separations(
     separation with fixed genes, an upper bound. Then the rivals of the first hypothesis may adapt their genes, until no
     other condition can be among the best MAX_ADVICE. Yields nothing where there are no two hypotheses or no conditions.
     """
-    rivals, conditions = rival_refits(weights), context.subject.candidate_conditions()
+    subject = beat_subject(context.subject)
+    rivals, conditions = rival_refits(weights), subject.candidate_conditions()
     if len(rivals) < 2:
         return
     if weights.probabilities.max() >= NEARLY_CERTAIN:
         conditions = conditions[:MAX_CONDITIONS_IF_CERTAIN]
     predicted, (first, *others) = list[tuple[float, Recording]](), rivals
-    model = context.subject.with_initial_motion(context.subject.extended(first.names), first.fit.genome)
+    model = subject.with_initial_motion(subject.extended(first.names), first.fit.genome)
     for k, condition in enumerate(conditions):
-        recording = context.subject.simulated_recording(model, first.fit.genome, condition)
+        recording = subject.simulated_recording(model, first.fit.genome, condition)
         if recording is not None:
             most = _least_separation(context, first, recording, others, adapt=False)
             predicted += [] if most is None else [(most, recording)]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
-from wingfit.diagnosis.finding import in_milli
+from wingfit.diagnosis.finding import amount
 from wingfit.inference.noise.drift import Drift
 from wingfit.inference.noise.harmonic import still_markers
 
@@ -17,7 +17,7 @@ def noise_remarks(data: WhitenedData, unit: str) -> tuple[str, ...]:
     within_beats = [r.name for r, v in zip(data.recordings, data.beat_fits, strict=True) if not v.between_beats]
     remarks = [
         f"{one.name}: the recorded position of {', '.join(markers)} never changes; ignored: check the export of tracks"
-        for one in data.recordings
+        for one in data.beat_recordings
         if (markers := still_markers(one))
     ]
     if within_beats:
@@ -31,7 +31,7 @@ def noise_remarks(data: WhitenedData, unit: str) -> tuple[str, ...]:
 def _drift_remarks(data: WhitenedData, unit: str) -> tuple[str, ...]:
     """Return a remark on recordings during which the beat changes slowly; empty if there are none."""
     found = [
-        f"{name} (by {in_milli(drift.size, unit)}, {drift.ratio:.2g} times the power of noise)"
+        f"{name} (by {amount(drift.size, unit)}, {drift.ratio:.2g} times the power of noise)"
         for name, drift in _drifts(data)
     ]
     remark = (
@@ -47,12 +47,12 @@ def _uneven_noise_remarks(data: WhitenedData, unit: str) -> tuple[str, ...]:
     levels = np.array([float(np.sqrt(np.mean(fit.noise[fit.used] ** 2))) for fit in data.beat_fits])
     usual = float(np.median(levels))
     loud = [
-        f"{one.name} ({in_milli(level, unit)})"
+        f"{one.name} ({amount(level, unit)})"
         for one, level in zip(data.recordings, levels, strict=True)
         if level > UNEVEN * usual
     ]
     remark = (
-        f"the noise of {', '.join(loud)} is more than {UNEVEN:g} times the usual {in_milli(usual, unit)}: what happens "
+        f"the noise of {', '.join(loud)} is more than {UNEVEN:g} times the usual {amount(usual, unit)}: what happens "
         "there but not in every beat is taken for noise, and missing physics may hide in it"
     )
     return (remark,) if loud else ()

@@ -7,16 +7,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from wingfit.calibration.estimates.linearised import free_genes, unit_at
 from wingfit.diagnosis.evidence.context import FitContext
-from wingfit.diagnosis.evidence.fit import Fit
+from wingfit.diagnosis.evidence.fit import FIT_ERRORS, Fit, gauss_newton_fit
 from wingfit.diagnosis.evidence.intervals import CONFIDENCE
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
-from wingfit.diagnosis.finding import Interval, Proof, RecordingMisfit, in_milli
-from wingfit.records import Recording
+from wingfit.diagnosis.finding import Interval, Proof, RecordingMisfit, amount
+from wingfit.inference.noise.series_fit import SeriesFit
+from wingfit.records import AnyRecording, Condition, Recording
 from wingfit.records.array_types import Array
+from wingfit.records.series import belongs_to
 
 BOOTSTRAP_DRAWS = 400  # of markers, with replacement (Efron 1979)
 MIN_MARKERS = 4  # for a bootstrap over markers
+OWN_STEPS = 20  # of the fit of the genes that belong to a held-out recording alone
 
 
 @dataclass(frozen=True)
@@ -33,27 +37,31 @@ class ResidualPair:
 
     @property
     def squares(self) -> Iterator[Array]:
-        """Squares [2, T, C] of the residuals before and after, NaN where a channel is not used, by recording."""
-        for fit, *residuals in zip(self.data.beat_fits, self.before, self.after, strict=True):
-            yield np.stack([np.where(fit.used, one, np.nan) ** 2 for one in residuals])
+        """Squares [2, T, C] of the residuals before and after, NaN where a channel is not used, by recording.
+
+        Residuals of a series are divided by the scale of their channel.
+        """
+        for fit, *residuals in zip(self.data.reduced, self.before, self.after, strict=True):
+            scale = fit.scale if isinstance(fit, SeriesFit) else 1.0
+            yield np.stack([np.where(fit.used, one / scale, np.nan) ** 2 for one in residuals])
 
 
 def predict_held_out(
-    recordings: Sequence[Recording], context: FitContext, before: Fit, after: Fit
+    recordings: Sequence[AnyRecording], context: FitContext, before: Fit, after: Fit
 ) -> tuple[ResidualPair | None, tuple[str, ...]]:
     """Return residuals of recordings that neither model was fitted to, and remarks on those that cannot be simulated.
 
     ``before``: fit of the nominal model; ``after``: fit with effects added; ``context``: of both, whose force axes and
-    thresholds are used here too. None where no recording can be simulated with both models.
+    thresholds are used here too. Genes that belong to a held-out recording alone (an initial state) are fitted to it;
+    all others keep their values. None where no recording can be simulated with both models.
     """
     fitted = context.data
-    kept, pairs, failed, incomplete = list[Recording](), list[tuple[Array, Array]](), list[str](), False
+    kept, pairs, failed, incomplete = list[AnyRecording](), list[tuple[Array, Array]](), list[str](), False
     for recording in recordings:
-        one, found, reasons = WhitenedData.of([recording], fitted.axes, fitted.policy), [], []
+        one, found, reasons = fitted.like([recording]), [], []
         for fit in (before, after):
-            problem = replace(fit.problem, recordings=one.recordings)
-            _, (reason,), (residuals,) = one.evaluate(problem, context.evaluator, fit.individual)
-            found.append(residuals[0])
+            residuals, reason = _predicted(one, context, fit)
+            found.append(residuals)
             reasons.append(reason)
         incomplete = incomplete or reasons[1] is not None
         if any(reasons):
@@ -65,32 +73,49 @@ def predict_held_out(
     if not kept:
         return None, tuple(failed)
     before_all, after_all = zip(*pairs, strict=True)
-    data = WhitenedData.of(kept, fitted.axes, fitted.policy)
+    data = fitted.like(kept)
     return ResidualPair(data, before_all, after_all, incomplete), tuple(failed)
+
+
+def _predicted(one: WhitenedData, context: FitContext, fit: Fit) -> tuple[Array, str | None]:
+    """Return the residuals [T, C] of the only recording of ``one`` with the genes of ``fit``, and why it failed."""
+    (recording,) = one.recordings
+    problem = replace(fit.problem, recordings=one.recordings)
+    own = tuple(gene.name for gene in fit.problem.model.genes if belongs_to(gene.name, recording.name))
+    values = fit.individual
+    if own:
+        base = problem.base.replace(fit.values)
+        problem = replace(problem, free=own, base=base)
+        start = unit_at(free_genes(problem), np.array([base[name] for name in own]))
+        try:
+            *_, last = gauss_newton_fit(replace(context, data=one), problem, start, OWN_STEPS)
+        except FIT_ERRORS as error:
+            return np.empty(0), str(error)
+        values = last.individual
+    _, (reason,), (residuals,) = one.evaluate(problem, context.evaluator, values)
+    return residuals[0], reason
 
 
 def recording_misfits(predicted: ResidualPair, *, held_out: bool, floor: float) -> tuple[RecordingMisfit, ...]:
     """Return the misfit to each recording; ``floor`` (m or N) is the discretisation error."""
     rows = []
     for r, recording in enumerate(predicted.data.recordings):
-        beat_fit, condition = predicted.data.beat_fits[r], recording.condition
-        alone = replace(predicted.data, recordings=(recording,), beat_fits=(beat_fit,))
+        fit = predicted.data.reduced[r]
+        alone = replace(predicted.data, recordings=(recording,), reduced=(fit,))
         before, after, _ = _misfits(ResidualPair(alone, (predicted.before[r],), (predicted.after[r],)))
-        noise = float(np.sqrt(np.mean(beat_fit.noise[beat_fit.used] ** 2)))
-        rows.append(
-            RecordingMisfit(
-                recording.name,
-                held_out,
-                condition.flap_frequency,
-                float(np.degrees(condition.phase_lag)),
-                condition.pressure / 100.0,
-                condition.airspeed,
-                before,
-                after,
-                float(np.hypot(noise, floor)),
-            )
-        )
+        noise = float(np.sqrt(np.mean(fit.noise[fit.used] ** 2)))
+        expected = before, after, float(np.hypot(noise, floor))
+        if isinstance(recording, Recording):
+            rows.append(RecordingMisfit(recording.name, held_out, *_setting(recording.condition), *expected))
+        else:
+            blank, settings = (None, None, None, None), dict(recording.settings)
+            rows.append(RecordingMisfit(recording.name, held_out, *blank, *expected, settings))
     return tuple(rows)
+
+
+def _setting(condition: Condition) -> tuple[float, float, float, float]:
+    lag = float(np.degrees(condition.phase_lag))
+    return condition.flap_frequency, lag, condition.pressure / 100.0, condition.airspeed
 
 
 def proof(predicted: ResidualPair, floor: float, unit: str, *, effects_added: bool) -> Proof:
@@ -101,9 +126,9 @@ def proof(predicted: ResidualPair, floor: float, unit: str, *, effects_added: bo
     data = predicted.data
     before, after, better = _misfits(predicted)
     least = float(np.hypot(data.noise, floor))
-    change = in_milli(before.value, unit)
+    change = amount(before.value, unit)
     if effects_added:
-        change += f" before, {in_milli(after.value, unit)} after"
+        change += f" before, {amount(after.value, unit)} after"
     better = better and not predicted.incomplete
     several = "s" if len(data.recordings) > 1 else ""
     words = f"{len(data.recordings)} held-out recording{several}: {change}, {after.value / least:.2f} times the floor"
@@ -119,7 +144,7 @@ def _relative_to_floor(interval: Interval, floor: float) -> Interval:
 
 def _misfits(predicted: ResidualPair) -> tuple[Interval, Interval, bool]:
     """Return root mean squares (m or N) before and after with intervals, and if the decrease is significant."""
-    kind, groups = predicted.data.recordings[0].kind, list[Array]()
+    kind, groups = predicted.data.kind, list[Array]()
     for squares in predicted.squares:
         count = np.isfinite(squares[0]).sum(axis=0)
         total = np.nansum(squares, axis=1)
@@ -127,7 +152,7 @@ def _misfits(predicted: ResidualPair) -> tuple[Interval, Interval, bool]:
         rows = np.concatenate([total, count[None].astype(float)]).reshape(3, -1, width).sum(axis=2)
         groups.append(rows[:, rows[2] > 0])
     every = np.concatenate(groups, axis=1)
-    if kind == "forces" or every.shape[1] < MIN_MARKERS:  # blocks of time instead of markers
+    if kind != "tracks" or every.shape[1] < MIN_MARKERS:  # blocks of time instead of markers
         every = _time_blocks(predicted)
     drawn = np.random.default_rng(0).integers(0, every.shape[1], (BOOTSTRAP_DRAWS, every.shape[1]))
     sums = every[:, drawn].sum(axis=2)

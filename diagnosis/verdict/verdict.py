@@ -12,8 +12,8 @@ from wingfit.diagnosis.evidence.refit import Refit
 from wingfit.diagnosis.evidence.screen import Trial
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.finding import VERDICTS, Hypothesis, Verdict
-from wingfit.diagnosis.subject import Suspect
 from wingfit.diagnosis.verdict.weigh_hypotheses import HypothesisWeights
+from wingfit.rigs.suspect import Suspect
 
 MAX_SCREENED_LISTED = 12  # suspects that were only score-tested and are still listed
 

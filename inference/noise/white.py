@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wingfit.records import Recording
+from wingfit.records import AnyRecording
 from wingfit.records.array_types import Array, Float
 
 FLOOR = 1e-6  # smallest standard deviation relative to the largest recorded value, so that R is not singular
@@ -31,14 +31,14 @@ class Noise:
     log_determinants: Float[Array, " C"]
 
     @classmethod
-    def of(cls, record: Recording, residuals: Float[Array, "T C"]) -> Noise:
+    def of(cls, record: AnyRecording, residuals: Float[Array, "T C"]) -> Noise:
         """Estimate R from the residuals [T, C] of ``record`` (NaN: not compared).
 
         Forces have a full covariance, (1/N) sum of v v^T over N samples v. Tracks have one variance for each of the C
         coordinates and no covariances: from as many frames as coordinates, with gaps, a full matrix would be singular.
         Each variance is a weighted mean of that of the coordinate and of the mean over all (weight: POOLED samples), so
-        that a track of a few frames cannot be fitted exactly and dominate. Channels without residuals get variance 1,
-        which has no influence.
+        that a track of a few frames cannot be fitted exactly and dominate. Channels of a series have different units,
+        so each has the variance of its own. Channels without residuals get variance 1, which has no influence.
         """
         seen = np.isfinite(residuals)
         v, count = np.where(seen, residuals, 0.0), seen.sum(axis=0)
@@ -46,9 +46,13 @@ class Noise:
             matrix = v.T @ v / max(int(count.max()), 1)
         else:
             power = (v**2).sum(axis=0)
-            matrix = np.diag((power + POOLED * power.sum() / max(count.sum(), 1)) / (count + POOLED))
-        largest = float(np.nanmax(np.abs(record.values), initial=0.0)) or 1.0
-        matrix = matrix + np.diag(np.where(count > 0, (FLOOR * largest) ** 2, 1.0 - np.diag(matrix)))
+            others = POOLED * power.sum() / max(count.sum(), 1)
+            pooled = record.kind == "tracks"
+            matrix = np.diag((power + others) / (count + POOLED) if pooled else power / np.maximum(count, 1))
+        axis = 0 if record.kind == "series" else None
+        largest = np.nanmax(np.abs(record.values), axis=axis, initial=0.0)
+        least = (FLOOR * np.where(largest > 0.0, largest, 1.0)) ** 2
+        matrix = matrix + np.diag(np.where(count > 0, least, 1.0 - np.diag(matrix)))
         factor = np.linalg.cholesky(matrix)
         whitening = np.asarray(np.linalg.solve(factor, np.eye(len(factor))).T, float)
         return cls(matrix, whitening, 2.0 * np.log(np.diag(factor)))

@@ -18,8 +18,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from wingfit.diagnosis.subject import ChannelLocation, Family, Suspect
+from wingfit.diagnosis.subject import ChannelLocation
 from wingfit.records import Condition, Gene, Recording
+from wingfit.rigs.suspect import Family, Suspect
 from wingfit.sim.effects.probe import Probe
 from wingfit.sim.model import Array, Model, Observation, genome_batch
 

@@ -27,7 +27,7 @@ from tests.diagnosis.pendulum_rig import (
 from wingfit.calibration.spec import CalibrationSpec
 from wingfit.diagnosis import DiagnosisSpec, check
 from wingfit.diagnosis.rigs import MAX_BODIES, MAX_CONDITIONS, VehicleSubject, WingSubject, subject_of
-from wingfit.diagnosis.subject import Subject
+from wingfit.diagnosis.subject import BeatSubject
 from wingfit.records import Dataset, LowPass, Wing
 from wingfit.sim.effects.ports.markers import nearest
 from wingfit.sim.filtering import default_cutoff
@@ -55,7 +55,7 @@ def vehicle() -> Dataset:
 
 
 @pytest.fixture(scope="module")
-def subjects(wing: Dataset, vehicle: Dataset) -> dict[str, Subject]:
+def subjects(wing: Dataset, vehicle: Dataset) -> dict[str, BeatSubject]:
     return {
         "wing": subject_of(wing, FOUR_BODIES),
         "vehicle": subject_of(vehicle, CalibrationSpec()),
@@ -63,7 +63,7 @@ def subjects(wing: Dataset, vehicle: Dataset) -> dict[str, Subject]:
     }
 
 
-def nominal(subject: Subject) -> Array:
+def nominal(subject: BeatSubject) -> Array:
     return np.array([[gene.nominal for gene in subject.model.genes]])
 
 
@@ -71,7 +71,7 @@ RIGS = ("wing", "vehicle", "pendulum")
 
 
 @pytest.mark.parametrize("rig", RIGS)
-def test_suspects_switched_off_change_nothing(subjects: dict[str, Subject], rig: str) -> None:
+def test_suspects_switched_off_change_nothing(subjects: dict[str, BeatSubject], rig: str) -> None:
     """Own genes come first, then those of the suspects; all at nominal they simulate the nominal model exactly."""
     subject = subjects[rig]
     names = [suspect.name for suspect in subject.suspects]
@@ -88,7 +88,7 @@ def test_suspects_switched_off_change_nothing(subjects: dict[str, Subject], rig:
 
 
 @pytest.mark.parametrize("rig", RIGS)
-def test_suspects_are_consistent(subjects: dict[str, Subject], rig: str) -> None:
+def test_suspects_are_consistent(subjects: dict[str, BeatSubject], rig: str) -> None:
     for suspect in subjects[rig].suspects:
         names = [gene.name for gene in suspect.genes]
         assert set(suspect.size_genes) <= set(names) == set(suspect.typical)
@@ -102,7 +102,7 @@ def test_suspects_are_consistent(subjects: dict[str, Subject], rig: str) -> None
 
 
 @pytest.mark.parametrize("rig", RIGS)
-def test_simulated_recordings_are_complete_and_aligned(subjects: dict[str, Subject], rig: str) -> None:
+def test_simulated_recordings_are_complete_and_aligned(subjects: dict[str, BeatSubject], rig: str) -> None:
     """All channels under every candidate condition: the model reproduces its recording, which starts at a beat."""
     subject = subjects[rig]
     conditions = subject.candidate_conditions()
@@ -118,7 +118,7 @@ def test_simulated_recordings_are_complete_and_aligned(subjects: dict[str, Subje
         assert subject.beat_start_phase(shown) == pytest.approx(0.0, abs=1e-6)
 
 
-def test_a_failed_simulation_gives_no_recording(subjects: dict[str, Subject]) -> None:
+def test_a_failed_simulation_gives_no_recording(subjects: dict[str, BeatSubject]) -> None:
     subject = subjects["wing"]
     genome = nominal(subject)[0]
     genome[[gene.name for gene in subject.model.genes].index("L_a")] = 1e6
@@ -164,7 +164,7 @@ def test_invalid_requests_are_refused_before_any_simulation(wing: Dataset) -> No
             check(dataset, replace(spec, calibration=FOUR_BODIES))
 
 
-def test_channel_locations_and_outline_of_a_wing(subjects: dict[str, Subject], wing: Dataset) -> None:
+def test_channel_locations_and_outline_of_a_wing(subjects: dict[str, BeatSubject], wing: Dataset) -> None:
     subject, recording = subjects["wing"], wing.recordings[0]
     places = subject.channel_locations(recording)
     stations = wing.wing.stations
@@ -191,7 +191,7 @@ def test_a_marker_fault_is_tested_at_every_marker(wing: Dataset) -> None:
     assert suspects["lumped_mass"].candidate_shapes == ()
 
 
-def test_finer_wings_refine_both_directions_up_to_a_limit(subjects: dict[str, Subject], wing: Dataset) -> None:
+def test_finer_wings_refine_both_directions_up_to_a_limit(subjects: dict[str, BeatSubject], wing: Dataset) -> None:
     divisions, subject = [], subjects["wing"]
     assert isinstance(subject, WingSubject)
     while True:
@@ -213,7 +213,7 @@ def test_finer_wings_refine_both_directions_up_to_a_limit(subjects: dict[str, Su
     assert [one.model.structure.division.bodies for one in eleven.finer_subjects()] == [(3,) * 6, (4,) * 6]
 
 
-def test_a_finer_discretisation_estimates_the_error_of_the_coarse_one(subjects: dict[str, Subject]) -> None:
+def test_a_finer_discretisation_estimates_the_error_of_the_coarse_one(subjects: dict[str, BeatSubject]) -> None:
     """With 4 bodies, against a wing finer than any that a diagnosis uses."""
     subject = subjects["wing"]
     assert isinstance(subject, WingSubject)
@@ -239,7 +239,7 @@ def test_a_vehicle_is_refined_only_where_forces_change(vehicle: Dataset) -> None
 
 
 def test_candidate_conditions_are_new_and_within_the_recorded_range(
-    subjects: dict[str, Subject], wing: Dataset
+    subjects: dict[str, BeatSubject], wing: Dataset
 ) -> None:
     recorded_ones = [r.condition for r in wing.recordings]
     for condition in subjects["wing"].candidate_conditions():

@@ -1,0 +1,89 @@
+"""Remarks on the noise of series: where it is known from, and whether it can be right."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
+from wingfit.inference.noise.series import EXCEEDS
+from wingfit.records.array_types import Array, Float
+
+UNEVEN = 3.0  # times the least noise of a channel: recordings with more get a remark
+SOURCES = {
+    "repeats": "the differences between repeats",
+    "period": "the differences between periods",
+    "stated": "what the dataset states",
+    "highest frequencies": "the highest frequencies, as white noise; slow noise is not in it",
+}
+
+
+def series_remarks(data: WhitenedData, coefficients: Float[Array, " D"]) -> tuple[str, ...]:
+    """Return remarks on the noise; ``coefficients`` [D]: residuals of the nominal model."""
+    return (*_sources(data), *_uneven(data), *_contradicted(data), *_overstated(data, coefficients))
+
+
+def _sources(data: WhitenedData) -> Iterator[str]:
+    noises = data.series.noises if data.series else {}
+    by_source: dict[str, list[str]] = {}
+    for one in data.recordings:
+        by_source.setdefault(noises[one.name].source, []).append(one.name)
+    for source, names in by_source.items():
+        where = "" if len(by_source) == 1 else f" of {', '.join(names)}"
+        yield f"the noise{where} is known from {SOURCES[source]}"
+
+
+def _uneven(data: WhitenedData) -> Iterator[str]:
+    """Yield a remark for each channel whose noise differs several-fold between recordings."""
+    noises = data.series.noises if data.series else {}
+    for c, channel in enumerate(data.recordings[0].channels):
+        levels = {one.name: float(noises[one.name].standard_deviation[c]) for one in data.recordings}
+        least = min(levels.values())
+        loud = [name for name, level in levels.items() if level > UNEVEN * least]
+        if loud:
+            yield (
+                f"the noise of {channel} in {', '.join(loud)} is more than {UNEVEN:g} times that of the quietest "
+                "recording: missing physics may hide in it"
+            )
+
+
+def _contradicted(data: WhitenedData) -> Iterator[str]:
+    """Yield a remark for each channel whose stated noise is far from that of the highest frequencies."""
+    noises = data.series.noises if data.series else {}
+    for c, channel in enumerate(data.recordings[0].channels):
+        ratios = [
+            noises[one.name].high[c] / noises[one.name].standard_deviation[c]
+            for one in data.recordings
+            if noises[one.name].source == "stated" and np.isfinite(noises[one.name].high[c])
+        ]
+        if not ratios:
+            continue
+        ratio = float(np.median(ratios))
+        if ratio > EXCEEDS or ratio < 1.0 / EXCEEDS:
+            yield (
+                f"the highest frequencies of {channel} have {ratio:.2g} times the stated standard deviation: check it; "
+                "a noise that is stated too large hides missing physics, one too small imitates it"
+            )
+
+
+def _overstated(data: WhitenedData, coefficients: Float[Array, " D"]) -> Iterator[str]:
+    ratio = residual_to_noise(data, coefficients)
+    if overstated(data, coefficients):
+        yield (
+            f"the residual is {ratio:.2g} times the assumed noise, so the noise is smaller; physics may be "
+            "missing that is smaller than the assumed noise; state the right standard deviation, or record repeats"
+        )
+
+
+def residual_to_noise(data: WhitenedData, coefficients: Float[Array, " D"]) -> float:
+    """Return the root mean square of a residual with ``coefficients`` [D] divided by the assumed noise."""
+    return float(np.sqrt(max(data.excess(coefficients) + data.noise**2, 0.0)) / data.noise)
+
+
+def overstated(data: WhitenedData, coefficients: Float[Array, " D"]) -> bool:
+    """Return whether a residual is so far below the assumed noise that the noise must be smaller."""
+    below = -data.excess(coefficients)
+    return data.kind == "series" and below > max(
+        (1.0 - EXCEEDS**-2) * data.noise**2, data.policy.allowance * data.excess_standard_error
+    )

@@ -1,0 +1,144 @@
+"""Recordings of any rig: named channels over time, inputs and settings, in the units that the user states."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+
+from wingfit.records.array_types import Array, Bool, Float, Mask
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A named quantity of a rig: an input, or a setting; ``unit`` as the user writes it ("1" if it has none)."""
+
+    name: str
+    unit: str
+    description: str = ""
+
+
+@dataclass(frozen=True)
+class Channel:
+    """A measured quantity.
+
+    Attributes:
+        name: identifier, the name of its column in a file.
+        unit: as the user writes it; "1" if it has none.
+        standard_deviation: of the noise of one sample, in ``unit``; None if it is not known.
+        place: where it is measured, as text for reports; "" if that has no meaning.
+        description: for reports.
+    """
+
+    name: str
+    unit: str
+    standard_deviation: float | None = None
+    place: str = ""
+    description: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Series:
+    """One recording of a rig: ``values`` [T, C] of C channels at T increasing ``times`` (s); NaN if not recorded.
+
+    Attributes:
+        name: identifier within its dataset.
+        times: [T], s; not necessarily even.
+        quantities: the C channels.
+        values: [T, C], each column in the unit of its channel.
+        inputs: samples [T] of each exogenous input (a voltage, a gust) at ``times``, by name.
+        settings: values that were set for this recording (a mass, an airspeed), by name.
+        estimates: estimates of genes that belong to this recording alone (an initial angle), by name of the gene.
+        repeats: name of the group of recordings that repeat the same experiment; "" if it was not repeated.
+        period: period (s) of the motion; None if it is not periodic.
+    """
+
+    name: str
+    times: Float[Array, " T"]
+    quantities: tuple[Channel, ...]
+    values: Float[Array, "T C"]
+    inputs: Mapping[str, Float[Array, " T"]] = field(default_factory=dict)
+    settings: Mapping[str, float] = field(default_factory=dict)
+    estimates: Mapping[str, float] = field(default_factory=dict)
+    repeats: str = ""
+    period: float | None = None
+
+    @property
+    def kind(self) -> Literal["series"]:
+        """Return "series"."""
+        return "series"
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Names of the columns of ``values``."""
+        return tuple(channel.name for channel in self.quantities)
+
+    @property
+    def standard_deviation(self) -> Float[Array, " C"] | None:
+        """Stated standard deviation [C] of the noise of each channel; None unless all channels state one."""
+        stated = [channel.standard_deviation for channel in self.quantities]
+        return None if any(one is None for one in stated) else np.array(stated, float)
+
+    @cached_property
+    def valid(self) -> Bool[Mask, "T C"]:
+        """True [T, C] where a value was recorded, False where it is missing (NaN)."""
+        return np.isfinite(self.values)
+
+
+def recording_gene(gene: str, recording: str) -> str:
+    """Return the name of the gene ``gene`` that belongs to the recording called ``recording`` alone."""
+    return f"{gene}[{recording}]"
+
+
+def belongs_to(gene: str, recording: str) -> bool:
+    """Return whether the gene called ``gene`` belongs to the recording called ``recording`` alone."""
+    return gene.endswith(f"[{recording}]")
+
+
+@dataclass(frozen=True)
+class SeriesDataset:
+    """Recordings of one rig that the user simulates.
+
+    Attributes:
+        name: of the dataset.
+        rig: name of the rig.
+        recordings: all with the same channels and inputs.
+        channels, inputs, settings: what the recordings hold, with units.
+        held_out: names of recordings that are used for validation only, never for fitting.
+        description: free text.
+    """
+
+    name: str
+    rig: str
+    recordings: tuple[Series, ...]
+    channels: tuple[Channel, ...]
+    inputs: tuple[Quantity, ...] = ()
+    settings: tuple[Quantity, ...] = ()
+    held_out: tuple[str, ...] = ()
+    description: str = ""
+
+    @property
+    def kind(self) -> Literal["series"]:
+        """Return "series"."""
+        return "series"
+
+    def recording(self, name: str) -> Series:
+        """Return the recording called ``name``; ValueError if there is none."""
+        for recording in self.recordings:
+            if recording.name == name:
+                return recording
+        raise ValueError(
+            f"no recording {name!r} in dataset {self.name!r}; it has {', '.join(r.name for r in self.recordings)}"
+        )
+
+    def select(self, names: Iterable[str]) -> tuple[Series, ...]:
+        """Return the recordings called ``names``, in the order of ``names``; ValueError for an unknown name."""
+        return tuple(self.recording(name) for name in names)
+
+    @property
+    def fitted(self) -> tuple[Series, ...]:
+        """Return the recordings that may be fitted: all that are not held out."""
+        return tuple(r for r in self.recordings if r.name not in self.held_out)

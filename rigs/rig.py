@@ -1,0 +1,85 @@
+"""A rig that the user simulates: genes, channels, what may be missing, and a function that simulates one recording."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+from wingfit.records import Gene
+from wingfit.records.array_types import Array
+from wingfit.rigs.ports import Port
+from wingfit.rigs.run import Run
+from wingfit.rigs.suspect import Suspect
+
+Simulate = Callable[[Mapping[str, float], Run], Mapping[str, Array]]
+"""Simulates the :class:`Run` with the values of all genes by name, those of suspects included (zero: off); returns the
+values [T] of each channel at ``run.times``, in the channel's unit. Raises ValueError where that is impossible."""
+
+
+@dataclass(frozen=True)
+class Rig:
+    """A rig with a simulation of the user's own.
+
+    Attributes:
+        name: of the rig.
+        genes: parameters of the nominal model that are fitted, each one value for all recordings.
+        channels: unit of each channel that ``simulate`` returns, by name.
+        simulate: see :data:`Simulate`. The same arguments must give the same numbers.
+        suspects: effects that may be missing; ``simulate`` implements them, exactly off while their sizes are zero.
+        recording_genes: parameters with a value of their own in each recording, such as an initial angle; a recording's
+            ``estimates`` replace the nominal value.
+        inputs, settings: units of the inputs and settings that ``simulate`` uses, by name.
+        ports: where laws may act (:meth:`Run.force`); each adds dry friction, damping, stiffness and others as
+            suspects.
+        faults: whether faults of the channels and inputs (gain, delay and so on) are suspects as well.
+        description: the nominal model in one line, for reports.
+        reference: where the rig was loaded from (:func:`wingfit.rigs.load.load_rig`), so that other processes can load
+            it; "" if it was not.
+    """
+
+    name: str
+    genes: tuple[Gene, ...]
+    channels: Mapping[str, str]
+    simulate: Simulate
+    suspects: tuple[Suspect, ...] = ()
+    recording_genes: tuple[Gene, ...] = ()
+    inputs: Mapping[str, str] = field(default_factory=dict)
+    settings: Mapping[str, str] = field(default_factory=dict)
+    ports: tuple[Port, ...] = ()
+    faults: bool = True
+    description: str = ""
+    reference: str = ""
+
+    def __reduce__(self) -> str | tuple[object, ...]:
+        """Pickle a rig that was loaded as its reference: its functions may not be importable elsewhere."""
+        if not self.reference:
+            return super().__reduce__()
+        from wingfit.rigs.load import load_rig  # it imports this module
+
+        return load_rig, (self.reference,)
+
+    def __post_init__(self) -> None:
+        for name in ("genes", "suspects", "recording_genes", "ports"):
+            object.__setattr__(self, name, tuple(getattr(self, name)))
+        if not (self.genes or self.recording_genes):
+            raise ValueError(f"rig {self.name!r} has no gene; give at least one parameter to fit")
+        if not self.channels:
+            raise ValueError(f"rig {self.name!r} has no channel; give the unit of each, such as {{'angle': 'rad'}}")
+        if not callable(self.simulate):
+            raise ValueError(f"rig {self.name!r}: simulate is {self.simulate!r}; give a function of (genes, run)")
+        own = [gene.name for gene in (*self.genes, *self.recording_genes)]
+        added = [gene.name for suspect in self.suspects for gene in suspect.genes]
+        for what, names in (
+            ("gene", own + added),
+            ("suspect", [suspect.name for suspect in self.suspects]),
+            ("port", [port.name for port in self.ports]),
+        ):
+            twice = [name for name, times in Counter(names).items() if times > 1]
+            if twice:
+                raise ValueError(f"rig {self.name!r} has {what} {twice[0]!r} twice; give each a name of its own")
+        for port in self.ports:
+            if port.stiffness and port.stiffness not in own:
+                raise ValueError(
+                    f"port {port.name!r}: its stiffness {port.stiffness!r} is no gene of rig {self.name!r}"
+                )

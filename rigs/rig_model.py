@@ -1,0 +1,145 @@
+"""The model of a user's rig: its simulation, with laws at its ports and faults of its channels and inputs added."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from wingfit.records import Gene
+from wingfit.records.array_types import Array, ArrayLike, Float
+from wingfit.records.series import Series, recording_gene
+from wingfit.rigs.faults import Channels, Fault, Scales, channel_faults, input_faults
+from wingfit.rigs.ports import Law, Values, laws
+from wingfit.rigs.rig import Rig
+from wingfit.rigs.run import Run
+from wingfit.rigs.suspect import Suspect
+from wingfit.sim.model import Observation, genome_batch
+
+
+@dataclass(frozen=True, eq=False)
+class RigModel:
+    """The simulation of ``rig`` with ``effects`` (names of suspects) added, for the recordings ``all_recordings``.
+
+    Recordings matter because some genes belong to a single one (:attr:`Rig.recording_genes`), and because the bounds
+    of faults follow from what was recorded.
+    """
+
+    rig: Rig
+    all_recordings: tuple[Series, ...]
+    effects: tuple[str, ...] = ()
+
+    @cached_property
+    def _faults(self) -> dict[str, Fault]:
+        if not self.rig.faults:
+            return {}
+        scales = Scales.of(self.all_recordings, {**self.rig.channels, **self.rig.inputs})
+        return channel_faults(list(self.rig.channels), scales) | input_faults(list(self.rig.inputs), scales)
+
+    @cached_property
+    def _laws(self) -> dict[str, tuple[str, Law]]:
+        return {name: (port.name, law) for port in self.rig.ports for name, law in laws(port).items()}
+
+    @cached_property
+    def suspects(self) -> tuple[Suspect, ...]:
+        """All that may be added: the rig's own suspects, laws at its ports, and faults, without :attr:`effects`."""
+        every = (
+            *self.rig.suspects,
+            *(law.suspect for _, law in self._laws.values()),
+            *(fault.suspect for fault in self._faults.values()),
+        )
+        return tuple(suspect for suspect in every if suspect.name not in self.effects)
+
+    @cached_property
+    def genes(self) -> tuple[Gene, ...]:
+        """Genes of the nominal model, those of each recording, and those of the effects that were added."""
+        known = {suspect.name: suspect for suspect in replace(self, effects=()).suspects}
+        added = (gene for name in self.effects for gene in known[name].genes)
+        return (*self.rig.genes, *(gene for one in self.all_recordings for gene in self.genes_of(one)), *added)
+
+    def genes_of(self, recording: Series) -> tuple[Gene, ...]:
+        """Return the genes that belong to ``recording`` alone, with its estimates as nominal values."""
+        return tuple(
+            replace(
+                gene,
+                name=recording_gene(gene.name, recording.name),
+                nominal=recording.estimates.get(gene.name, gene.nominal),
+            )
+            for gene in self.rig.recording_genes
+        )
+
+    @property
+    def searched(self) -> tuple[str, ...]:
+        """Names of all genes."""
+        return tuple(gene.name for gene in self.genes)
+
+    def with_effects(self, *names: str) -> RigModel:
+        """Return the model with the suspects ``names`` added, all off; ValueError for an unknown one."""
+        known = [suspect.name for suspect in self.suspects]
+        for name in names:
+            if name not in known:
+                raise ValueError(f"unknown suspect {name!r}; rig {self.rig.name!r} has {', '.join(known)}")
+        return replace(self, effects=(*self.effects, *names))
+
+    def observe(self, genomes: ArrayLike, recording: Series) -> Observation:
+        """Simulate ``genomes`` [B, G] for ``recording``: channels [B, T, C] in the units of the recording.
+
+        Individuals that differ only in genes of other recordings are simulated once.
+        """
+        batch = genome_batch(self.genes, genomes)
+        names = [gene.name for gene in self.genes]
+        own = {recording_gene(gene.name, recording.name): gene.name for gene in self.rig.recording_genes}
+        of_others = {gene.name for one in self.all_recordings for gene in self.genes_of(one)} - set(own)
+        columns = [k for k, name in enumerate(names) if name not in of_others]
+        labels = [own.get(names[k], names[k]) for k in columns]
+        done: dict[bytes, tuple[Array, str | None]] = {}
+        for row in batch[:, columns]:
+            if row.tobytes() not in done:
+                done[row.tobytes()] = self._simulated(dict(zip(labels, row.tolist(), strict=True)), recording)
+        results = [done[row.tobytes()] for row in batch[:, columns]]
+        return Observation(np.stack([one for one, _ in results]), tuple(reason for _, reason in results))
+
+    def _simulated(self, values: Values, recording: Series) -> tuple[Float[Array, "T C"], str | None]:
+        """Return the channels [T, C] of one individual, and why it failed, or None; NaN if it did."""
+        failed = np.full(recording.values.shape, np.nan)
+        off = {gene.name: gene.nominal for suspect in self.rig.suspects for gene in suspect.genes}
+        faults = [self._faults[name] for name in self.effects if name in self._faults]
+        run = self._run(values, recording)
+        for fault in faults:
+            run = fault.before(run, values) if fault.before else run
+        try:
+            channels: Channels = {
+                name: np.asarray(one, float) for name, one in self.rig.simulate({**off, **values}, run).items()
+            }
+        except (ValueError, ArithmeticError, np.linalg.LinAlgError) as error:
+            return failed, f"the simulation fails: {error}"
+        problem = _unusable(channels, recording)
+        if problem:
+            return failed, problem
+        for fault in faults:
+            channels = fault.after(channels, run, values) if fault.after else channels
+        return np.stack([channels[name] for name in recording.channels], axis=1), None
+
+    def _run(self, values: Values, recording: Series) -> Run:
+        at_ports: dict[str, list[Law]] = {}
+        for name in self.effects:
+            if name in self._laws:
+                port, law = self._laws[name]
+                at_ports.setdefault(port, []).append(law)
+        times = recording.times
+        return Run(recording.name, times, recording.settings, dict(recording.inputs), times, values, at_ports)
+
+
+def _unusable(channels: Channels, recording: Series) -> str | None:
+    """Return what is wrong with the simulated ``channels``; None if nothing is."""
+    count = len(recording.times)
+    for name in recording.channels:
+        if name not in channels:
+            return f"the simulation returned no channel {name!r}, but {', '.join(channels) or 'nothing'}"
+        if channels[name].shape != (count,):
+            shape = list(channels[name].shape)
+            return f"the simulation returned {name!r} with shape {shape}; it needs one value for each of {count} times"
+        if not np.isfinite(channels[name]).all():
+            return f"the simulated {name} is not finite"
+    return None

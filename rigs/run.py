@@ -1,0 +1,124 @@
+"""What the simulation of a rig is asked to compute: one recording, with the laws that act at its ports."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import scipy
+
+from wingfit.records.array_types import Array, ArrayLike, Float
+from wingfit.rigs.ports import Law, Values
+
+RTOL = 1e-8
+ATOL = 1e-9  # of the largest initial value, at least ATOL_LEAST
+ATOL_LEAST = 1e-12
+SAMPLES_PER_STEP = 10.0  # of an input: longest step of an integration, so that no change of an input is missed
+
+
+class SimulationError(ValueError):
+    """Raised by a simulation that cannot be computed; its message becomes the reason of the individual's failure."""
+
+
+@dataclass(eq=False)
+class Run:
+    """One simulation: the instants, settings and inputs of a recording, and what is added to the model.
+
+    Attributes:
+        recording: name of the recording.
+        times: [T], s, at which channels are wanted, increasing.
+        settings: by name, as the dataset states them.
+        inputs: samples of each input by name, at ``input_times`` [N].
+        input_times: [N], s.
+    """
+
+    recording: str
+    times: Float[Array, " T"]
+    settings: Mapping[str, float]
+    inputs: Mapping[str, Array]
+    input_times: Float[Array, " N"]
+    values: Values = field(default_factory=dict)
+    laws: Mapping[str, Sequence[Law]] = field(default_factory=dict)
+    _memory: list[float] = field(default_factory=list)
+    _slip: list[float] = field(default_factory=list)
+    _integrates: bool = False
+
+    def setting(self, name: str) -> float:
+        """Return the setting called ``name``; SimulationError if the recording does not state it."""
+        if name not in self.settings:
+            have = ", ".join(self.settings) or "none"
+            raise SimulationError(f"recording {self.recording!r} states no setting {name!r}; it has {have}")
+        return self.settings[name]
+
+    def input(self, name: str, times: ArrayLike) -> Array:
+        """Return the input called ``name`` at ``times`` (s, any shape), linear between samples and constant beyond."""
+        if name not in self.inputs:
+            have = ", ".join(self.inputs) or "none"
+            raise SimulationError(f"recording {self.recording!r} has no input {name!r}; it has {have}")
+        return np.asarray(np.interp(np.asarray(times, float), self.input_times, self.inputs[name]))
+
+    def force(self, port: str, coordinate: float, rate: float) -> float:
+        """Return the force of the laws that were added at ``port``, for a ``coordinate`` and its ``rate``.
+
+        It is zero unless a law was added. Add it to the force that accelerates the coordinate.
+        """
+        total = 0.0
+        for law in self.laws.get(port, ()):
+            state = 0.0
+            if law.slip is not None:
+                if not self._integrates:
+                    raise SimulationError(f"{law.suspect.name} has a memory: call force within Run.integrate")
+                place = self._place(law)
+                state = self._memory[place]
+                self._slip[place] = law.slip(self.values, coordinate, rate, state)
+            total += law.force(self.values, coordinate, rate, state)
+        return total
+
+    def integrate(
+        self,
+        rate: Callable[[float, Array], ArrayLike],
+        start: ArrayLike,
+        *,
+        method: str = "LSODA",
+        rtol: float = RTOL,
+        atol: float | None = None,
+    ) -> Float[Array, "N T"]:
+        """Integrate d(state)/dt = ``rate(t, state)`` from ``start`` [N] at the first of ``times``; returns [N, T].
+
+        ``atol``: absolute tolerance; None: ATOL of the largest value in ``start``. SimulationError where it fails.
+        """
+        first = np.atleast_1d(np.asarray(start, float))
+        remembering = [law for own in self.laws.values() for law in own if law.slip is not None]
+        self._memory, self._slip = [0.0] * len(remembering), [0.0] * len(remembering)
+        size, times = len(first), np.asarray(self.times, float)
+
+        def derivative(t: float, state: Array) -> Array:
+            self._memory = state[size:].tolist()
+            return np.concatenate([np.asarray(rate(t, state[:size]), float).ravel(), self._slip])
+
+        whole = np.concatenate([first, np.zeros(len(remembering))])
+        if len(times) < 2:
+            return first[:, None] + np.zeros(len(times))
+        spacing = float(np.median(np.diff(self.input_times))) if self.inputs else np.inf
+        self._integrates = True
+        try:
+            found = scipy.integrate.solve_ivp(
+                derivative,
+                (times[0], times[-1]),
+                whole,
+                method,
+                times,
+                rtol=rtol,
+                atol=max(ATOL * float(np.abs(first).max()), ATOL_LEAST) if atol is None else atol,
+                max_step=SAMPLES_PER_STEP * spacing,
+            )
+        finally:
+            self._integrates = False
+        if not found.success:
+            raise SimulationError(f"the integration fails: {found.message}")
+        return np.asarray(found.y[:size])
+
+    def _place(self, law: Law) -> int:
+        remembering = [one for own in self.laws.values() for one in own if one.slip is not None]
+        return next(k for k, one in enumerate(remembering) if one is law)
