@@ -49,22 +49,13 @@ def test_a_drift_of_tracks_or_forces_is_remarked_with_its_size() -> None:
 
 @pytest.mark.parametrize("seed", range(5))
 def test_a_steady_beat_is_not_remarked(seed: int) -> None:
-    assert (
-        drift_remark([growing_tracks(0.0, seed), growing_tracks(0.0, seed, noise=0.0), growing_forces(0.0, seed)]) == ()
-    )
+    steady = growing_tracks(0.0, seed), growing_tracks(0.0, seed, noise=0.0), growing_forces(0.0, seed)
+    assert drift_remark(steady) == ()
 
 
 def test_a_change_far_below_the_noise_and_short_recordings_are_not_remarked() -> None:
-    assert (
-        drift_remark(
-            [
-                growing_tracks(1e-4),
-                growing_tracks(0.2, beats=1),
-                replace(growing_tracks(0.2), values=np.zeros((248, 6))),
-            ]
-        )
-        == ()
-    )
+    still = replace(growing_tracks(0.2), values=np.zeros((248, 6)))
+    assert drift_remark([growing_tracks(1e-4), growing_tracks(0.2, beats=1), still]) == ()
 
 
 def test_a_run_over_drifting_tracks_mentions_the_drift(small: tuple[Dataset, Genome]) -> None:
