@@ -73,6 +73,7 @@ class Ends:
 
     def fail(self, error: Exception) -> str:
         """End the present start where it is, and return why; one without an iteration leaves no end."""
+        self.present = self.present and self.present | {"converged": False}
         self.close()
         self.failures = [*self.failures, str(error)]
         return f"start {self.tried} of Gauss-Newton failed: {error}"

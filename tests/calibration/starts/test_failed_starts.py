@@ -11,15 +11,16 @@ import pytest
 
 from tests.calibration.starts.conftest import Failing, progress_is_sound, ran, step
 from tests.calibration.test_search import Here
-from wingfit.calibration import search
+from wingfit.calibration import search, summary
 from wingfit.calibration.estimates.likelihood import ITERATIONS, Step
 from wingfit.calibration.preparation import Prepared
 from wingfit.calibration.problem import Problem
+from wingfit.calibration.result import Result
 from wingfit.calibration.search import CalibrationSpec, calibrate
 from wingfit.calibration.starts import AGREE, End, Ends, doubts
 from wingfit.calibration.summary import summarise
 from wingfit.inference.differences import NotSimulatedError
-from wingfit.records import Dataset
+from wingfit.records import Dataset, Genome
 
 
 def test_a_start_that_cannot_be_simulated_is_passed_over(valleys: Prepared, forces: Dataset) -> None:
@@ -140,6 +141,40 @@ def test_an_unconfirmed_minimum_is_remarked_in_the_result(forces: Dataset, monke
     )
     assert doubts({}) == (), "of a checkpoint of an earlier version"
     assert doubts({"doubts": {"joint": "a", "vacuum": "b"}}) == ("stage 'joint': a", "stage 'vacuum': b")
+
+
+def test_remarks_on_the_search_come_before_those_on_tracks(
+    small: tuple[Dataset, Genome], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    judged = Result((), (), 1.0, 1.0, None, None, None, ("another",))
+    monkeypatch.setattr(summary, "found", lambda *_: {"joint": {}})
+    monkeypatch.setattr(summary, "judge", lambda *_: judged)
+    result = summarise(CalibrationSpec(), small[0], Here(), {"doubts": {"joint": "not confirmed"}})
+    assert result.remarks == ("stage 'joint': not confirmed", "another")
+    assert summarise(CalibrationSpec(), small[0], Here(), {}) == judged
+
+
+def test_a_checkpoint_of_an_earlier_version_resumes(valleys: Prepared, forces: Dataset) -> None:
+    whole = ran(valleys, forces, -3.0, 3.0, 4.2, 1.9, evaluator=Failing(4.1, 4.3))
+    for cut, generation in enumerate(whole, 1):
+        old = json.loads(json.dumps(generation.checkpoint))
+        for place in (*old["ends"]["done"], old["ends"]["present"] or {"converged": True}):
+            place.pop("converged")
+        del old["ends"]["failures"], old["doubts"]
+        rest = list(calibrate(valleys.spec, forces, Failing(4.1, 4.3), old))
+        assert [(g.genome, g.progress, g.reasons) for g in rest] == [
+            (g.genome, g.progress, g.reasons) for g in whole[cut:]
+        ]
+
+
+def test_a_start_of_an_earlier_version_that_fails_on_its_way_confirms_none() -> None:
+    made = Ends()
+    made.add(step(5.0), last=True)
+    made.add(step(5.0, converged=False), last=False)
+    assert made.present is not None
+    del made.present["converged"]
+    assert made.fail(ValueError("broken")) == "start 2 of Gauss-Newton failed: broken"
+    assert (made.agreed, made.tried, made.failures, len(made.done)) == (False, 2, ["broken"], 2)
 
 
 def test_ends_of_an_earlier_version_count_as_converged() -> None:

@@ -158,8 +158,8 @@ def test_the_best_that_is_reported_never_rises_in_cost(valleys: Prepared, forces
 
 
 def test_resumed_after_any_iteration_equals_uninterrupted(valleys: Prepared, forces: Dataset) -> None:
-    """Also where a start follows that fails at once: the third, or the first."""
-    for starts in ((-3.0, 3.0, 4.2, 1.9), (4.2, -3.0, 3.0)):
+    """Also where a start follows that fails at once: the third, the first, or the last."""
+    for starts in ((-3.0, 3.0, 4.2, 1.9), (4.2, -3.0, 3.0), (-3.0, 3.0, 4.2)):
         whole = ran(valleys, forces, *starts, evaluator=Failing(4.1, 4.3))
         assert len(whole) > 6
         for cut, generation in enumerate(whole):
