@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from wingfit.calibration.effects import absent
+from wingfit.calibration.estimates.drift_remark import drift_remark
 from wingfit.calibration.estimates.uncertainty import Standing, standing
 from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.preparation import Stage, prepare
@@ -141,13 +142,16 @@ def judge(spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, genome:
         for recording, part in zip(dataset.recordings, both.per_recording, strict=True)
         if part.reasons[1]
     ]
+    drift = drift_remark(dataset.recordings)
     if noise is not None and not adequate:
+        cause = "the beat drifts (see below), the search" if drift else "the search"
         remarks.append(
             f"the residual of the best genome on the fitted recordings is {after * 1e3:.2f} mm, {after / noise:.1f} "
-            f"times the tracking noise: the search was cut short, or the model misses physics: try a finer "
+            f"times the tracking noise: {cause} was cut short, or the model misses physics: try a finer "
             f"discretisation, or effects ('wingfit effects' lists them). Standard errors assume at most "
             f"{ADEQUATE:g} times the noise, so no gene counts as identifiable"
         )
+    remarks += drift
     remarks += absent(best.as_dict(), ready.searched)
     return Result(
         genes=_genes(model, stages, nominal, best, evaluator, adequate),

@@ -14,7 +14,7 @@ from wingfit.calibration.genetic import FAILED
 from wingfit.calibration.preparation import Prepared, prepare
 from wingfit.calibration.problem import Problem, base_genome
 from wingfit.calibration.spec import CalibrationSpec, model_for, resolved
-from wingfit.calibration.starts import SEARCHED, Ends, apart
+from wingfit.calibration.starts import SEARCHED, START_ERRORS, Ends, apart
 from wingfit.records import Dataset, Gene
 from wingfit.records.array_types import Array
 from wingfit.records.blas_threads import one_blas_thread
@@ -41,10 +41,11 @@ class Generation:
 
     ``best`` and ``mean`` are sums of squares, m^2 or N^2; ``distance`` is the best individual's misfit, m or N
     (:class:`wingfit.calibration.problem.Misfit`); ``diversity`` is the standard deviation of the population, genes
-    scaled to 0..1, mean over the free genes (of an iteration: the largest move of a gene); ``evaluations`` counts
-    individuals simulated since the start; ``failed`` counts the generation's failed individuals, with up to ten
-    different ``reasons``; ``genome`` is the best, all genes by name; ``progress`` estimates the finished part of
-    the calibration (never decreases, 1 only at the end). In ``checkpoint``, ``found`` has the best genome by stage.
+    scaled to 0..1, mean over the free genes (of an iteration: the largest move of a gene); ``evaluations`` counts the
+    individuals evaluated since the start (of equal ones each counts, and one is simulated); ``failed`` counts the
+    generation's failed individuals, and starts that failed since the last, with up to ten different ``reasons``;
+    ``genome`` is the best, all genes by name; ``progress`` estimates the finished part of the calibration (never
+    decreases, 1 only at the end). In ``checkpoint``, ``found`` has the best genome by stage.
     """
 
     stage: str
@@ -97,7 +98,7 @@ class _State:
 
     ``base`` is the genome from which the stage starts, ``population`` the state of its search, ``found`` the best
     genome of each stage, ``newton`` the checkpoint of its Gauss-Newton iterations (None before the first), ``ends``
-    those of a method that has several starts.
+    those of a method that has several starts, ``doubts`` why the minimum of a stage is not confirmed, by its name.
     """
 
     stage: int
@@ -108,6 +109,7 @@ class _State:
     found: dict[str, dict[str, float]] = field(default_factory=dict)
     newton: dict[str, Any] | None = None
     ends: Ends = field(default_factory=Ends)
+    doubts: dict[str, str] = field(default_factory=dict)
 
     @classmethod
     def start(cls, spec: CalibrationSpec, model: Model) -> _State:
@@ -124,7 +126,7 @@ class _State:
     def as_json(self) -> dict[str, Any]:
         found = {name: dict(genome) for name, genome in self.found.items()}
         own = {"population": dict(vars(self.population)), "base": dict(self.base), "ends": dict(vars(self.ends))}
-        return vars(self) | own | {"found": found}
+        return vars(self) | own | {"found": found, "doubts": dict(self.doubts)}
 
 
 def _empty(spec: CalibrationSpec) -> Population:
@@ -160,7 +162,7 @@ class _Run:
         try:
             for step in iterate(self.problem, self.evaluator, start, self.state.newton, limit):
                 yield self._iteration(step, step.converged or step.index + 1 >= limit)
-        except ValueError as error:
+        except START_ERRORS as error:
             if self.state.newton is not None or self.spec.search_division is None:
                 raise
             raise ValueError(
@@ -173,28 +175,27 @@ class _Run:
         """Yield Gauss-Newton iterations from the best individuals of the search until two starts end at one cost.
 
         The best genome is that of the least cost so far; the checkpoint of a start's last iteration ends it. A start
-        that fails is passed over, and its individuals are not counted; ValueError if all of them fail.
+        that fails is passed over, and its individuals are not counted; the next generation says why, which is one more
+        if there is no further start. ValueError if all of them fail.
         """
         population, ends = self.state.population, self.state.ends
         if not isinstance(population, genetic.Population):
             raise TypeError("starts are taken from a genetic search")
-        chosen, reasons = apart(population), list[str]()
+        chosen, failures = apart(population), list[str]()  # failures: since the last generation
         while ends.tried < len(chosen) and not ends.agreed:
-            for step in self._steps(_named(self.genes, chosen[ends.tried]), reasons):
-                ends.add(step, step.converged or step.index + 1 >= ITERATIONS)
-                yield self._start(step, len(chosen))
+            try:
+                for step in iterate(self.problem, self.evaluator, _named(self.genes, chosen[ends.tried]), ends.newton):
+                    ends.add(step, step.converged or step.index + 1 >= ITERATIONS)
+                    yield self._start(step, len(chosen), failures)
+                    failures = []
+            except START_ERRORS as error:
+                failures.append(ends.fail(error))
         if not ends.done:
             stage = self.stage.name
-            raise ValueError(f"stage {stage!r}: Gauss-Newton failed from every start, the first: {reasons[0]}")
-
-    def _steps(self, start: dict[str, float], reasons: list[str]) -> Iterator[Step]:
-        """Yield iterations from one of several starts; if one fails, the start ends, and why is put in ``reasons``."""
-        ends = self.state.ends
-        try:
-            yield from iterate(self.problem, self.evaluator, start, ends.newton)
-        except ValueError as error:
-            reasons.append(str(error))
-            ends.close()
+            raise ValueError(f"stage {stage!r}: Gauss-Newton failed from every start, the first: {ends.failures[0]}")
+        if failures:
+            ends.iterations += 1
+            yield self._start(None, len(chosen), failures)
 
     def _generation(self) -> Generation:
         """Compute one generation: draw individuals, simulate them, and update the population."""
@@ -239,14 +240,21 @@ class _Run:
             list(step.reasons),
         )  # fmt: skip
 
-    def _start(self, step: Step, starts: int) -> Generation:
-        """Report an iteration from one of several ``starts``, with the place of the least cost so far."""
-        ends, best = self.state.ends, self.state.ends.best()
-        part = 1.0 if ends.agreed or ends.tried == starts else _share(ends.iterations, 2 * EXPECTED_ITERATIONS)
+    def _start(self, step: Step | None, starts: int, failures: list[str]) -> Generation:
+        """Report an iteration from one of several ``starts``, with the place of the least cost so far.
+
+        ``failures``: why starts failed since the last generation; ``step``: None if no start followed them.
+        """
+        state, ends, stage = self.state, self.state.ends, self.stage.name
+        best, last = ends.best(), ends.agreed or ends.tried == starts
+        part = 1.0 if last else _share(ends.iterations, 2 * EXPECTED_ITERATIONS)
+        if last and ends.doubt:
+            state.doubts = state.doubts | {stage: ends.doubt}
+        evaluated, mean, moved = (step.evaluations, step.fitness, step.step) if step else (0, best.fitness, 0.0)
         return self._seen(
-            self.state.base | best.values, step.evaluations, (self.state.stage + part) / len(self.stages),
-            self.stage.name + NEWTON, ends.iterations - 1, best.fitness, step.fitness, step.step, best.distance,
-            list(step.reasons),
+            state.base | best.values, evaluated, (state.stage + part) / len(self.stages), stage + NEWTON,
+            ends.iterations - 1, best.fitness, mean, moved, best.distance,
+            [*failures, *(step.reasons if step else ())],
         )  # fmt: skip
 
     def _seen(

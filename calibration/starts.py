@@ -13,19 +13,21 @@ import numpy as np
 
 from wingfit.calibration.estimates.likelihood import Step
 from wingfit.calibration.genetic import FAILED, Population
+from wingfit.inference.differences import NotSimulatedError
 
 SEARCHED = 8  # generations of the search before
 MOST = 5  # starts
 APART = 0.1  # largest difference of a gene between two starts, genes scaled to 0..1
 AGREE = 1.0  # difference of two negative log-likelihoods up to which they count as the same
 FLAT = 4.0  # the same, times the decrease at which iterations end
+START_ERRORS = (NotSimulatedError, np.linalg.LinAlgError)  # end one start, not the calibration
 
 
 @dataclass(frozen=True)
 class End:
     """Where Gauss-Newton is from one start: ``cost`` J, sum of squares and misfit (m or N), and values by name.
 
-    ``flat``: decrease of the cost at which iterations end.
+    ``flat``: decrease of the cost at which iterations end; ``converged``: whether they have ended there.
     """
 
     cost: float
@@ -33,20 +35,22 @@ class End:
     distance: float
     values: dict[str, float]
     flat: float = 0.0
+    converged: bool = True  # of earlier versions, which did not store it
 
     @classmethod
     def of(cls, step: Step) -> End:
         """Return where an iteration ended; its cost is that before the iteration, which is the last of a start."""
-        return cls(step.cost, step.fitness, step.distance, step.values, step.flat)
+        return cls(step.cost, step.fitness, step.distance, step.values, step.flat, step.converged)
 
 
 @dataclass
 class Ends:
     """Progress from start to start; plain numbers, stored as part of a checkpoint.
 
-    ``done``: ends of the starts that have converged, or got somewhere before they failed; ``tried``: number of starts
-    that are over, with those that failed at once; ``present``: where the present one is; ``newton``: checkpoint of its
-    iterations; ``iterations``: number of iterations of all starts so far.
+    ``done``: ends of the starts that have converged, reached the limit of iterations, or got somewhere before they
+    failed; ``tried``: number of starts that are over, with those that failed at once; ``present``: where the present
+    one is; ``newton``: checkpoint of its iterations; ``iterations``: number of generations of all starts so far;
+    ``failures``: why starts failed.
     """
 
     done: list[dict[str, Any]] = field(default_factory=list)
@@ -54,6 +58,7 @@ class Ends:
     present: dict[str, Any] | None = None
     newton: dict[str, Any] | None = None
     iterations: int = 0
+    failures: list[str] = field(default_factory=list)
 
     def best(self) -> End:
         """Return the place with the least cost, also of the present start; ValueError before the first iteration."""
@@ -66,16 +71,39 @@ class Ends:
         if last:
             self.close()
 
+    def fail(self, error: Exception) -> str:
+        """End the present start where it is, and return why; one without an iteration leaves no end."""
+        self.present = self.present and self.present | {"converged": False}
+        self.close()
+        self.failures = [*self.failures, str(error)]
+        return f"start {self.tried} of Gauss-Newton failed: {error}"
+
     def close(self) -> None:
-        """End the present start where it is; one that failed before its first iteration leaves no end."""
+        """End the present start where it is."""
         self.done = [*self.done, *([self.present] if self.present else [])]
         self.tried, self.present, self.newton = self.tried + 1, None, None
 
     @property
     def agreed(self) -> bool:
-        """Whether two starts have ended at the least cost."""
-        ends = sorted((End(**one) for one in self.done), key=lambda end: end.cost)[:2]
-        return len(ends) == 2 and bool(ends[1].cost - ends[0].cost <= max(AGREE, FLAT * ends[0].flat))
+        """Whether two starts have converged at the least cost of all."""
+        ends = [End(**one) for one in self.done]
+        if not ends:
+            return False
+        least = min(ends, key=lambda end: end.cost)
+        near = [end for end in ends if end.cost - least.cost <= max(AGREE, FLAT * least.flat)]
+        return sum(end.converged for end in near) >= 2
+
+    @property
+    def doubt(self) -> str | None:
+        """Why the least cost is not confirmed, in words that follow the name of the stage; None if it is."""
+        if self.agreed:
+            return None
+        starts = f"of {self.tried} starts of Gauss-Newton, no two converged at the least cost"
+        failed = f" ({len(self.failures)} failed, the first: {self.failures[0]})" if self.failures else ""
+        return (
+            f"{starts if self.tried > 1 else 'Gauss-Newton had only one start'}{failed}: the minimum is not confirmed; "
+            "use a larger population or another seed"
+        )
 
 
 def apart(population: Population) -> list[list[float]]:
@@ -87,3 +115,11 @@ def apart(population: Population) -> list[list[float]]:
         if len(chosen) == MOST:
             break
     return chosen
+
+
+def doubts(checkpoint: dict[str, Any]) -> tuple[str, ...]:
+    """Return remarks on the stages of a run whose minimum is not confirmed, from its last ``checkpoint``."""
+    stages: dict[str, list[str]] = {}
+    for stage, doubt in checkpoint.get("doubts", {}).items():
+        stages.setdefault(doubt, []).append(repr(stage))
+    return tuple(f"{'stages' if len(of) > 1 else 'stage'} {', '.join(of)}: {doubt}" for doubt, of in stages.items())

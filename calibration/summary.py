@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 from wingfit.calibration.evaluator import Evaluator
@@ -10,6 +11,7 @@ from wingfit.calibration.forces.result import ForceResult
 from wingfit.calibration.result import Result, judge
 from wingfit.calibration.search import found
 from wingfit.calibration.spec import CalibrationSpec
+from wingfit.calibration.starts import doubts
 from wingfit.records import Dataset
 from wingfit.records.blas_threads import one_blas_thread
 
@@ -18,8 +20,13 @@ from wingfit.records.blas_threads import one_blas_thread
 def summarise(
     spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, checkpoint: dict[str, Any]
 ) -> Result | ForceResult:
-    """Compare the result in the last ``checkpoint`` with every recording of ``dataset``, held-out ones included."""
+    """Compare the result in the last ``checkpoint`` with every recording of ``dataset``, held-out ones included.
+
+    Its remarks begin with those on the search.
+    """
     if dataset.kind == "forces":
-        return summarise_forces(spec, dataset, evaluator, checkpoint)
+        forces = summarise_forces(spec, dataset, evaluator, checkpoint)
+        return replace(forces, remarks=(*doubts(checkpoint), *forces.remarks))
     (*_, genome) = found(spec, dataset, checkpoint).values()
-    return judge(spec, dataset, evaluator, genome)
+    tracks = judge(spec, dataset, evaluator, genome)
+    return replace(tracks, remarks=(*doubts(checkpoint), *tracks.remarks))

@@ -35,6 +35,7 @@ DIAGNOSES = JobKind(
     stage_of=_stage,
     exported="csv holds the ranking, netcdf the maps and misfits",
     find=Client.diagnoses,
+    fetch=Client.diagnosis,
     wait=Client.wait_for_diagnosis,
     cancel=Client.cancel_diagnosis,
     delete=Client.delete_diagnosis,

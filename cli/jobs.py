@@ -21,6 +21,7 @@ from wingfit.client.export_answers import Format
 from wingfit.client.transport import ENDINGS
 
 START_SECONDS = 1.0  # between two looks at a server that starts
+ACTIVE = "QUEUED", "RUNNING"  # states of a job that waits for the server's start
 INTERRUPTED = 130  # exit code after Ctrl-C
 STANDARD_OUTPUT = Path("-")
 FormatName = Annotated[
@@ -35,7 +36,7 @@ class JobKind:
 
     ``stage_of`` and ``outcome_of`` return the stage and the outcome of a job as text; ``outcome`` is the heading of the
     column of outcomes, ``work`` the title of the progress bar, ``submit`` an example command, ``exported`` the help on
-    export formats. ``find`` lists the jobs.
+    export formats. ``find`` lists the jobs, ``fetch`` returns one.
     """
 
     name: str
@@ -48,6 +49,7 @@ class JobKind:
     stage_of: Callable[[Any], str]
     exported: str
     find: Callable[..., list[Any]]
+    fetch: Callable[[Client, str], Any]
     wait: Callable[[Client, str, Callable[[Any], None]], Any]
     cancel: Callable[[Client, str], Any]
     delete: Callable[[Client, str], None]
@@ -109,7 +111,10 @@ def follow(client: Client, kind: JobKind, job_id: str) -> Any:
     """Show the progress of a job until it ends, and return the job; Ctrl-C ends the command, and the job continues."""
     try:
         with progress(kind.work) as report:
-            while (health := client.health())["status"] == "starting" and health["detail"]:
+            while kind.fetch(client, job_id)["state"] in ACTIVE:
+                health = client.health()
+                if health["status"] != "starting" or not health["detail"]:
+                    break
                 report(None, note=health["detail"])
                 time.sleep(START_SECONDS)
             return kind.wait(

@@ -45,6 +45,7 @@ RUNS = JobKind(
     stage_of=_stage,
     exported="csv holds the history, netcdf also every recording as simulated with the best genome",
     find=Client.runs,
+    fetch=Client.run,
     wait=Client.wait,
     cancel=Client.cancel,
     delete=Client.delete_run,

@@ -157,7 +157,8 @@ class Job(TypedDict):
     """The fields that runs and diagnoses (jobs) have in common.
 
     ``stage`` names the present step, null before the first; ``progress`` lies in [0, 1]; ``eta_seconds`` estimates the
-    remaining time; ``evaluations`` counts simulated individuals; ``error`` says why the job failed, else null.
+    remaining time; ``evaluations`` counts evaluated individuals (of equal ones each counts, and one is simulated);
+    ``error`` says why the job failed, else null.
     """
 
     id: str
@@ -196,9 +197,10 @@ class HistoryItem(TypedDict):
     individuals that did not fail) are sums of squared differences to the recordings: m^2 (tracks) or N^2 (forces).
     ``diversity`` is the mean over genes of the population's standard deviation, with bounds scaled to [0, 1]; of a
     Gauss-Newton iteration, the largest change of a gene on that scale.
-    ``evaluations`` counts simulated individuals since the start of the run, ``failed`` the individuals of this
-    generation that could not be simulated; ``reasons`` lists up to ten different causes. ``elapsed_seconds`` is the
-    computing time since the start of the run, without pauses.
+    ``evaluations`` counts the individuals evaluated since the start of the run (of equal ones each counts, and one is
+    simulated), ``failed`` those of this generation that could not be simulated and, with the method auto, starts that
+    failed since the last generation; ``reasons`` lists up to ten different causes. ``elapsed_seconds`` is the computing
+    time since the start of the run, without pauses.
     """
 
     sequence: int

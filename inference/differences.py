@@ -25,6 +25,10 @@ STEP = 0.003
 TANGENT_STEP = 1e-6
 
 
+class NotSimulatedError(ValueError):
+    """Raised where the point to be differentiated cannot be simulated."""
+
+
 @dataclass(frozen=True)
 class Differences:
     """Simulated outputs at a point, and their derivatives with respect to K scaled genes.
@@ -60,8 +64,8 @@ def differences(
     ``columns`` are indices into ``unit``. With ``sides`` = 2, each gene is changed by ``step`` up and down (central
     differences); with 1, only up, or down where the upper bound is closer than ``step``. A changed gene is clipped to
     its bounds. Where one of the two simulations of a gene fails, the point itself takes its place, so that the
-    difference is one-sided. ``at``: outputs at the point if they are known already. ValueError if the point cannot be
-    simulated.
+    difference is one-sided. ``at``: outputs at the point if they are known already. NotSimulatedError if the point
+    cannot be simulated.
     """
     moves = step * np.eye(len(unit))[columns]
     moves[unit[columns] > 1.0 - step] *= -1.0
@@ -70,7 +74,7 @@ def differences(
     found, reasons = simulate(batch)
     if at is None:
         if reasons[0] is not None:
-            raise ValueError(f"the genome to be differentiated cannot be simulated: {reasons[0]}")
+            raise NotSimulatedError(f"the genome to be differentiated cannot be simulated: {reasons[0]}")
         at, found, reasons = [part[0] for part in found], [part[1:] for part in found], reasons[1:]
     failed = np.array([reason is not None for reason in reasons], bool)
     neighbours[failed] = unit

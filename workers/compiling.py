@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from contextlib import suppress
 
 from wingfit.workers.share import child_environment
 
@@ -19,7 +20,8 @@ COMMAND = "from wingfit.sim.warm import compile_kernels; compile_kernels(lambda 
 def compile_simulator(say: Callable[[str], None], stopped: Callable[[], bool]) -> None:
     """Compile what is not compiled yet, in a process of its own, and ``say`` how far it is.
 
-    Ends soon after ``stopped()`` returns True. A failure is only logged: the workers then compile for themselves.
+    Ends soon after ``stopped()`` returns True. A failure of the process is only logged: the workers then compile for
+    themselves. OSError if the process cannot be started.
     """
     from wingfit.sim.warm import compiled
 
@@ -36,10 +38,18 @@ def compile_simulator(say: Callable[[str], None], stopped: Callable[[], bool]) -
         while process.poll() is None:
             if stopped():
                 process.kill()
-            elif lines := process.stdout.read():
-                part = float(lines.split()[-1])
+            elif part := _last_part(process.stdout.read() or b""):
                 left = (time.monotonic() - began) * (1.0 - part) / part
                 say(f"compiling the simulator, once: {part:.0%}, about {left:.0f} s left")
             time.sleep(LOOK_SECONDS)
     if process.returncode and not stopped():
         LOG.warning("compiling the simulator ended with %d; the workers compile for themselves", process.returncode)
+
+
+def _last_part(output: bytes) -> float | None:
+    """Return the last line of ``output`` that is a number in (0, 1]; None without one. Other lines are warnings."""
+    part = None
+    for line in output.splitlines():
+        with suppress(ValueError):
+            part = found if 0.0 < (found := float(line)) <= 1.0 else part
+    return part

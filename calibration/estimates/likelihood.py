@@ -154,8 +154,8 @@ def iterate(
 
     Ends when no step lowers the cost, when a step is smaller than STEP and lowers the cost by less than the fraction
     COST, when two steps in succession lower it by less (genes that still move are then not identifiable), or after
-    ``iterations``. A resumed estimation gives the same bits as an uninterrupted one. ValueError if the start cannot be
-    simulated. An effect of size zero starts with this size; its other genes start with the values that
+    ``iterations``. A resumed estimation gives the same bits as an uninterrupted one. NotSimulatedError if the start
+    cannot be simulated. An effect of size zero starts with this size; its other genes start with the values that
     :mod:`wingfit.calibration.initial_effect_position` chooses.
     """
     genes, before = free_genes(problem), 0

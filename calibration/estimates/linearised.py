@@ -105,11 +105,11 @@ def tangent_problem(problem: Problem, values: Array) -> Problem | None:
 def linearise(problem: Problem, evaluator: Evaluator, unit: Array, motion: Array | None = None) -> Linearised:
     """Linearise about ``unit`` [F], genes scaled to 0..1.
 
-    ``motion`` [F]: genes from whose motion derivatives start (:func:`initial_motion`); None: ``unit``. ValueError if
-    the genome at ``unit`` cannot be simulated. A model that is differentiable is differentiated in steps of
-    TANGENT_STEP; for the genes that have no derivative, and for other models, central differences are taken. Their
-    steps end at the bounds, and a displaced genome that fails is replaced by the one at ``unit``, so that differences
-    may become one-sided. For genes with a failure on both sides, shorter steps are tried once.
+    ``motion`` [F]: genes from whose motion derivatives start (:func:`initial_motion`); None: ``unit``.
+    NotSimulatedError if the genome at ``unit`` cannot be simulated. A model that is differentiable is differentiated in
+    steps of TANGENT_STEP; for the genes that have no derivative, and for other models, central differences are taken.
+    Their steps end at the bounds, and a displaced genome that fails is replaced by the one at ``unit``, so that
+    differences may become one-sided. For genes with a failure on both sides, shorter steps are tried once.
     """
     genes, evaluations, every = free_genes(problem), list[Evaluation](), np.arange(len(unit))
 

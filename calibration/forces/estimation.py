@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from wingfit.calibration.effects import absent, is_measured
+from wingfit.calibration.estimates.drift_remark import drift_remark
 from wingfit.calibration.estimates.likelihood import STEP, at_bounds, iterate
 from wingfit.calibration.estimates.linearised import free_genes
 from wingfit.calibration.estimates.uncertainty import Standing, Uncertainty, uncertainty
@@ -101,7 +102,8 @@ def summarise_forces(
         everywhere.append(_compare(model, as_fitted(spec, recording), genomes, spec.axes))
         remarks = (*remarks, *warnings)
     misfits = [_misfit_remark(one, everywhere) for one in judged]
-    remarks = (*remarks, *(remark for remark in misfits if remark), *_filtered_before(spec, dataset))
+    drift = drift_remark((as_fitted(spec, recording) for recording in dataset.recordings), spec.axes)
+    remarks = (*remarks, *(remark for remark in misfits if remark), *drift, *_filtered_before(spec, dataset))
     names = {name for one in judged for name in one.estimate.recordings}
     left_out, warnings = _left_out(model, spec, dataset, nominal, [one.estimate for one in judged]) if law else ((), ())
     fitted = [one for one in everywhere if one.recording.name in names]

@@ -27,7 +27,7 @@ class Pool:
     """Starts and holds the evaluator (worker processes that simulate), which all jobs share.
 
     ``prepare``, if given, runs before the first attempt, with a function to say what it does, and another that returns
-    whether to stop.
+    whether to stop. If it fails, the evaluator is started all the same.
 
     Attributes:
         error: why the last attempt to start the evaluator failed; None before the first failure and once it runs.
@@ -91,8 +91,7 @@ class Pool:
         # Worker processes inherit the priority of the thread that starts them.
         lower_priority()
         attempt = 0
-        if self._prepare:
-            self._prepare(self._say, self._stop.is_set)
+        self._prepare_start()
         while not self._stop.is_set():
             try:
                 self._adopt(self._make())
@@ -102,6 +101,15 @@ class Pool:
                 LOG.exception("cannot start the evaluator")
             self._stop.wait(RETRY_SECONDS[min(attempt, len(RETRY_SECONDS) - 1)])
             attempt += 1
+
+    def _prepare_start(self) -> None:
+        try:
+            if self._prepare:
+                self._prepare(self._say, self._stop.is_set)
+        except Exception:
+            LOG.exception("cannot prepare the start of the evaluator; it starts without")
+        finally:
+            self.doing = None
 
     def _say(self, doing: str) -> None:
         self.doing = doing

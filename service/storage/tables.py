@@ -117,7 +117,7 @@ class JobRow(OwnedRow):
         state, wish, generations, progress, error, starts: those of `workers.jobs.Job`.
         stage: name of the present stage of the search.
         eta_seconds: estimated remaining time (s), None if unknown.
-        evaluations: number of simulated individuals so far.
+        evaluations: number of evaluated individuals so far.
         elapsed_seconds: computing time up to the last stored step (s).
         ended_at_service_seconds: reading of the service clock (s) when the end of the job was first noticed.
     """

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import os
 
-import llvmlite.binding as llvm
 import numba
+from numba.core.codegen import get_host_cpu_features
 
 VARIABLE = "WINGFIT_LANES"  # sets the number, for tests: results do not depend on it
 POSSIBLE = (2, 4, 8)
@@ -23,5 +23,6 @@ def lanes() -> int:
             raise ValueError(f"{VARIABLE} is {asked!r}; it must be one of {', '.join(map(str, POSSIBLE))}, or unset")
         return int(asked)
     given = numba.config.CPU_FEATURES  # for which numba compiles; None: for this processor
-    wide = llvm.get_host_cpu_features().get("avx512f", False) if given is None else "+avx512f" in given.split(",")
-    return 8 if wide else 4
+    # numba's function leaves AVX out if NUMBA_ENABLE_AVX is 0, and returns "" where LLVM does not know the processor.
+    features = get_host_cpu_features() if given is None else given
+    return 8 if "+avx512f" in features.split(",") else 4

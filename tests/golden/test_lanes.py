@@ -5,6 +5,7 @@ from __future__ import annotations
 import llvmlite.binding as llvm
 import numba
 import pytest
+from llvmlite.binding import FeatureMap
 
 from tests.golden.numbers import CASES, entry
 from wingfit.sim.kernels import processor
@@ -29,9 +30,25 @@ def test_as_many_as_fit_the_registers_for_which_numba_compiles(
     monkeypatch: pytest.MonkeyPatch, host: dict[str, bool], asked: str | None, lanes: int
 ) -> None:
     monkeypatch.delenv(processor.VARIABLE, raising=False)
-    monkeypatch.setattr(llvm, "get_host_cpu_features", lambda: host)
+    monkeypatch.setattr(llvm, "get_host_cpu_features", lambda: FeatureMap(host))
+    monkeypatch.setattr(numba.config, "ENABLE_AVX", True)
     monkeypatch.setattr(numba.config, "CPU_FEATURES", asked)
     assert processor.lanes() == lanes
+
+
+def test_without_avx_in_numba_or_a_known_processor_there_are_four(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv(processor.VARIABLE, raising=False)
+    monkeypatch.setattr(numba.config, "CPU_FEATURES", None)
+    monkeypatch.setattr(llvm, "get_host_cpu_features", lambda: FeatureMap(avx2=True, avx512f=True))
+    monkeypatch.setattr(numba.config, "ENABLE_AVX", False)
+    assert processor.lanes() == 4
+
+    def unknown() -> FeatureMap:
+        raise RuntimeError("failed to get host cpu features")
+
+    monkeypatch.setattr(llvm, "get_host_cpu_features", unknown)
+    monkeypatch.setattr(numba.config, "ENABLE_AVX", True)
+    assert processor.lanes() == 4
 
 
 @pytest.mark.parametrize("value", ["0", "3", "16", "eight", "-4", "4.0"])

@@ -39,6 +39,17 @@ def test_progress_is_said_with_the_time_that_is_left(monkeypatch: pytest.MonkeyP
     assert all(one.startswith("compiling the simulator, once: ") and one.endswith(" s left") for one in said)
 
 
+def test_lines_that_are_no_progress_are_ignored(monkeypatch: pytest.MonkeyPatch) -> None:
+    lines = "Warning: something", "3 warnings", "0.5", "0.0", "7", "nan", "", "Warning: more"
+    printed = f"import time; print({chr(10).join(lines)!r}, flush=True); time.sleep(1)"
+    monkeypatch.setattr(warm, "compiled", lambda: False)
+    monkeypatch.setattr(compiling, "COMMAND", printed)
+    said: list[str] = []
+    compiling.compile_simulator(said.append, lambda: False)
+    assert len(said) == 1
+    assert said[0].startswith("compiling the simulator, once: 50%, about ")
+
+
 def test_it_ends_when_the_service_stops(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(warm, "compiled", lambda: False)
     monkeypatch.setattr(compiling, "COMMAND", "import time; time.sleep(60)")
