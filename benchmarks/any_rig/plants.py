@@ -69,22 +69,23 @@ def _motor(
     p: Mapping[str, float], hidden: Mapping[str, float], push: Callable[[float], float], start: Array, times: Array
 ) -> Array:
     h = {name: hidden.get(name, 0.0) for name in (*MOTOR.listed, *MOTOR.unlisted)}
-    gain = 1.0 + h["gain.voltage"]
+    lag = h["low_pass.speed"] or 1.0
 
     def current(t: float, w: float, heat: float) -> float:
-        return (gain * push(t) - p["torque_constant"] * w) / (p["resistance"] * (1.0 + h["warm winding"] * heat))
+        return (push(t) - p["torque_constant"] * w) / (p["resistance"] * (1.0 + h["warm winding"] * heat))
 
     def rate(t: float, state: Array) -> Array:
-        angle, w, heat = state
+        angle, w, heat, shown = state
         i = current(t, w, heat)
         torque = p["torque_constant"] * i - p["damping"] * w
         torque -= h["dry_friction.shaft"] * _sign(w, 0.8) + h["square_drag.shaft"] * abs(w) * w
         torque -= h["cogging"] * np.sin(3.0 * angle) + h["sticking"] * _sign(w, 0.8) * np.exp(-((w / 15.0) ** 2))
-        return np.array([w, torque / p["inertia"], i * i])
+        return np.array([w, torque / p["inertia"], i * i, (w - shown) / lag])
 
-    states = integrated(rate, np.array([0.0, start[0], 0.0]), times)
-    amperes = np.array([current(t, w, heat) for t, (_, w, heat) in zip(times, states, strict=True)])
-    return np.stack([states[:, 1], amperes * (1.0 + h["gain.current"])], axis=1)
+    states = integrated(rate, np.array([0.0, start[0], 0.0, start[0]]), times)
+    amperes = np.array([current(t, w, heat) for t, (_, w, heat, _) in zip(times, states, strict=True)])
+    speed = states[:, 3] if h["low_pass.speed"] else states[:, 1]
+    return np.stack([speed, amperes + h["offset.current"]], axis=1)
 
 
 def _circuit(
@@ -148,7 +149,7 @@ def _two_masses(
 
 
 MOTOR = Plant(
-    {"dry_friction.shaft": 0.012, "square_drag.shaft": 1.2e-6, "gain.current": 0.15, "gain.voltage": 0.15},
+    {"dry_friction.shaft": 0.012, "square_drag.shaft": 1.2e-6, "low_pass.speed": 0.03, "offset.current": 0.3},
     {"cogging": 0.02, "warm winding": 0.08, "sticking": 0.03},
     {"torque_constant": 0.05, "resistance": 2.0, "inertia": 1e-4, "damping": 1e-4},
     0.01, 250, 6.0, 0.35, (5.0,), _motor,

@@ -90,7 +90,7 @@ def recorded(trial: Trial) -> tuple[SeriesDataset, Answer]:
 def _clean(plant: Plant, k: int, parameters: dict[str, float], hidden: dict[str, float], rng: Any) -> Series:
     """Record experiment number ``k`` without noise."""
     rig = next(RIGS[name] for name, one in PLANTS.items() if one is plant)
-    times = np.arange(plant.samples) * plant.interval
+    times = np.arange(plant.samples, dtype=np.float64) * plant.interval
     push = plant.push * _input(times, plant.corner, rng)
     start = rng.normal(0.0, plant.start)
     values = plant.run(parameters, hidden, lambda t: float(np.interp(t, times, push)), start, times)

@@ -4,7 +4,7 @@ The noise of a channel is described by its standard deviation and by its spectra
 discrete cosine transform of its samples (orthonormal, type II). White noise of variance s has density s at all of them.
 
 - **Repeats**: recordings of one experiment differ by noise alone. The density is that of their differences.
-- **Period**: what is left of a periodic recording after its harmonics is noise (at least three periods).
+- **Period**: the residual of the harmonics of a periodic recording is noise (at least three periods).
 - **Stated**: noise of the stated standard deviation, of the colour that its visible part has.
 - **Highest frequencies**: sampled fast enough, a motion has no power at the highest frequencies, and noise has
   (:mod:`wingfit.inference.noise.visible_noise`). Refused where the power there is not that of noise.

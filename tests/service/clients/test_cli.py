@@ -96,7 +96,7 @@ def test_the_commands_are_those_promised() -> None:
         | {f"diagnoses {c}" for c in ("list", "watch", "cancel", "delete", "export")}
         | {f"runs {c}" for c in steer}
         | {f"datasets {c}" for c in data}
-        | {"backup", "restore"}
+        | {"backup", "restore", "rig check", "rig list"}
         | {f"keys {c}" for c in ("create", "list", "revoke")}
     )
     assert set(COMMANDS) == expected
