@@ -2,9 +2,10 @@
 
 Stiffness, damping or a motor that drift change size and phase of the harmonics slowly. The power of such a change lies
 next to the harmonics, so close that it looks like noise of long memory. But noise, whatever its colour, has about the
-same density at all frequencies near a harmonic. So the power of the linear change of a harmonic is compared with the
-power of the spectral lines around it: their ratio, pooled over harmonics and channels, follows an F distribution for
-noise alone.
+same density at all frequencies near a harmonic, unless a resonance is narrower than the distance of a few spectral
+lines. So the power of the slow change of a harmonic is compared with the power of the nearest spectral lines: their
+ratio, pooled over harmonics and channels, follows an F distribution for noise alone. Its degrees of freedom count
+harmonics and channels only as far as their noise near the harmonics is independent and of similar size.
 """
 
 from __future__ import annotations
@@ -19,7 +20,8 @@ from wingfit.records.array_types import Array, Bool, Float, Index, Int, Mask
 
 HARMONICS = 3  # compared: those in which a wing moves most
 FEWEST_BEATS = 3  # with which lines remain that the change does not use up
-LONG = 6  # beats from which a curved change is removed, too
+LONG = 6  # beats from which a curved change is found and removed, too
+NEAREST = 3  # spectral lines on either side of a harmonic: farther ones say less about noise at the harmonic
 CERTAIN = 1e-5  # probability of noise alone below which a change counts as found
 LEAST_RATIO = 1.5  # of its power to that of noise: less may come from noise whose density rises towards a harmonic
 _RANK = 1e-6
@@ -50,62 +52,126 @@ def drift_of(
     harmonics: int,
     beats: int,
 ) -> Drift | None:
-    """Compare the linear change of the first harmonics with the noise around them; None with too few beats.
+    """Compare the slow change of the first harmonics with the noise around them.
 
     ``scatter`` [T, C]: recorded values minus mean beat, zero where not ``valid``; ``psi`` [T]: phase (rad) of the beat,
-    ``apparent`` [T]: time in apparent beats; ``harmonics``: of the mean beat; ``beats``: whole apparent beats.
+    ``apparent`` [T]: time in apparent beats; ``harmonics``: of the mean beat; ``beats``: whole apparent beats. The
+    change is linear and, from LONG beats on, curved. None with too few beats, or too few samples between gaps.
     """
     if beats < FEWEST_BEATS:
         return None
-    values = scatter[:, valid.any(axis=0)]
-    periodic, lines = _orthonormal(fourier_basis(psi, harmonics)), np.arange(1, beats // 2 + 1) / beats
-    count = min(HARMONICS, harmonics)
-    changes = [_orthonormal(_slow(psi, k, curved=False), periodic) for k in range(1, count + 1)]
-    all_changes = _orthonormal(np.hstack(changes))
-    slow, noise, freedom = [], [], 0
-    for k, change in enumerate(changes, 1):
-        angles = 2 * np.pi * apparent[:, None] * np.concatenate([k - lines, k + lines])
-        around = _orthonormal(np.hstack([np.cos(angles), np.sin(angles)]), periodic, all_changes)
-        slow.append(((change.T @ values) ** 2).mean(axis=0))
-        noise.append(((around.T @ values) ** 2).mean(axis=0))
-        freedom += around.shape[1]
-    # Size of each channel, so that a loud one does not decide alone; from all samples, to hardly depend on ``noise``.
-    scale = np.maximum((values**2).sum(axis=0) - ((all_changes.T @ values) ** 2).sum(axis=0), 1e-300)
-    ratio = float((np.array(slow) / scale).mean() / max(float((np.array(noise) / scale).mean()), 1e-300))
-    independent = _independent(values)
-    probability = float(stats.f.sf(ratio, 2 * count * independent, freedom * independent))
-    power = 2.0 * float(np.sum(slow)) * max(0.0, 1.0 - 1.0 / max(ratio, 1.0))
-    return Drift(ratio, probability, float(np.sqrt(power / valid.sum())))
+    orders = range(1, min(HARMONICS, harmonics) + 1)
+    time, curved = _time(apparent), beats >= LONG
+    distances = np.arange(1, min(beats // 2, NEAREST) + 1) / beats
+    parts = []
+    masks, group = np.unique(valid, axis=1, return_inverse=True)
+    for g, mask in enumerate(masks.T):
+        if not mask.any():
+            continue
+        periodic = _orthonormal(fourier_basis(psi[mask], harmonics))
+        changes = [_orthonormal(_slow(psi[mask], time[mask], k, curved=curved), periodic) for k in orders]
+        removed = (periodic, _orthonormal(np.hstack(changes)))
+        lines = [_orthonormal(_waves(apparent[mask], k, distances), *removed) for k in orders]
+        if min(_rank(one) for one in (*changes, *lines)) < 1.0:
+            return None
+        parts.append(_Powers.of(scatter[np.ix_(mask, group.ravel() == g)], changes, lines))
+    return _compared(parts, int(valid.sum())) if parts else None
 
 
-def slow_basis(psi: Float[Array, " T"], beats: int, harmonics: int) -> tuple[Float[Array, "T P"], Int[Index, " P"]]:
+@dataclass(frozen=True)
+class _Powers:
+    """Slow changes and noise near K harmonics, in C channels that have the same gaps.
+
+    ``slow`` [K, C]: mean square of the coefficients of slow changes; ``near`` [K, L, C]: coefficients at L nearby lines;
+    ``freedom`` [2, K]: number of independent coefficients of both; ``level`` [C]: mean square of all samples.
+    """
+
+    slow: Array
+    near: Array
+    freedom: Array
+    level: Array
+
+    @classmethod
+    def of(cls, values: Array, changes: list[Array], lines: list[Array]) -> _Powers:
+        freedom = np.array([[_rank(one) for one in bases] for bases in (changes, lines)])
+        slow = np.array([((one.T @ values) ** 2).sum(axis=0) for one in changes])
+        level = np.maximum((values**2).sum(axis=0) - slow.sum(axis=0), 1e-300) / len(values)
+        return cls(slow / freedom[0][:, None], np.array([one.T @ values for one in lines]), freedom, level)
+
+
+def _compared(parts: list[_Powers], samples: int) -> Drift:
+    """Pool the channels of all ``parts``; ``samples``: number of values of all channels."""
+    slow, near, level = (
+        np.concatenate(found, axis=-1) for found in zip(*((one.slow, one.near, one.level) for one in parts), strict=True)
+    )
+    freedom = np.concatenate([np.repeat(one.freedom[..., None], len(one.level), axis=-1) for one in parts], axis=-1)
+    noise = (near**2).sum(axis=1) / freedom[1]
+    # Each channel is divided by its size, so that a loud one does not decide alone.
+    by_harmonic = (noise / level).mean(axis=1)
+    ratio = float((slow / level).mean() / max(float(by_harmonic.mean()), 1e-300))
+    alike = float(by_harmonic.sum() ** 2 / max(len(by_harmonic) * (by_harmonic**2).sum(), 1e-300))
+    of_slow, of_noise = alike * freedom.sum(axis=1).mean(axis=-1)
+    independent = _independent(near.reshape(-1, len(level)) / np.sqrt(level), of_noise)
+    probability = float(stats.f.sf(ratio, of_slow * independent, of_noise * independent))
+    power = float((freedom[0] * (slow - noise)).sum())
+    return Drift(ratio, probability, float(np.sqrt(max(power, 0.0) / samples)))
+
+
+def slow_basis(
+    psi: Float[Array, " T"], apparent: Float[Array, " T"], beats: int, harmonics: int
+) -> tuple[Float[Array, "T P"], Int[Index, " P"]]:
     """Slow changes of mean and first harmonics, as columns [T, P], and the harmonic [P] of each.
 
-    Linear changes and, in long recordings, curved ones.
+    Linear changes and, in long recordings, curved ones. ``psi`` [T]: phase (rad) of the beat; ``apparent`` [T]: time in
+    apparent beats; ``beats``: whole ones; ``harmonics``: of the mean beat.
     """
-    curved = beats >= LONG
-    count = min(HARMONICS, harmonics)
-    columns = [_slow(psi, k, curved=curved) for k in range(count + 1)]
+    count, time = min(HARMONICS, harmonics), _time(apparent)
+    columns = [_slow(psi, time, k, curved=beats >= LONG) for k in range(count + 1)]
     return np.hstack(columns), np.repeat(np.arange(count + 1), [part.shape[1] for part in columns])
 
 
-def _slow(psi: Array, k: int, *, curved: bool) -> Array:
-    """Slow changes [T, .] of harmonic ``k`` (0: of the mean): Legendre polynomials of the time."""
-    time = np.linspace(-1.0, 1.0, len(psi))[:, None]
-    slow = np.hstack([time, 1.5 * time**2 - 0.5]) if curved else time
+def _time(apparent: Array) -> Array:
+    """Time [T] from -1 at the first sample to 1 at the last."""
+    return np.asarray(2.0 * (apparent - apparent[0]) / (apparent[-1] - apparent[0]) - 1.0)
+
+
+def _slow(psi: Array, time: Array, k: int, *, curved: bool) -> Array:
+    """Slow changes [T, .] of harmonic ``k`` (0: of the mean): Legendre polynomials of the ``time`` [T], -1 to 1."""
+    slow = np.stack([time, 1.5 * time**2 - 0.5] if curved else [time], axis=1)
     return np.hstack([slow * np.cos(k * psi)[:, None], slow * np.sin(k * psi)[:, None]]) if k else slow
 
 
+def _waves(apparent: Array, k: int, distances: Array) -> Array:
+    """Cosines and sines [T, .] at ``distances`` (in flap frequencies) on either side of harmonic ``k``."""
+    angles = 2 * np.pi * apparent[:, None] * np.concatenate([k - distances, k + distances])
+    return np.hstack([np.cos(angles), np.sin(angles)])
+
+
 def _orthonormal(columns: Array, *others: Array) -> Array:
-    """Return an orthonormal basis of the part of ``columns`` [T, .] that is orthogonal to the ``others``."""
+    """Return the nearest orthonormal columns to the part of ``columns`` [T, .] that is orthogonal to the ``others``.
+
+    Where the columns depend on each other, so do those returned; :func:`_rank` is the number of independent ones.
+    """
     for other in others:
         columns = columns - other @ (other.T @ columns)
-    basis, sizes, _ = np.linalg.svd(columns, full_matrices=False)
-    return np.asarray(basis[:, sizes > _RANK * sizes.max(initial=0.0)])
+    basis, sizes, turned = np.linalg.svd(columns, full_matrices=False)
+    kept = sizes > _RANK * sizes.max(initial=0.0)
+    return np.asarray(basis[:, kept] @ turned[kept])
 
 
-def _independent(values: Array) -> float:
-    """Number of independent channels that scatter like ``values`` [T, C]: fewer than C where they scatter together."""
-    covariance = values.T @ values
-    size = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
-    return float(len(size) ** 2 / max(float(((covariance / size / size[:, None]) ** 2).sum()), 1.0))
+def _rank(basis: Array) -> float:
+    """Return the number of independent columns of an :func:`_orthonormal` basis."""
+    return float(np.round((basis**2).sum()))
+
+
+def _independent(near: Array, freedom: float) -> float:
+    """Number of independent channels of noise: fewer than C where channels scatter together or some are louder.
+
+    ``near`` [L, C]: coefficients of the noise; ``freedom``: how many of the L are independent. Channels that are
+    independent correlate by chance; the mean of that is subtracted.
+    """
+    square = (near.T @ near) ** 2
+    own = float(np.trace(square))
+    total = float((near**2).sum()) ** 2
+    together = max(0.0, float(square.sum()) - own - (total - own) / max(freedom, 1.0))
+    return total / max(own + together, 1e-300) if total > 0.0 else 1.0
