@@ -20,10 +20,10 @@ from wingfit.records.array_types import Array, Bool, Float, Index, Int, Mask
 
 HARMONICS = 3  # compared: those in which a wing moves most
 FEWEST_BEATS = 3  # with which lines remain that the change does not use up
-LONG = 6  # beats from which a curved change is found and removed, too
-NEAREST = 3  # spectral lines on either side of a harmonic: farther ones say less about noise at the harmonic
+CURVED = 4  # beats from which a curved change is found and removed, too
+NEAREST = 3  # spectral lines on either side of a harmonic: farther ones say less about the noise at the harmonic
 CERTAIN = 1e-5  # probability of noise alone below which a change counts as found
-LEAST_RATIO = 1.5  # of its power to that of noise: less may come from noise whose density rises towards a harmonic
+RISE = 1.5  # largest ratio of the density of noise at a harmonic to that around it that counts as usual
 _RANK = 1e-6
 
 
@@ -41,7 +41,7 @@ class Drift:
     @property
     def found(self) -> bool:
         """Whether noise alone does not explain the change."""
-        return self.probability < CERTAIN and self.ratio > LEAST_RATIO
+        return self.probability < CERTAIN
 
 
 def drift_of(
@@ -56,12 +56,11 @@ def drift_of(
 
     ``scatter`` [T, C]: recorded values minus mean beat, zero where not ``valid``; ``psi`` [T]: phase (rad) of the beat,
     ``apparent`` [T]: time in apparent beats; ``harmonics``: of the mean beat; ``beats``: whole apparent beats. The
-    change is linear and, from LONG beats on, curved. None with too few beats, or too few samples between gaps.
+    change is linear or, from CURVED beats on, curved. None with too few beats, or too few samples between gaps.
     """
     if beats < FEWEST_BEATS:
         return None
-    orders = range(1, min(HARMONICS, harmonics) + 1)
-    time, curved = _time(apparent), beats >= LONG
+    orders, time = range(1, min(HARMONICS, harmonics) + 1), _time(apparent)
     distances = np.arange(1, min(beats // 2, NEAREST) + 1) / beats
     parts = []
     masks, group = np.unique(valid, axis=1, return_inverse=True)
@@ -69,21 +68,26 @@ def drift_of(
         if not mask.any():
             continue
         periodic = _orthonormal(fourier_basis(psi[mask], harmonics))
-        changes = [_orthonormal(_slow(psi[mask], time[mask], k, curved=curved), periodic) for k in orders]
-        removed = (periodic, _orthonormal(np.hstack(changes)))
-        lines = [_orthonormal(_waves(apparent[mask], k, distances), *removed) for k in orders]
-        if min(_rank(one) for one in (*changes, *lines)) < 1.0:
-            return None
-        parts.append(_Powers.of(scatter[np.ix_(mask, group.ravel() == g)], changes, lines))
-    return _compared(parts, int(valid.sum())) if parts else None
+        changes: list[list[Array]] = []
+        for degree in _degrees(beats):
+            lower = zip(*changes, strict=True) if changes else [()] * len(orders)
+            new = [_slow(psi[mask], time[mask], k, degree) for k in orders]
+            changes.append([_orthonormal(one, periodic, *less) for one, less in zip(new, lower, strict=True)])
+        every = _orthonormal(np.hstack([one for row in changes for one in row]))
+        lines = [_orthonormal(_waves(apparent[mask], k, distances), periodic, every) for k in orders]
+        values = scatter[np.ix_(mask, group.ravel() == g)]
+        parts.append(_Powers.of(values, values - every @ (every.T @ values), changes, lines))
+    enough = parts and min(float(one.freedom.min()) for one in parts) >= 1.0
+    return _compared(parts, int(valid.sum())) if enough else None
 
 
 @dataclass(frozen=True)
 class _Powers:
-    """Slow changes and noise near K harmonics, in C channels that have the same gaps.
+    """Slow changes of D degrees (linear, curved) and noise near K harmonics, in C channels that have the same gaps.
 
-    ``slow`` [K, C]: mean square of the coefficients of slow changes; ``near`` [K, L, C]: coefficients at L nearby lines;
-    ``freedom`` [2, K]: number of independent coefficients of both; ``level`` [C]: mean square of all samples.
+    ``slow`` [D, K, C]: sum of squares of the coefficients of slow changes; ``near`` [K, L, C]: coefficients of noise at
+    L nearby lines; ``freedom`` [D + 1, K]: number of independent coefficients of the slow changes of each degree, and
+    of the noise; ``level`` [C]: mean square of the samples without slow changes.
     """
 
     slow: Array
@@ -92,29 +96,38 @@ class _Powers:
     level: Array
 
     @classmethod
-    def of(cls, values: Array, changes: list[Array], lines: list[Array]) -> _Powers:
-        freedom = np.array([[_rank(one) for one in bases] for bases in (changes, lines)])
-        slow = np.array([((one.T @ values) ** 2).sum(axis=0) for one in changes])
-        level = np.maximum((values**2).sum(axis=0) - slow.sum(axis=0), 1e-300) / len(values)
-        return cls(slow / freedom[0][:, None], np.array([one.T @ values for one in lines]), freedom, level)
+    def of(cls, values: Array, steady: Array, changes: list[list[Array]], lines: list[Array]) -> _Powers:
+        """Project ``values`` [T, C], and ``steady`` [T, C] without slow changes, on bases [T, .] of each harmonic."""
+        freedom = np.array([[_rank(one) for one in row] for row in (*changes, lines)])
+        slow = np.array([[((one.T @ values) ** 2).sum(axis=0) for one in row] for row in changes])
+        near = np.array([one.T @ steady for one in lines])
+        return cls(slow, near, freedom, np.maximum((steady**2).mean(axis=0), 1e-300))
 
 
 def _compared(parts: list[_Powers], samples: int) -> Drift:
-    """Pool the channels of all ``parts``; ``samples``: number of values of all channels."""
-    slow, near, level = (
-        np.concatenate(found, axis=-1) for found in zip(*((one.slow, one.near, one.level) for one in parts), strict=True)
+    """Compare the slow changes of all channels of the ``parts`` with their noise; ``samples``: number of values.
+
+    Linear changes alone are compared, and linear and curved ones together; the less probable result counts.
+    """
+    every = (
+        (one.slow, one.near, np.repeat(one.freedom[..., None], len(one.level), axis=-1), one.level) for one in parts
     )
-    freedom = np.concatenate([np.repeat(one.freedom[..., None], len(one.level), axis=-1) for one in parts], axis=-1)
-    noise = (near**2).sum(axis=1) / freedom[1]
+    slow, near, freedom, level = (np.concatenate(found, axis=-1) for found in zip(*every, strict=True))
+    slow, of_slow = slow.cumsum(axis=0), freedom[:-1].cumsum(axis=0)
+    noise = (near**2).sum(axis=1) / freedom[-1]
     # Each channel is divided by its size, so that a loud one does not decide alone.
     by_harmonic = (noise / level).mean(axis=1)
-    ratio = float((slow / level).mean() / max(float(by_harmonic.mean()), 1e-300))
     alike = float(by_harmonic.sum() ** 2 / max(len(by_harmonic) * (by_harmonic**2).sum(), 1e-300))
-    of_slow, of_noise = alike * freedom.sum(axis=1).mean(axis=-1)
+    of_noise = alike * float(freedom[-1].sum(axis=0).mean())
     independent = _independent(near.reshape(-1, len(level)) / np.sqrt(level), of_noise)
-    probability = float(stats.f.sf(ratio, of_slow * independent, of_noise * independent))
-    power = float((freedom[0] * (slow - noise)).sum())
-    return Drift(ratio, probability, float(np.sqrt(max(power, 0.0) / samples)))
+    found = []
+    for power, count in zip(slow, of_slow, strict=True):
+        ratio = float((power / count / level).mean() / max(float(by_harmonic.mean()), 1e-300))
+        free = alike * float(count.sum(axis=0).mean()) * independent
+        found.append((len(slow) * float(stats.f.sf(ratio / RISE, free, of_noise * independent)), -ratio))
+    probability, ratio = min(found)
+    beyond = float((slow[-1] - of_slow[-1] * noise).sum())
+    return Drift(-ratio, min(probability, 1.0), float(np.sqrt(max(beyond, 0.0) / samples)))
 
 
 def slow_basis(
@@ -122,12 +135,17 @@ def slow_basis(
 ) -> tuple[Float[Array, "T P"], Int[Index, " P"]]:
     """Slow changes of mean and first harmonics, as columns [T, P], and the harmonic [P] of each.
 
-    Linear changes and, in long recordings, curved ones. ``psi`` [T]: phase (rad) of the beat; ``apparent`` [T]: time in
-    apparent beats; ``beats``: whole ones; ``harmonics``: of the mean beat.
+    Linear changes and, from CURVED beats on, curved ones. ``psi`` [T]: phase (rad) of the beat; ``apparent`` [T]: time
+    in apparent beats; ``beats``: whole ones; ``harmonics``: of the mean beat.
     """
-    count, time = min(HARMONICS, harmonics), _time(apparent)
-    columns = [_slow(psi, time, k, curved=beats >= LONG) for k in range(count + 1)]
-    return np.hstack(columns), np.repeat(np.arange(count + 1), [part.shape[1] for part in columns])
+    orders, time = range(min(HARMONICS, harmonics) + 1), _time(apparent)
+    columns = [np.hstack([_slow(psi, time, k, degree) for degree in _degrees(beats)]) for k in orders]
+    return np.hstack(columns), np.repeat(orders, [part.shape[1] for part in columns])
+
+
+def _degrees(beats: int) -> tuple[int, ...]:
+    """Degrees of the slow changes that are seen in so many ``beats``: 1 linear, 2 curved."""
+    return (1, 2) if beats >= CURVED else (1,)
 
 
 def _time(apparent: Array) -> Array:
@@ -135,9 +153,9 @@ def _time(apparent: Array) -> Array:
     return np.asarray(2.0 * (apparent - apparent[0]) / (apparent[-1] - apparent[0]) - 1.0)
 
 
-def _slow(psi: Array, time: Array, k: int, *, curved: bool) -> Array:
-    """Slow changes [T, .] of harmonic ``k`` (0: of the mean): Legendre polynomials of the ``time`` [T], -1 to 1."""
-    slow = np.stack([time, 1.5 * time**2 - 0.5] if curved else [time], axis=1)
+def _slow(psi: Array, time: Array, k: int, degree: int) -> Array:
+    """Slow change [T, .] of harmonic ``k`` (0: of the mean): a Legendre polynomial of the ``time`` [T], -1 to 1."""
+    slow = (time if degree == 1 else 1.5 * time**2 - 0.5)[:, None]
     return np.hstack([slow * np.cos(k * psi)[:, None], slow * np.sin(k * psi)[:, None]]) if k else slow
 
 
