@@ -31,7 +31,7 @@ from wingfit.diagnosis.verdict.weigh_hypotheses import only_drifts
 Step = tuple[float, str, Located | None]
 
 DRIFT = Where(
-    "the beat changes slowly, and its mean fits within the noise, which shows no place", None, None, None, "", ()
+    "the beat changes slowly; the mean beat fits within the noise and shows no place", None, None, None, "", ()
 )
 
 

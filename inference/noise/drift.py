@@ -116,18 +116,29 @@ def _compared(parts: list[_Powers], samples: int) -> Drift:
     slow, of_slow = slow.cumsum(axis=0), freedom[:-1].cumsum(axis=0)
     noise = (near**2).sum(axis=1) / freedom[-1]
     # Each channel is divided by its size, so that a loud one does not decide alone.
-    by_harmonic = (noise / level).mean(axis=1)
-    alike = float(by_harmonic.sum() ** 2 / max(len(by_harmonic) * (by_harmonic**2).sum(), 1e-300))
-    of_noise = alike * float(freedom[-1].sum(axis=0).mean())
-    independent = _independent(near.reshape(-1, len(level)) / np.sqrt(level), of_noise)
+    around, lines = float((noise / level).mean()), freedom[-1].mean(axis=-1)
+    sources = _sources(near / np.sqrt(level), lines)
     found = []
     for power, count in zip(slow, of_slow, strict=True):
-        ratio = float((power / count / level).mean() / max(float(by_harmonic.mean()), 1e-300))
-        free = alike * float(count.sum(axis=0).mean()) * independent
-        found.append((len(slow) * float(stats.f.sf(ratio / RISE, free, of_noise * independent)), -ratio))
+        ratio = float((power / count / level).mean() / max(around, 1e-300))
+        chance = float(stats.f.sf(ratio / RISE, sources * count.mean(), sources * lines.mean()))
+        found.append((len(slow) * chance, -ratio))
     probability, ratio = min(found)
     beyond = float((slow[-1] - of_slow[-1] * noise).sum())
     return Drift(-ratio, min(probability, 1.0), float(np.sqrt(max(beyond, 0.0) / samples)))
+
+
+def _sources(near: Array, lines: Array) -> float:
+    """Number of independent sources of noise near K harmonics in C channels, of equal power: at most K C.
+
+    It is smaller where channels scatter together, or where some harmonics or channels have most of the noise.
+    ``near`` [K, L, C]: coefficients of the noise; ``lines`` [K]: how many of the L are independent. By chance, channels
+    correlate that are independent; the mean of that is subtracted.
+    """
+    total = (near**2).sum(axis=(1, 2))
+    square = ((near.transpose(0, 2, 1) @ near) ** 2).sum(axis=(1, 2))
+    square = np.maximum((square - total**2 / lines) / np.maximum(1.0 - 1.0 / lines, 0.5), total**2 / near.shape[2])
+    return float((total / lines).sum() ** 2 / max((square / lines**2).sum(), 1e-300)) or 1.0
 
 
 def slow_basis(
@@ -180,16 +191,3 @@ def _orthonormal(columns: Array, *others: Array) -> Array:
 def _rank(basis: Array) -> float:
     """Return the number of independent columns of an :func:`_orthonormal` basis."""
     return float(np.round((basis**2).sum()))
-
-
-def _independent(near: Array, freedom: float) -> float:
-    """Number of independent channels of noise: fewer than C where channels scatter together or some are louder.
-
-    ``near`` [L, C]: coefficients of the noise; ``freedom``: how many of the L are independent. Channels that are
-    independent correlate by chance; the mean of that is subtracted.
-    """
-    square = (near.T @ near) ** 2
-    own = float(np.trace(square))
-    total = float((near**2).sum()) ** 2
-    together = max(0.0, float(square.sum()) - own - (total - own) / max(freedom, 1.0))
-    return total / max(own + together, 1e-300) if total > 0.0 else 1.0
