@@ -29,9 +29,10 @@ _RANK = 1e-6
 
 @dataclass(frozen=True)
 class Drift:
-    """A slow change of the beat: ``ratio`` of its power to that of noise, ``probability`` of that for noise alone.
+    """A slow change of the beat: ``ratio`` of its power to that of the noise around the harmonics.
 
-    ``size``: its root mean square beyond the noise, over all samples and channels, m or N.
+    ``probability``: of such a ratio for noise alone that is RISE times as dense at a harmonic as around it.
+    ``size``: root mean square of the change beyond the noise, over all samples and channels, m or N.
     """
 
     ratio: float
