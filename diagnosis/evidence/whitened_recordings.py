@@ -116,17 +116,30 @@ class WhitenedData:
         return max(float(np.sqrt(square)), self.tolerance)
 
     @cached_property
-    def drift(self) -> float:
-        """Root mean square (m or N) over all used channels of slow changes of the beat that noise does not explain."""
+    def drift(self) -> Float[Array, " R"]:
+        """Slow change of the beat of each recording [R] that noise does not explain, divided by its noise of a sample.
+
+        Both are root mean squares over the recording's used channels; zero where noise explains the change.
+        """
         if self.kind == "series":
-            return 0.0
-        sizes = [fit.drift.size if fit.drift and fit.drift.found else 0.0 for fit in self.beat_fits]
-        return float(np.sqrt(self.recording_weights @ np.square(sizes)))
+            return np.zeros(len(self.recordings))
+        found = np.array([fit.drift.size if fit.drift and fit.drift.found else 0.0 for fit in self.beat_fits])
+        noise = [float(np.sqrt(np.mean(fit.noise[fit.used] ** 2))) for fit in self.beat_fits]
+        return np.asarray(found / np.maximum(noise, self.tolerance))
 
     def change_of_beat(self, coefficients: Float[Array, " D"]) -> float:
-        """Return the mean square (m^2 or N^2) of a residual's linear change of the first harmonic."""
-        slow = np.concatenate([np.tile(v.trend & (v.order > 0), int(v.used.sum())) for v in self.beat_fits])
-        return float(self.weight[slow] @ coefficients[slow] ** 2)
+        """Return the mean square beyond noise (m^2 or N^2) of a residual's linear change of the first harmonic.
+
+        Only recordings with a :attr:`drift` count. ``coefficients`` [D]: of the residual.
+        """
+        first = np.concatenate([np.tile(v.trend & (v.order > 0), int(v.used.sum())) for v in self.beat_fits])
+        seen = first & np.repeat(self.drift > 0.0, [part.stop - part.start for part in self.recording_slices])
+        return max(float(self.weight[seen] @ (coefficients[seen] ** 2 - self.variance[seen])), 0.0)
+
+    def mean_beat_excess(self, coefficients: Float[Array, " D"]) -> float:
+        """Return the :meth:`excess` (m^2 or N^2) of a residual's ``coefficients`` [D] without those of slow trends."""
+        steady = ~np.concatenate([np.tile(v.trend, int(v.used.sum())) for v in self.beat_fits])
+        return float(self.weight[steady] @ (coefficients[steady] ** 2 - self.variance[steady]))
 
     @cached_property
     def recording_slices(self) -> tuple[slice, ...]:

@@ -26,8 +26,13 @@ from wingfit.diagnosis.search_state import SearchState
 from wingfit.diagnosis.subject import beat_subject
 from wingfit.diagnosis.verdict.proof import ResidualPair
 from wingfit.diagnosis.verdict.verdict import Decision
+from wingfit.diagnosis.verdict.weigh_hypotheses import only_drifts
 
 Step = tuple[float, str, Located | None]
+
+DRIFT = Where(
+    "the beat changes slowly; the mean beat fits within the noise and shows no place", None, None, None, "", ()
+)
 
 
 def locate_in_beat(
@@ -38,17 +43,17 @@ def locate_in_beat(
     ``fitted``, ``held_out``: residuals of both, in the recordings that were fitted and in those that were predicted.
     """
     subject, data, missing = beat_subject(state.subject), state.data, MissingPhysics()
-    if decision.verdict == "unnamed" or _is_load(decision, best):
+    nominal, drifting = state.fitted_nominal.refit, _only_drifts(state, decision)
+    if not drifting and (decision.verdict == "unnamed" or _is_load(decision, best)):
         for fraction, stage, found in _locate(state, unnamed=decision.verdict == "unnamed"):
             missing = found
             yield fraction, stage, None
-    nominal = state.fitted_nominal.refit
     before, after = (maps.recording_residuals(subject, data, one.fit.coefficients) for one in (nominal, best))
     shown = list(maps.overlays(subject, data, fitted.before, fitted.after, held_out=False))
     if held_out is not None:
         shown += maps.overlays(subject, held_out.data, held_out.before, held_out.after, held_out=True)
     located = Located(
-        where=_where(state, decision, best, missing),
+        where=DRIFT if drifting else _where(state, decision, best, missing),
         overlays=tuple(shown),
         markers=maps.markers(before, after),
         phase_map=maps.phase_map(before, after),
@@ -57,6 +62,13 @@ def locate_in_beat(
         outline=subject.outline,
     )
     yield 1.0, "locating the missing physics", located
+
+
+def _only_drifts(state: SearchState, decision: Decision) -> bool:
+    """Return whether only a drift speaks against the nominal model: then its misfit shows no place on the wing."""
+    nominal = state.fitted_nominal
+    floor = 0.0 if nominal.tried_finer else nominal.discretisation_error or 0.0
+    return decision.verdict in ("unnamed", "ambiguous") and only_drifts(state.data, nominal.refit, floor)
 
 
 def _is_load(decision: Decision, best: Refit) -> bool:

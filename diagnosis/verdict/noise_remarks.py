@@ -6,10 +6,12 @@ import numpy as np
 
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.finding import amount
+from wingfit.diagnosis.verdict.weigh_hypotheses import drifts
 from wingfit.inference.noise.drift import Drift
 from wingfit.inference.noise.harmonic import still_markers
 
-UNEVEN = 3.0  # times the median noise: recordings with more get a remark
+UNEVEN = 3.0  # times the noise of quieter recordings: those with more get a remark
+QUIET = 0.25  # of the recordings, or the quietest one: their noise is that of quieter recordings
 
 
 def noise_remarks(data: WhitenedData, unit: str) -> tuple[str, ...]:
@@ -43,17 +45,20 @@ def _drift_remarks(data: WhitenedData, unit: str) -> tuple[str, ...]:
 
 
 def _uneven_noise_remarks(data: WhitenedData, unit: str) -> tuple[str, ...]:
-    """Return a remark on recordings with several times the noise of the others; empty if there are none."""
+    """Return a remark on recordings with several times the noise of quieter ones; empty if there are none.
+
+    Noise below the tolerance of any model hides nothing, and gets no remark.
+    """
     levels = np.array([float(np.sqrt(np.mean(fit.noise[fit.used] ** 2))) for fit in data.beat_fits])
-    usual = float(np.median(levels))
+    quiet = float(np.quantile(levels, QUIET, method="lower"))
     loud = [
         f"{one.name} ({amount(level, unit)})"
         for one, level in zip(data.recordings, levels, strict=True)
-        if level > UNEVEN * usual
+        if level > max(UNEVEN * quiet, data.tolerance)
     ]
     remark = (
-        f"the noise of {', '.join(loud)} is more than {UNEVEN:g} times the usual {amount(usual, unit)}: what happens "
-        "there but not in every beat is taken for noise, and missing physics may hide in it"
+        f"the noise of {', '.join(loud)} is more than {UNEVEN:g} times the {amount(quiet, unit)} of quieter "
+        "recordings: what happens there but not in every beat is taken for noise, and missing physics may hide in it"
     )
     return (remark,) if loud else ()
 
@@ -61,11 +66,9 @@ def _uneven_noise_remarks(data: WhitenedData, unit: str) -> tuple[str, ...]:
 def drift_sentence(data: WhitenedData) -> str:
     """Return a sentence for the summary if the beat changes slowly during recordings; empty if it does not."""
     drifting, every = len(_drifts(data)), len(data.recordings)
-    return (
-        f" The beat changes slowly during {drifting} of {every} recordings: something drifts, which may be the cause."
-        if drifting
-        else ""
-    )
+    cause = "which may be the cause" if drifts(data) else "by too little to matter"
+    found = f" The beat changes slowly during {drifting} of {every} recordings: something drifts, {cause}."
+    return found if drifting else ""
 
 
 def _drifts(data: WhitenedData) -> list[tuple[str, Drift]]:

@@ -83,11 +83,20 @@ def nominal_refuted(data: WhitenedData, excess: float, floor: float) -> bool:
 
 
 def drifts(data: WhitenedData) -> bool:
-    """Return whether the beat changes slowly by more than what counts as none.
+    """Return whether the beat changes slowly in any recording, by more than what counts as none.
 
     The nominal model is the same in every beat, so something is missing even if the mean beat fits.
     """
-    return data.drift > data.policy.negligible * data.noise
+    return bool(np.max(data.drift) > data.policy.negligible)
+
+
+def only_drifts(data: WhitenedData, nominal: Refit, floor: float) -> bool:
+    """Return whether the beat changes slowly and the ``nominal`` model's misfit of the mean beat is within the noise.
+
+    ``floor`` (m or N): discretisation error.
+    """
+    excess = data.mean_beat_excess(nominal.fit.coefficients)
+    return drifts(data) and not nominal_refuted(data, excess, floor)
 
 
 def _explains_drift(data: WhitenedData, nominal: Refit, refit: Refit) -> bool:

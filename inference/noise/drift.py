@@ -2,9 +2,10 @@
 
 Stiffness, damping or a motor that drift change size and phase of the harmonics slowly. The power of such a change lies
 next to the harmonics, so close that it looks like noise of long memory. But noise, whatever its colour, has about the
-same density at all frequencies near a harmonic. So the power of the linear change of a harmonic is compared with the
-power of the spectral lines around it: their ratio, pooled over harmonics and channels, follows an F distribution for
-noise alone.
+same density at all frequencies near a harmonic, unless a resonance is narrower than the distance of a few spectral
+lines. So the power of the slow change of a harmonic is compared with the power of the nearest spectral lines: their
+ratio, pooled over harmonics and channels, follows an F distribution for noise alone. Its degrees of freedom count
+harmonics and channels only as far as their noise near the harmonics is independent and of similar size.
 """
 
 from __future__ import annotations
@@ -19,17 +20,19 @@ from wingfit.records.array_types import Array, Bool, Float, Index, Int, Mask
 
 HARMONICS = 3  # compared: those in which a wing moves most
 FEWEST_BEATS = 3  # with which lines remain that the change does not use up
-LONG = 6  # beats from which a curved change is removed, too
+CURVED = 4  # beats from which a curved change is found and removed, too
+NEAREST = 3  # spectral lines on either side of a harmonic: farther ones say less about the noise at the harmonic
 CERTAIN = 1e-5  # probability of noise alone below which a change counts as found
-LEAST_RATIO = 1.5  # of its power to that of noise: less may come from noise whose density rises towards a harmonic
+RISE = 1.5  # largest ratio of the density of noise at a harmonic to that around it that counts as usual
 _RANK = 1e-6
 
 
 @dataclass(frozen=True)
 class Drift:
-    """A slow change of the beat: ``ratio`` of its power to that of noise, ``probability`` of that for noise alone.
+    """A slow change of the beat: ``ratio`` of its power to that of the noise around the harmonics.
 
-    ``size``: its root mean square beyond the noise, over all samples and channels, m or N.
+    ``probability``: of such a ratio for noise alone that is RISE times as dense at a harmonic as around it.
+    ``size``: root mean square of the change beyond the noise, over all samples and channels, m or N.
     """
 
     ratio: float
@@ -39,7 +42,7 @@ class Drift:
     @property
     def found(self) -> bool:
         """Whether noise alone does not explain the change."""
-        return self.probability < CERTAIN and self.ratio > LEAST_RATIO
+        return self.probability < CERTAIN
 
 
 def drift_of(
@@ -50,62 +53,142 @@ def drift_of(
     harmonics: int,
     beats: int,
 ) -> Drift | None:
-    """Compare the linear change of the first harmonics with the noise around them; None with too few beats.
+    """Compare the slow change of the first harmonics with the noise around them.
 
     ``scatter`` [T, C]: recorded values minus mean beat, zero where not ``valid``; ``psi`` [T]: phase (rad) of the beat,
-    ``apparent`` [T]: time in apparent beats; ``harmonics``: of the mean beat; ``beats``: whole apparent beats.
+    ``apparent`` [T]: time in apparent beats; ``harmonics``: of the mean beat; ``beats``: whole apparent beats. The
+    change is linear or, from CURVED beats on, curved. None with too few beats, or too few samples between gaps.
     """
     if beats < FEWEST_BEATS:
         return None
-    values = scatter[:, valid.any(axis=0)]
-    periodic, lines = _orthonormal(fourier_basis(psi, harmonics)), np.arange(1, beats // 2 + 1) / beats
-    count = min(HARMONICS, harmonics)
-    changes = [_orthonormal(_slow(psi, k, curved=False), periodic) for k in range(1, count + 1)]
-    all_changes = _orthonormal(np.hstack(changes))
-    slow, noise, freedom = [], [], 0
-    for k, change in enumerate(changes, 1):
-        angles = 2 * np.pi * apparent[:, None] * np.concatenate([k - lines, k + lines])
-        around = _orthonormal(np.hstack([np.cos(angles), np.sin(angles)]), periodic, all_changes)
-        slow.append(((change.T @ values) ** 2).mean(axis=0))
-        noise.append(((around.T @ values) ** 2).mean(axis=0))
-        freedom += around.shape[1]
-    # Size of each channel, so that a loud one does not decide alone; from all samples, to hardly depend on ``noise``.
-    scale = np.maximum((values**2).sum(axis=0) - ((all_changes.T @ values) ** 2).sum(axis=0), 1e-300)
-    ratio = float((np.array(slow) / scale).mean() / max(float((np.array(noise) / scale).mean()), 1e-300))
-    independent = _independent(values)
-    probability = float(stats.f.sf(ratio, 2 * count * independent, freedom * independent))
-    power = 2.0 * float(np.sum(slow)) * max(0.0, 1.0 - 1.0 / max(ratio, 1.0))
-    return Drift(ratio, probability, float(np.sqrt(power / valid.sum())))
+    orders, time = range(1, min(HARMONICS, harmonics) + 1), _time(apparent)
+    distances = np.arange(1, min(beats // 2, NEAREST) + 1) / beats
+    parts = []
+    masks, group = np.unique(valid, axis=1, return_inverse=True)
+    for g, mask in enumerate(masks.T):
+        if not mask.any():
+            continue
+        periodic = _orthonormal(fourier_basis(psi[mask], harmonics))
+        changes: list[list[Array]] = []
+        for degree in _degrees(beats):
+            lower = zip(*changes, strict=True) if changes else [()] * len(orders)
+            new = [_slow(psi[mask], time[mask], k, degree) for k in orders]
+            changes.append([_orthonormal(one, periodic, *less) for one, less in zip(new, lower, strict=True)])
+        every = _orthonormal(np.hstack([one for row in changes for one in row]))
+        lines = [_orthonormal(_waves(apparent[mask], k, distances), periodic, every) for k in orders]
+        values = scatter[np.ix_(mask, group.ravel() == g)]
+        parts.append(_Powers.of(values, values - every @ (every.T @ values), changes, lines))
+    enough = parts and min(float(one.freedom.min()) for one in parts) >= 1.0
+    return _compared(parts, int(valid.sum())) if enough else None
 
 
-def slow_basis(psi: Float[Array, " T"], beats: int, harmonics: int) -> tuple[Float[Array, "T P"], Int[Index, " P"]]:
+@dataclass(frozen=True)
+class _Powers:
+    """Slow changes of D degrees (linear, curved) and noise near K harmonics, in C channels that have the same gaps.
+
+    ``slow`` [D, K, C]: sum of squares of the coefficients of slow changes; ``near`` [K, L, C]: coefficients of noise at
+    L nearby lines; ``freedom`` [D + 1, K]: number of independent coefficients of the slow changes of each degree, and
+    of the noise; ``level`` [C]: mean square of the samples without slow changes.
+    """
+
+    slow: Array
+    near: Array
+    freedom: Array
+    level: Array
+
+    @classmethod
+    def of(cls, values: Array, steady: Array, changes: list[list[Array]], lines: list[Array]) -> _Powers:
+        """Project ``values`` [T, C], and ``steady`` [T, C] without slow changes, on bases [T, .] of each harmonic."""
+        freedom = np.array([[_rank(one) for one in row] for row in (*changes, lines)])
+        slow = np.array([[((one.T @ values) ** 2).sum(axis=0) for one in row] for row in changes])
+        near = np.array([one.T @ steady for one in lines])
+        return cls(slow, near, freedom, np.maximum((steady**2).mean(axis=0), 1e-300))
+
+
+def _compared(parts: list[_Powers], samples: int) -> Drift:
+    """Compare the slow changes of all channels of the ``parts`` with their noise; ``samples``: number of values.
+
+    Linear changes alone are compared, and linear and curved ones together; the less probable result counts.
+    """
+    every = (
+        (one.slow, one.near, np.repeat(one.freedom[..., None], len(one.level), axis=-1), one.level) for one in parts
+    )
+    slow, near, freedom, level = (np.concatenate(found, axis=-1) for found in zip(*every, strict=True))
+    slow, of_slow = slow.cumsum(axis=0), freedom[:-1].cumsum(axis=0)
+    noise = (near**2).sum(axis=1) / freedom[-1]
+    # Each channel is divided by its size, so that a loud one does not decide alone.
+    around, lines = float((noise / level).mean()), freedom[-1].mean(axis=-1)
+    sources = _sources(near / np.sqrt(level), lines)
+    found = []
+    for power, count in zip(slow, of_slow, strict=True):
+        ratio = float((power / count / level).mean() / max(around, 1e-300))
+        chance = float(stats.f.sf(ratio / RISE, sources * count.mean(), sources * lines.mean()))
+        found.append((len(slow) * chance, -ratio))
+    probability, ratio = min(found)
+    beyond = float((slow[-1] - of_slow[-1] * noise).sum())
+    return Drift(-ratio, min(probability, 1.0), float(np.sqrt(max(beyond, 0.0) / samples)))
+
+
+def _sources(near: Array, lines: Array) -> float:
+    """Number of independent sources of noise near K harmonics in C channels, of equal power: at most K C.
+
+    It is smaller where channels scatter together, or where some harmonics or channels have most of the noise.
+    ``near`` [K, L, C]: coefficients of the noise; ``lines`` [K]: how many of the L are independent. By chance, channels
+    correlate that are independent; the mean of that is subtracted.
+    """
+    total = (near**2).sum(axis=(1, 2))
+    square = ((near.transpose(0, 2, 1) @ near) ** 2).sum(axis=(1, 2))
+    square = np.maximum((square - total**2 / lines) / np.maximum(1.0 - 1.0 / lines, 0.5), total**2 / near.shape[2])
+    return float((total / lines).sum() ** 2 / max((square / lines**2).sum(), 1e-300)) or 1.0
+
+
+def slow_basis(
+    psi: Float[Array, " T"], apparent: Float[Array, " T"], beats: int, harmonics: int
+) -> tuple[Float[Array, "T P"], Int[Index, " P"]]:
     """Slow changes of mean and first harmonics, as columns [T, P], and the harmonic [P] of each.
 
-    Linear changes and, in long recordings, curved ones.
+    Linear changes and, from CURVED beats on, curved ones. ``psi`` [T]: phase (rad) of the beat; ``apparent`` [T]: time
+    in apparent beats; ``beats``: whole ones; ``harmonics``: of the mean beat.
     """
-    curved = beats >= LONG
-    count = min(HARMONICS, harmonics)
-    columns = [_slow(psi, k, curved=curved) for k in range(count + 1)]
-    return np.hstack(columns), np.repeat(np.arange(count + 1), [part.shape[1] for part in columns])
+    orders, time = range(min(HARMONICS, harmonics) + 1), _time(apparent)
+    columns = [np.hstack([_slow(psi, time, k, degree) for degree in _degrees(beats)]) for k in orders]
+    return np.hstack(columns), np.repeat(orders, [part.shape[1] for part in columns])
 
 
-def _slow(psi: Array, k: int, *, curved: bool) -> Array:
-    """Slow changes [T, .] of harmonic ``k`` (0: of the mean): Legendre polynomials of the time."""
-    time = np.linspace(-1.0, 1.0, len(psi))[:, None]
-    slow = np.hstack([time, 1.5 * time**2 - 0.5]) if curved else time
+def _degrees(beats: int) -> tuple[int, ...]:
+    """Degrees of the slow changes that are seen in so many ``beats``: 1 linear, 2 curved."""
+    return (1, 2) if beats >= CURVED else (1,)
+
+
+def _time(apparent: Array) -> Array:
+    """Time [T] from -1 at the first sample to 1 at the last."""
+    return np.asarray(2.0 * (apparent - apparent[0]) / (apparent[-1] - apparent[0]) - 1.0)
+
+
+def _slow(psi: Array, time: Array, k: int, degree: int) -> Array:
+    """Slow change [T, .] of harmonic ``k`` (0: of the mean): a Legendre polynomial of the ``time`` [T], -1 to 1."""
+    slow = (time if degree == 1 else 1.5 * time**2 - 0.5)[:, None]
     return np.hstack([slow * np.cos(k * psi)[:, None], slow * np.sin(k * psi)[:, None]]) if k else slow
 
 
+def _waves(apparent: Array, k: int, distances: Array) -> Array:
+    """Cosines and sines [T, .] at ``distances`` (in flap frequencies) on either side of harmonic ``k``."""
+    angles = 2 * np.pi * apparent[:, None] * np.concatenate([k - distances, k + distances])
+    return np.hstack([np.cos(angles), np.sin(angles)])
+
+
 def _orthonormal(columns: Array, *others: Array) -> Array:
-    """Return an orthonormal basis of the part of ``columns`` [T, .] that is orthogonal to the ``others``."""
+    """Return the nearest orthonormal columns to the part of ``columns`` [T, .] that is orthogonal to the ``others``.
+
+    Where the columns depend on each other, so do those returned; :func:`_rank` is the number of independent ones.
+    """
     for other in others:
         columns = columns - other @ (other.T @ columns)
-    basis, sizes, _ = np.linalg.svd(columns, full_matrices=False)
-    return np.asarray(basis[:, sizes > _RANK * sizes.max(initial=0.0)])
+    basis, sizes, turned = np.linalg.svd(columns, full_matrices=False)
+    kept = sizes > _RANK * sizes.max(initial=0.0)
+    return np.asarray(basis[:, kept] @ turned[kept])
 
 
-def _independent(values: Array) -> float:
-    """Number of independent channels that scatter like ``values`` [T, C]: fewer than C where they scatter together."""
-    covariance = values.T @ values
-    size = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
-    return float(len(size) ** 2 / max(float(((covariance / size / size[:, None]) ** 2).sum()), 1.0))
+def _rank(basis: Array) -> float:
+    """Return the number of independent columns of an :func:`_orthonormal` basis."""
+    return float(np.round((basis**2).sum()))

@@ -174,18 +174,19 @@ class _Scatter:
         recorded = np.where(valid, recording.values, 0.0)
         # Trends are not subtracted: they would absorb some of the noise.
         values, fitted = scatter_about(basis[:, ~trend], recorded, valid), order[~trend]
-        psi = 2 * np.pi * recording.condition.flap_frequency * recording.times
-        drift = drift_of(values, valid, psi, np.asarray(advance * number, float), harmonics, beats)
+        psi, apparent = 2 * np.pi * recording.condition.flap_frequency * recording.times, advance * number.astype(float)
+        drift, widened = drift_of(values, valid, psi, apparent, harmonics, beats), np.ones(harmonics + 1)
         if drift and drift.found:  # not noise: what it is, the trends show
-            slow, of = slow_basis(psi, beats, harmonics)
+            slow, of = slow_basis(psi, apparent, beats, harmonics)
             columns = np.hstack([basis[:, ~trend], slow])
             if SPARE * columns.shape[1] <= valid.sum(axis=0)[used].min():
-                widened = np.sqrt((beats - 1.0) / (beats - 1.0 - (of == 0).sum()))
-                values, fitted = widened * scatter_about(columns, recorded, valid), np.concatenate([fitted, of])
-        density = density_at_harmonics(values, valid, advance, number, harmonics, beats)
-        taken = density[1] * density[0][fitted].sum()  # power of the noise that the fit of the mean beat absorbs
+                widened[: of.max() + 1] = (beats - 1.0) / (beats - 1.0 - (of == 0).sum())  # noise that is removed too
+                values, fitted = scatter_about(columns, recorded, valid), np.concatenate([fitted, of])
+        density, scale = density_at_harmonics(values, valid, advance, number, harmonics, beats)
+        density *= widened
+        taken = scale * density[fitted].sum()  # power of the noise that the fit of the mean beat absorbs
         variance = ((values**2).sum(axis=0) + taken) / np.maximum(valid.sum(axis=0), 1)
-        return cls(values, valid, basis, order, trend, beats, inner, density, variance, drift)
+        return cls(values, valid, basis, order, trend, beats, inner, (density, scale), variance, drift)
 
 
 def _check_moves(recording: Recording, seen: Mask) -> None:

@@ -3,31 +3,41 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
 
 from tests.diagnosis.pendulum_rig import GENES, PendulumRig, recorded
 from wingfit.diagnosis import DiagnosisSpec, Finding, diagnose_subject
+from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
+from wingfit.diagnosis.policy import POLICY
+from wingfit.diagnosis.verdict.noise_remarks import drift_sentence, noise_remarks
+from wingfit.diagnosis.verdict.weigh_hypotheses import drifts
+from wingfit.inference.noise.drift import Drift
 from wingfit.records import Recording
 from wingfit.workers.in_process import InProcessEvaluator
 
-PARTS = 5
+FALLING, DIPPING = (0.5, 0.25, 0.0, -0.25, -0.5), (0.0, -0.7, -1.0, -0.7, 0.0)
+FREQUENCIES = (1.2, 1.7, 2.7, 3.4)
 
 
-def drifting(change: float, seed: int, frequencies: tuple[float, ...]) -> tuple[Recording, ...]:
-    """Recordings during which the stiffness falls linearly by the fraction ``change`` of its nominal value."""
+def drifting(
+    change: float, seed: int, frequencies: tuple[float, ...], course: tuple[float, ...] = FALLING
+) -> tuple[Recording, ...]:
+    """Recordings during which the stiffness changes along a ``course``, by the fraction ``change`` of the nominal."""
     stiffness = next(gene.nominal for gene in GENES if gene.name == "stiffness")
     every = [
         recorded({"stiffness": stiffness * (1.0 + part)}, noise=0.0, frequencies=frequencies, frames=248)
-        for part in change * np.linspace(0.5, -0.5, PARTS)
+        for part in change * np.array(course)
     ]
     noisy = recorded({}, seed=seed, frequencies=frequencies, frames=248)
     quiet = recorded({}, noise=0.0, frequencies=frequencies, frames=248)
     found = []
     for k, one in enumerate(noisy):
-        at = np.linspace(0.0, PARTS - 1.0, len(one.times))
-        low = np.minimum(at.astype(int), PARTS - 2)
+        at = np.linspace(0.0, len(course) - 1.0, len(one.times))
+        low = np.minimum(at.astype(int), len(course) - 2)
         share, values = (at - low)[:, None], np.stack([part[k].values for part in every])
         rows = np.arange(len(at))
         moving = (1.0 - share) * values[low, rows] + share * values[low + 1, rows]
@@ -35,8 +45,8 @@ def drifting(change: float, seed: int, frequencies: tuple[float, ...]) -> tuple[
     return tuple(found)
 
 
-def diagnosed(change: float, seed: int = 1) -> Finding:
-    fitted, held_out = drifting(change, seed, (1.2, 1.7, 2.7, 3.4)), drifting(change, seed + 1, (1.5,))
+def diagnosed(change: float, seed: int = 1, course: tuple[float, ...] = FALLING) -> Finding:
+    fitted, held_out = (drifting(change, seed + k, at, course) for k, at in enumerate((FREQUENCIES, (1.5,))))
     *_, last = diagnose_subject(PendulumRig(), "drifting", fitted, held_out, DiagnosisSpec(), InProcessEvaluator())
     assert last.finding is not None
     return last.finding
@@ -48,19 +58,71 @@ def test_a_steady_pendulum_is_adequate_and_nothing_is_said_about_drift() -> None
     assert not [remark for remark in finding.remarks if "drift" in remark]
 
 
-@pytest.mark.parametrize("change", [0.05, 0.2])
-def test_a_stiffness_that_drifts_is_neither_adequate_nor_an_effect_of_the_library(change: float) -> None:
-    finding = diagnosed(change)
+@pytest.mark.parametrize(("change", "course"), [(0.05, FALLING), (0.2, FALLING), (0.1, DIPPING)])
+def test_a_stiffness_that_drifts_is_neither_adequate_nor_an_effect_of_the_library(
+    change: float, course: tuple[float, ...]
+) -> None:
+    finding = diagnosed(change, course=course)
     assert finding.verdict == "unnamed"
     (remark,) = [remark for remark in finding.remarks if "drifts" in remark]
     assert remark.startswith("the beat changes slowly during ")
     assert " mm, " in remark
+    assert finding.summary.endswith("something drifts, which may be the cause.")
 
 
-def test_a_recording_with_several_times_the_usual_noise_is_remarked() -> None:
-    fitted = (*recorded({}, frequencies=(1.2, 1.7, 2.0, 2.7)), *recorded({}, noise=1e-3, frequencies=(3.4,)))
-    *_, last = diagnose_subject(PendulumRig(), "loud", fitted, (), DiagnosisSpec(), InProcessEvaluator())
-    assert last.finding is not None
-    (remark,) = [remark for remark in last.finding.remarks if remark.startswith("the noise of ")]
-    assert fitted[-1].name in remark
-    assert "more than 3 times the usual 0.199 mm" in remark
+def test_no_place_is_claimed_where_only_a_drift_speaks_against_the_model() -> None:
+    finding = diagnosed(0.05)
+    where = finding.where
+    assert where is not None
+    assert (where.span, where.chord, where.phase, where.exponents) == (None, None, None, ())
+    assert (finding.missing, finding.law) == ((), None)
+    assert "the mean beat fits within the noise and shows no place" in finding.summary
+    assert "of the span" not in finding.summary
+
+
+def test_one_recording_that_drifts_among_many_is_enough() -> None:
+    """The root mean square over all recordings would hide it."""
+    others = tuple(1.2 + 0.2 * k for k in range(11))
+    steady = recorded({}, seed=5, frequencies=others, frames=248)
+    assert not drifts(WhitenedData.of(steady))
+    data = WhitenedData.of((*drifting(0.02, 1, (1.7,)), *steady))
+    assert drifts(data)
+    assert np.flatnonzero(data.drift).tolist() == [0]
+
+
+def test_an_effect_explains_a_drift_although_noise_remains() -> None:
+    noisy, quiet = drifting(0.03, 1, (1.7,)), recorded({}, seed=5, frequencies=(1.2, 2.7, 3.4), frames=248)
+    data = WhitenedData.of((*noisy, *quiet))
+    steady = recorded({}, seed=1, frequencies=(1.7,), frames=248)
+    before, left = (
+        data.change_of_beat(data.coefficients_of([r.values for r in (*one, *quiet)])) for one in (noisy, steady)
+    )
+    assert left < 0.1 * before
+
+
+@pytest.mark.parametrize(
+    ("size", "says"), [(1.0, "which may be the cause"), (0.2, "by too little to matter"), (0.0, "")]
+)
+def test_the_sentence_fits_the_verdict(size: float, says: str) -> None:
+    """Size of the drift of one recording, in its noise."""
+    drift = Drift(9.0, 1e-9, 1e-3 * size) if size else None
+    fits = [SimpleNamespace(drift=one) for one in (drift, None)]
+    recordings = [SimpleNamespace(name=name) for name in ("a", "b")]
+    every = np.array([size, 0.0])
+    data = SimpleNamespace(recordings=recordings, beat_fits=fits, tolerance=1e-4, drift=every, policy=POLICY)
+    sentence = drift_sentence(cast("WhitenedData", data))
+    assert says in sentence
+    assert bool(sentence) == bool(size)
+
+
+@pytest.mark.parametrize("others", [(1.7,), (1.2, 1.7, 2.0, 2.7)])
+def test_a_recording_with_several_times_the_noise_of_others_is_remarked(others: tuple[float, ...]) -> None:
+    loud = recorded({}, noise=1e-3, frequencies=(3.4,))
+    (remark,) = noise_remarks(WhitenedData.of((*recorded({}, frequencies=others), *loud)), "m")
+    assert remark.startswith(f"the noise of {loud[0].name} (0.993 mm) is more than 3 times the 0.19")
+    assert "of quieter recordings" in remark
+
+
+def test_recordings_without_noise_get_no_remark_on_it() -> None:
+    """Theirs is round-off, which differs by any factor."""
+    assert noise_remarks(WhitenedData.of(recorded({}, noise=0.0, frequencies=(1.2, 2.0, 3.4))), "m") == ()

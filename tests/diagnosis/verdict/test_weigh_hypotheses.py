@@ -259,7 +259,7 @@ def test_no_verdict_depends_on_the_unit_of_length(unit: float, nominal: float, e
                 effective_samples=36.0,
                 excess_standard_error=excess_standard_error * unit**2,
                 policy=POLICY,
-                drift=0.5 * unit,
+                drift=0.5,
                 change_of_beat=lambda power: power * unit**2,
             ),
         )
