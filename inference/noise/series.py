@@ -22,7 +22,7 @@ import scipy
 
 from wingfit.inference.noise.mean_beat import fourier_basis
 from wingfit.records.array_types import Array, Float
-from wingfit.records.series import Series
+from wingfit.records.series import Series, difference_of_repeats
 
 Source = Literal["repeats", "period", "stated", "highest frequencies"]
 
@@ -37,7 +37,6 @@ MEASURED_ERROR = 0.05  # the least for one that is estimated: it is not exactly 
 FLOOR = 1e-6  # of the largest value: smallest standard deviation
 QUANTUM = 1e-6  # relative distance from a multiple of the smallest step within which values are quantised
 EXCEEDS = 2.0  # times: a stated and an estimated standard deviation that differ by more get a remark
-SAME = 1e-6  # relative distance of times and settings of repeats
 
 
 @dataclass(frozen=True)
@@ -129,17 +128,12 @@ def _from_repeats(recordings: Sequence[Series]) -> Iterator[tuple[str, SeriesNoi
 
 def _check_repeat(first: Series, other: Series) -> None:
     """ValueError if ``other`` does not repeat the experiment of ``first``."""
-    same = len(first.times) == len(other.times) and np.allclose(
-        first.times, other.times, rtol=0.0, atol=SAME * max(float(np.ptp(first.times)), 1e-300)
-    )
-    settings = dict(first.settings) == dict(other.settings)
-    inputs = same and all(np.allclose(u, other.inputs[name], rtol=1e-3) for name, u in first.inputs.items())
-    for fine, what in ((same, "sample times"), (settings, "settings"), (inputs, "inputs")):
-        if not fine:
-            raise ValueError(
-                f"recordings {first.name!r} and {other.name!r} repeat {first.repeats!r}, but have different {what}; "
-                "resample them to the same, or remove 'repeats'"
-            )
+    what = difference_of_repeats(first, other)
+    if what:
+        raise ValueError(
+            f"recordings {first.name!r} and {other.name!r} repeat {first.repeats!r}, but have different {what}; "
+            "resample them to the same, or remove 'repeats'"
+        )
 
 
 def _from_period(recording: Series, high: Array) -> SeriesNoise:
