@@ -162,8 +162,5 @@ AnyDataset = Dataset | SeriesDataset
 def wing_or_vehicle(dataset: AnyDataset) -> Dataset:
     """Return ``dataset`` if it describes a wing or a vehicle; ValueError if it is a series of any other rig."""
     if isinstance(dataset, SeriesDataset):
-        raise ValueError(
-            f"dataset {dataset.name!r} is a series of rig {dataset.rig!r}; this needs a wing or a vehicle: a series is "
-            "diagnosed in Python, with your simulation of the rig"
-        )
+        raise ValueError(f"dataset {dataset.name!r} is a series of rig {dataset.rig!r}; this needs a wing or a vehicle")
     return dataset

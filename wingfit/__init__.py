@@ -25,11 +25,25 @@ if TYPE_CHECKING:
     from wingfit.client.transport import ServerAwayError, WingfitError
     from wingfit.diagnosis.finding import Finding
     from wingfit.diagnosis.spec import DiagnosisSpec
-    from wingfit.records import Condition, Dataset, DatasetError, Gene, Genome, Recording, load_dataset, save_dataset
+    from wingfit.records import (
+        Channel,
+        Condition,
+        Dataset,
+        DatasetError,
+        Gene,
+        Genome,
+        Quantity,
+        Recording,
+        Series,
+        SeriesDataset,
+        load_dataset,
+        save_dataset,
+    )
     from wingfit.report import finding_json, html
 
 __all__ = [
     "CalibrationSpec",
+    "Channel",
     "Client",
     "Condition",
     "Dataset",
@@ -40,9 +54,12 @@ __all__ = [
     "Gene",
     "GeneResult",
     "Genome",
+    "Quantity",
     "Recording",
     "RecordingResult",
     "Result",
+    "Series",
+    "SeriesDataset",
     "ServerAwayError",
     "WingfitError",
     "calibrate",
@@ -63,12 +80,16 @@ _MODULES = {
     "wingfit.diagnosis.finding": ("Finding",),
     "wingfit.diagnosis.spec": ("DiagnosisSpec",),
     "wingfit.records": (
+        "Channel",
         "Condition",
         "Dataset",
         "DatasetError",
         "Gene",
         "Genome",
+        "Quantity",
         "Recording",
+        "Series",
+        "SeriesDataset",
         "load_dataset",
         "save_dataset",
     ),

@@ -12,14 +12,14 @@ from wingfit.calibration.spec import CalibrationSpec
 from wingfit.calibration.summary import summarise
 from wingfit.diagnosis import DiagnosisSpec, Finding
 from wingfit.diagnosis import diagnose as steps_of
-from wingfit.records import Dataset
+from wingfit.records import AnyDataset, wing_or_vehicle
 from wingfit.workers import RunningEvaluator, make_evaluator
 
 OnProgress = Callable[[float, str], object]
 
 
 def calibrate(
-    dataset: Dataset,
+    dataset: AnyDataset,
     spec: CalibrationSpec | None = None,
     *,
     workers: int = 1,
@@ -41,22 +41,22 @@ def calibrate(
         A :class:`Result` for a wing (distances in m), a :class:`ForceResult` for a vehicle (forces in N).
 
     Raises:
-        ValueError: the spec does not fit the dataset.
+        ValueError: the spec does not fit the dataset, or the dataset is of neither a wing nor a vehicle.
     """
-    spec = spec or CalibrationSpec()
+    known, spec = wing_or_vehicle(dataset), spec or CalibrationSpec()
     checkpoint = None
     with _evaluator(workers) as evaluator:
-        for generation in generations_of(spec, dataset, evaluator):
+        for generation in generations_of(spec, known, evaluator):
             checkpoint = generation.checkpoint
             if on_progress:
                 on_progress(generation.progress, generation.stage)
         if checkpoint is None:
             raise ValueError("the search ended without a generation; check max_generations")
-        return summarise(spec, dataset, evaluator, checkpoint)
+        return summarise(spec, known, evaluator, checkpoint)
 
 
 def diagnose(
-    dataset: Dataset,
+    dataset: AnyDataset,
     spec: DiagnosisSpec | None = None,
     *,
     workers: int = 1,
@@ -77,7 +77,7 @@ def diagnose(
         ValueError: the spec does not fit the dataset, or the dataset cannot be diagnosed; the message says why.
     """
     with _evaluator(workers) as evaluator:
-        for progress in steps_of(dataset, spec or DiagnosisSpec(), evaluator):
+        for progress in steps_of(wing_or_vehicle(dataset), spec or DiagnosisSpec(), evaluator):
             if on_progress:
                 on_progress(progress.fraction, progress.stage)
             if progress.finding is not None:

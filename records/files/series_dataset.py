@@ -64,7 +64,11 @@ def quantities(
 
 def describe_series(dataset: SeriesDataset) -> dict[str, object]:
     """Convert ``dataset``, without its samples, to the plain data of ``dataset.yaml``; nothing is checked."""
-    lists = {"channels": dataset.channels, "inputs": dataset.inputs, "settings": dataset.settings}
+    lists: dict[str, Sequence[Channel | Quantity]] = {
+        "channels": dataset.channels,
+        "inputs": dataset.inputs,
+        "settings": dataset.settings,
+    }
     return {
         "format_version": FORMAT_VERSION,
         "name": dataset.name,

@@ -12,7 +12,7 @@ from pydantic import ValidationError
 
 from wingfit.client.transport import WingfitError
 from wingfit.diagnosis.finding import Finding
-from wingfit.records import Dataset, load_dataset
+from wingfit.records import Dataset, load_dataset, wing_or_vehicle
 from wingfit.service.diagnoses.checks import checked
 from wingfit.service.diagnoses.diagnoser import Diagnoser
 from wingfit.service.diagnoses.requests import DiagnosisIn
@@ -53,7 +53,11 @@ def diagnose(path: Path, request: dict[str, Any], workers: int | None, on_progre
 
 def _loaded(path: Path) -> Dataset:
     try:
-        return load_dataset(path)
+        dataset = load_dataset(path)
     except ValueError as error:
         faults = [vars(fault) for fault in getattr(error, "errors", [])]
         raise WingfitError(f"{path} is not a valid dataset", "" if faults else str(error), errors=faults) from error
+    try:
+        return wing_or_vehicle(dataset)
+    except ValueError as error:
+        raise WingfitError(f"{path} cannot be diagnosed here", str(error)) from error

@@ -14,7 +14,7 @@ import pytest
 from tests.docs.pages import blocks
 from tests.records.malformed import YAML, error_of_zip, good_files, with_yaml, zipped
 from tests.records.vehicles import good_vehicle, vehicle_yaml
-from wingfit.records import FourBarDrive, LowPass, load_archive
+from wingfit.records import FourBarDrive, LowPass, load_archive, wing_or_vehicle
 from wingfit.records import limits as limits_module
 from wingfit.records.description.schema import dataset_schema, schema_text
 from wingfit.records.description.yaml_text import read_yaml
@@ -110,7 +110,7 @@ def test_the_schema_refuses_the_same_of_a_vehicle(old: str, new: str) -> None:
 
 
 def test_the_vehicle_of_the_page_loads() -> None:
-    dataset = load_archive(zipped(vehicle_example()), "page.zip")
+    dataset = wing_or_vehicle(load_archive(zipped(vehicle_example()), "page.zip"))
     assert [r.name for r in dataset.fitted] == ["hover"]
     assert math.isclose(dataset.recordings[0].condition.angle_of_attack, math.radians(83.0))
     assert dataset.vehicle.motion.root_pitch == math.pi / 2
@@ -126,7 +126,7 @@ def test_the_vehicle_of_the_page_loads() -> None:
 
 
 def test_the_example_of_the_page_loads() -> None:
-    dataset = load_archive(zipped(example()), "page.zip")
+    dataset = wing_or_vehicle(load_archive(zipped(example()), "page.zip"))
     assert [r.name for r in dataset.fitted] == ["vacuum-3hz"]
     assert math.isclose(dataset.recordings[0].condition.phase_lag, math.radians(7.0))
     assert dataset.recordings[0].condition.pressure == 1000.0
@@ -139,7 +139,7 @@ def test_the_four_bar_of_the_page_loads() -> None:
     text = block("falcon/dataset.yaml")
     start, end = text.index("  drive:"), text.index("  estimates:")
     files = {**example(), YAML: (text[:start] + block("four-bar.yaml") + text[end:]).encode()}
-    drive = load_archive(zipped(files), "page.zip").wing.drive
+    drive = wing_or_vehicle(load_archive(zipped(files), "page.zip")).wing.drive
     assert drive == FourBarDrive(0.06, 0.012, 0.055, 0.03, -math.pi / 2)
 
 
