@@ -4,7 +4,7 @@ The noise of a channel is described by its standard deviation and by its spectra
 discrete cosine transform of its samples (orthonormal, type II). White noise of variance s has density s at all of them.
 
 - **Repeats**: recordings of one experiment differ by noise alone. The density is that of their differences.
-- **Period**: what is left of a periodic recording after its harmonics is noise (at least three periods).
+- **Period**: the residual of a periodic recording after its harmonics is noise (at least three periods).
 - **Stated**: white noise of the stated standard deviation.
 - **Highest frequencies**: sampled fast enough, a motion has no power in the upper half of the frequencies, and white
   noise has. This is refused where the power there is not flat, since then it is not white noise, or not noise.
