@@ -78,6 +78,10 @@ def diagnose(
     report: ReportFile = None,
     as_json: FindingJson = False,
     local: Annotated[bool, typer.Option("--local", help="Compute here, without a server; DATASET is a path.")] = False,
+    rig: Annotated[
+        str | None,
+        typer.Option(metavar="RIG", help="With --local: your own simulation, as for 'wingfit rig check'. It is run."),
+    ] = None,
     workers: Annotated[
         int | None,
         typer.Option(min=1, max=MOST_WORKERS, help="With --local: number of processes; default: one per processor."),
@@ -88,12 +92,14 @@ def diagnose(
 
     Example: wingfit diagnose examples/robird --division 11 --report robird.html
     """
-    settings = o.settings(ctx, "dataset", "fixed", "report", "as_json", "local", "workers", "url")
+    settings = o.settings(ctx, "dataset", "fixed", "report", "as_json", "local", "rig", "workers", "url")
     if fixed:
         settings["fixed"] = o.read_genome(fixed, "--fixed")
     if local:
-        _diagnose_here(dataset, settings, workers, report, as_json=as_json)
+        _diagnose_here(dataset, settings, workers, report, rig, as_json=as_json)
         return
+    if rig is not None:
+        raise typer.BadParameter("your simulation runs on your machine; give it with --local", param_hint="--rig")
     if workers is not None:
         raise typer.BadParameter("the server has its own; give it with --local", param_hint="--workers")
     if dataset is None and run_id is None:
@@ -124,7 +130,13 @@ def _print_when_done(client: Client, diagnosis_id: str, report: Path | None, *, 
 
 
 def _diagnose_here(
-    dataset: str | None, settings: dict[str, Any], workers: int | None, report: Path | None, *, as_json: bool
+    dataset: str | None,
+    settings: dict[str, Any],
+    workers: int | None,
+    report: Path | None,
+    rig: str | None,
+    *,
+    as_json: bool,
 ) -> None:
     if "run_id" in settings:
         raise typer.BadParameter("runs are on a server; leave --run or --local out", param_hint="--run")
@@ -138,7 +150,7 @@ def _diagnose_here(
 
     try:
         with progress("diagnosing") as show:
-            finding = diagnose_here(path, settings, workers, show)
+            finding = diagnose_here(path, settings, workers, show, rig)
     except KeyboardInterrupt:
         note("\nthe diagnosis was stopped; nothing was stored")
         raise typer.Exit(INTERRUPTED) from None

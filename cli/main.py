@@ -10,7 +10,7 @@ import sys
 
 import typer
 
-from wingfit.cli import backup, campaigns, datasets, diagnose, effects, keys, runs, serve, simulate
+from wingfit.cli import backup, campaigns, datasets, diagnose, effects, keys, rigs, runs, serve, simulate
 from wingfit.cli.base.output import note
 from wingfit.cli.forces import free_flight, kinematics
 from wingfit.cli.forces import runs as force_runs
@@ -37,6 +37,7 @@ app.add_typer(diagnose.app, name="diagnoses")
 app.command()(simulate.simulate)
 app.command()(force_runs.models)
 app.command()(effects.effects)
+app.add_typer(rigs.app, name="rig")
 app.add_typer(keys.app, name="keys")
 app.command()(backup.backup)
 app.command()(backup.restore)

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple, Protocol, runtime_checkable
+from typing import NamedTuple, Protocol, cast
 
 from wingfit.records import Condition, Recording
 from wingfit.records.array_types import Array
@@ -62,7 +62,6 @@ class Subject(Protocol):
         ...
 
 
-@runtime_checkable
 class BeatSubject(Subject, Protocol):
     """A rig that flaps: it also knows the beat, where on a wing channels are measured, and what could be recorded."""
 
@@ -94,6 +93,6 @@ class BeatSubject(Subject, Protocol):
 
 def beat_subject(subject: Subject) -> BeatSubject:
     """Return ``subject``, a rig with a beat; TypeError for another."""
-    if not isinstance(subject, BeatSubject):
+    if not hasattr(subject, "beat_start_phase"):
         raise TypeError(f"{subject.description} has no beat")
-    return subject
+    return cast("BeatSubject", subject)

@@ -33,8 +33,8 @@ class Gene:
     nominal: float
     lower: float
     upper: float
-    scale: Scale
-    description: str
+    scale: Scale = "linear"
+    description: str = ""
     share_of: str | None = None
 
     def __post_init__(self) -> None:

@@ -9,7 +9,17 @@ from statistics import median
 from wingfit.diagnosis.finding import Finding, Interval, Overlay, Proof, RecordingMisfit
 from wingfit.report.layout import figure, panels
 from wingfit.report.markup import Markup, tag
-from wingfit.report.number_format import Scale, bounds, change, channel_scale, condition, number, shortened, stages
+from wingfit.report.number_format import (
+    Scale,
+    bounds,
+    change,
+    channel_scale,
+    condition,
+    number,
+    scale_for,
+    shortened,
+    stages,
+)
 from wingfit.report.svg import Axis, axis, curve, dots, drawing, legend, line, places, text, whisker, x_axis, y_axis
 
 WIDTH, LEFT, RIGHT = 360.0, 12.0, 348.0
@@ -97,14 +107,14 @@ def _recordings_caption(finding: Finding) -> str:
 
 def overlays(finding: Finding) -> Markup | None:
     """Draw recorded samples with both simulations, one small chart for each recorded channel; None without any."""
-    shown = [o for o in finding.overlays if o.phase][:MOST_OVERLAYS]
+    shown = [o for o in finding.overlays if o.recorded][:MOST_OVERLAYS]
     if not shown:
         return None
     scale = channel_scale(finding)
     left = len(finding.overlays) - len(shown)
     return figure(
         _overlays_caption(finding, shown, scale),
-        panels(*(_overlay(finding, o, scale) for o in shown), size="small"),
+        panels(*(_overlay(finding, o, _own_scale(o) or scale) for o in shown), size="small"),
         legend(("recorded", "recorded"), *((f"{stage}-line", name) for stage, name in stages(finding).items())),
         note=f"{left} more in the JSON." if left else None,
     )
@@ -112,12 +122,19 @@ def overlays(finding: Finding) -> Markup | None:
 
 def _overlays_caption(finding: Finding, shown: Sequence[Overlay], scale: Scale) -> str:
     """Return the typical distance between simulation and recording in one sentence."""
+    if finding.kind == "series":
+        return "Recorded and simulated samples of the channels that the added effects change most"
     before, after = (
         median([math.dist(o.recorded, getattr(o, name)) / len(o.phase) ** 0.5 for o in shown])
         for name in ("before", "after")
     )
     values = change(finding, scale.text(before), scale.text(after))
     return f"Median distance between simulated and recorded beats: {values}"
+
+
+def _own_scale(overlay: Overlay) -> Scale | None:
+    """Return a scale for an overlay with a unit of its own; None for one in the unit of the finding."""
+    return scale_for((*overlay.recorded, *overlay.before), overlay.unit) if overlay.unit else None
 
 
 def _recordings(finding: Finding, title: str, rows: Sequence[RecordingMisfit], along: Axis, scale: Scale) -> Markup:
@@ -137,12 +154,17 @@ def _recordings(finding: Finding, title: str, rows: Sequence[RecordingMisfit], a
 
 
 def _overlay(finding: Finding, overlay: Overlay, scale: Scale) -> Markup:
-    """Draw the recorded and simulated beat, and below it, to another scale, the residuals."""
+    """Draw the recorded and simulated beat or series, and below it, to another scale, the residuals."""
     left, right = 50.0, 292.0
     simulated = {name: [v * scale.factor for v in getattr(overlay, name)] for name in stages(finding)}
     recorded = [v * scale.factor for v in overlay.recorded]
     residuals = {n: [r - v for r, v in zip(recorded, values, strict=True)] for n, values in simulated.items()}
-    across = Axis(0, 1, left, right)
+    if overlay.times:
+        over, label, at, ticks = "time", "time, s", overlay.times, None
+        across = Axis(at[0], at[-1], left, right)
+    else:
+        over, label, at, ticks = "one beat", "phase of the beat", overlay.phase, BEATS
+        across = Axis(0, 1, left, right)
     up = axis([*recorded, *(v for values in simulated.values() for v in values)], 142, 42)
     rest = axis([v for values in residuals.values() for v in values], 226, 160, zero=True)
     title = shortened(overlay.channel, 28)
@@ -150,18 +172,18 @@ def _overlay(finding: Finding, overlay: Overlay, scale: Scale) -> Markup:
     return drawing(
         300,
         258,
-        f"{title}, {below}: recorded and simulated over one beat, and the residuals",
+        f"{title}, {below}: recorded and simulated over {over}, and the residuals",
         text(left, 14, title, class_="title"),
         text(left, 30, below, class_="tick"),
-        x_axis(across, 42, 226, "phase of the beat", BEATS),
+        x_axis(across, 42, 226, label, ticks),
         y_axis(up, left, right, scale.unit),
         y_axis(rest, left, right, f"residual, {scale.unit}", count=3),
         line(left, rest.at(0), right, rest.at(0), "axis"),
-        dots(places(across, overlay.phase, up, recorded), "samples"),
+        dots(places(across, at, up, recorded), "samples"),
         *(
-            curve(places(across, overlay.phase, on, values[name]), f"curve {name}")
+            curve(places(across, at, on, values[stage]), f"curve {stage}")
             for on, values in ((up, simulated), (rest, residuals))
-            for name in simulated
+            for stage in simulated
         ),
     )
 

@@ -24,7 +24,9 @@ class Scale(NamedTuple):
 
 
 def channel_scale(finding: Finding) -> Scale:
-    """Return the scale in which misfits and samples are shown: mm or mN."""
+    """Return the scale in which misfits are shown: mm, mN or, for series, multiples of the noise."""
+    if finding.unit == "noise":
+        return Scale(1.0, "× noise")
     return Scale(1e3, "mm" if finding.unit == "m" else "mN")
 
 

@@ -77,7 +77,7 @@ def _floors(finding: Finding) -> Markup:
     scale = channel_scale(finding)
     floors = finding.floors
     rows = [
-        ("noise, from the scatter between beats", floors.noise, "pale"),
+        ("noise" if finding.kind == "series" else "noise, from the scatter between beats", floors.noise, "pale"),
         ("tolerance of the simulation", floors.simulation, "pale"),
         ("floor: root sum of squares of these", floors.total, "strong"),
         ("nominal model, refitted", finding.strength * floors.noise, "plain"),

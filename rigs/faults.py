@@ -21,7 +21,7 @@ from wingfit.rigs.run import Run
 from wingfit.rigs.suspect import Family, Suspect
 
 LATEST = 20.0  # sampling intervals: longest delay and longest time constant of a filter
-GAIN = 2.0  # largest error of a gain, of 1; with -2 the sign is wrong
+GAIN = 0.3  # largest error of a gain, of 1
 RATE = 0.05  # largest error of the rate of a clock, of 1
 CROSSTALK = 0.5  # largest part of one channel that another shows, both relative to their ranges
 MAX_CROSSTALK = 12  # pairs of channels that are tried
@@ -132,7 +132,7 @@ def _suspect(name: str, title: str, family: Family, gene: tuple[str, str, float,
 def _of_channel(name: str, scales: Scales) -> Iterator[Fault]:
     span, unit, slow = scales.span[name], scales.units[name], LATEST * scales.interval
     rows: tuple[tuple[str, str, tuple[str, str, float, float], float, Change], ...] = (
-        ("gain", "gain error", ("error", "1", -GAIN - 0.5, GAIN), 0.05, _gain),
+        ("gain", "gain error", ("error", "1", -GAIN, GAIN), 0.05, _gain),
         ("offset", "offset", ("size", unit, -span, span), 0.1 * span, _offset),
         ("drift", "drift", ("size", unit, -span, span), 0.1 * span, _drift),
         ("delay", "delay", ("time", "s", -slow, slow), 0.1 * slow, _delay),
@@ -151,7 +151,7 @@ def _after(name: str, gene: str, change: Change) -> Callable[[Channels, Run, Val
 def _of_input(name: str, scales: Scales) -> Iterator[Fault]:
     span, unit, slow = scales.span[name], scales.units[name], LATEST * scales.interval
     rows: tuple[tuple[str, str, tuple[str, str, float, float], float, Change], ...] = (
-        ("gain", "gain error", ("error", "1", -GAIN - 0.5, GAIN), 0.05, _gain),
+        ("gain", "gain error", ("error", "1", -GAIN, GAIN), 0.05, _gain),
         ("offset", "offset", ("size", unit, -span, span), 0.1 * span, _offset),
         ("delay", "delay", ("time", "s", -slow, slow), 0.1 * slow, _delayed_input),
     )

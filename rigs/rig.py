@@ -34,6 +34,8 @@ class Rig:
             suspects.
         faults: whether faults of the channels and inputs (gain, delay and so on) are suspects as well.
         description: the nominal model in one line, for reports.
+        reference: where the rig was loaded from (:func:`wingfit.rigs.load.load_rig`), so that other processes can load
+            it; "" if it was not.
     """
 
     name: str
@@ -47,6 +49,15 @@ class Rig:
     ports: tuple[Port, ...] = ()
     faults: bool = True
     description: str = ""
+    reference: str = ""
+
+    def __reduce__(self) -> str | tuple[object, ...]:
+        """Pickle a rig that was loaded as its reference: its functions may not be importable elsewhere."""
+        if not self.reference:
+            return super().__reduce__()
+        from wingfit.rigs.load import load_rig  # it imports this module
+
+        return load_rig, (self.reference,)
 
     def __post_init__(self) -> None:
         for name in ("genes", "suspects", "recording_genes", "ports"):
@@ -67,6 +78,9 @@ class Rig:
             twice = [name for name, times in Counter(names).items() if times > 1]
             if twice:
                 raise ValueError(f"rig {self.name!r} has {what} {twice[0]!r} twice; give each a name of its own")
+        both = sorted(set(self.channels) & set(self.inputs))
+        if both:
+            raise ValueError(f"rig {self.name!r}: {both[0]!r} is a channel and an input; give one of them another name")
         for port in self.ports:
             if port.stiffness and port.stiffness not in own:
                 raise ValueError(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 
 import numpy as np
@@ -29,6 +29,10 @@ class RigModel:
     rig: Rig
     all_recordings: tuple[Series, ...]
     effects: tuple[str, ...] = ()
+
+    def __getstate__(self) -> dict[str, object]:
+        """Pickle the fields alone: laws and faults are made again from them."""
+        return {field.name: getattr(self, field.name) for field in fields(self)}
 
     @cached_property
     def _faults(self) -> dict[str, Fault]:
@@ -126,7 +130,8 @@ class RigModel:
         for name in self.effects:
             if name in self._laws:
                 port, law = self._laws[name]
-                at_ports.setdefault(port, []).append(law)
+                if any(values[size] != 0.0 for size in law.suspect.size_genes):  # else its memory is not integrated
+                    at_ports.setdefault(port, []).append(law)
         times = recording.times
         return Run(recording.name, times, recording.settings, dict(recording.inputs), times, values, at_ports)
 

@@ -7,6 +7,8 @@ The names below are public and documented; everything else in the package may ch
 raises :class:`DatasetError`, which lists what is wrong.
 - :func:`calibrate` estimates the genes of a model in this process, without a server; :func:`diagnose` reports which
 physics the model is missing.
+- :class:`Rig` is a rig with a simulation of the user's own; :class:`Suspect` an effect that it may be missing,
+:class:`Port` a place where laws may act, :class:`Run` what its simulation computes.
 
 ``import wingfit`` is fast: modules are imported when one of their names is first used.
 """
@@ -40,6 +42,10 @@ if TYPE_CHECKING:
         save_dataset,
     )
     from wingfit.report import finding_json, html
+    from wingfit.rigs.ports import Port
+    from wingfit.rigs.rig import Rig
+    from wingfit.rigs.run import Run, SimulationError
+    from wingfit.rigs.suspect import Suspect
 
 __all__ = [
     "CalibrationSpec",
@@ -54,13 +60,18 @@ __all__ = [
     "Gene",
     "GeneResult",
     "Genome",
+    "Port",
     "Quantity",
     "Recording",
     "RecordingResult",
     "Result",
+    "Rig",
+    "Run",
     "Series",
     "SeriesDataset",
     "ServerAwayError",
+    "SimulationError",
+    "Suspect",
     "WingfitError",
     "calibrate",
     "diagnose",
@@ -94,6 +105,10 @@ _MODULES = {
         "save_dataset",
     ),
     "wingfit.report": ("finding_json", "html"),
+    "wingfit.rigs.ports": ("Port",),
+    "wingfit.rigs.rig": ("Rig",),
+    "wingfit.rigs.run": ("Run", "SimulationError"),
+    "wingfit.rigs.suspect": ("Suspect",),
 }
 _MODULE_OF = {name: module for module, names in _MODULES.items() for name in names}
 

@@ -10,9 +10,10 @@ from wingfit.calibration.result import Result
 from wingfit.calibration.search import calibrate as generations_of
 from wingfit.calibration.spec import CalibrationSpec
 from wingfit.calibration.summary import summarise
-from wingfit.diagnosis import DiagnosisSpec, Finding
+from wingfit.diagnosis import DiagnosisSpec, Finding, Progress, diagnose_rig
 from wingfit.diagnosis import diagnose as steps_of
-from wingfit.records import AnyDataset, wing_or_vehicle
+from wingfit.records import AnyDataset, SeriesDataset, wing_or_vehicle
+from wingfit.rigs.rig import Rig
 from wingfit.workers import RunningEvaluator, make_evaluator
 
 OnProgress = Callable[[float, str], object]
@@ -59,6 +60,7 @@ def diagnose(
     dataset: AnyDataset,
     spec: DiagnosisSpec | None = None,
     *,
+    rig: Rig | None = None,
     workers: int = 1,
     on_progress: OnProgress | None = None,
 ) -> Finding:
@@ -70,6 +72,8 @@ def diagnose(
     Args:
         dataset: recordings, some of them held out: these are never fitted and test the explanation.
         spec: model, suspects (effects to consider) and thresholds; None: all effects that apply to this kind of rig.
+        rig: simulation of the rig that was recorded, if it is neither a wing nor a vehicle. With more than one worker,
+            its functions must be importable: defined at the top of a module.
         workers: number of processes that simulate, as in :func:`calibrate`.
         on_progress: called with the completed fraction, in [0, 1], and the name of the step.
 
@@ -77,12 +81,24 @@ def diagnose(
         ValueError: the spec does not fit the dataset, or the dataset cannot be diagnosed; the message says why.
     """
     with _evaluator(workers) as evaluator:
-        for progress in steps_of(wing_or_vehicle(dataset), spec or DiagnosisSpec(), evaluator):
+        for progress in _steps(dataset, rig, spec or DiagnosisSpec(), evaluator):
             if on_progress:
                 on_progress(progress.fraction, progress.stage)
             if progress.finding is not None:
                 return progress.finding
     raise ValueError("the diagnosis ended without a finding")
+
+
+def _steps(
+    dataset: AnyDataset, rig: Rig | None, spec: DiagnosisSpec, evaluator: RunningEvaluator
+) -> Iterator[Progress]:
+    if isinstance(dataset, SeriesDataset):
+        if rig is None:
+            raise ValueError(f"dataset {dataset.name!r} has series of rig {dataset.rig!r}; give its simulation as rig")
+        return diagnose_rig(rig, dataset, spec, evaluator)
+    if rig is not None:
+        raise ValueError(f"dataset {dataset.name!r} describes a {dataset.kind} rig of its own; leave out rig")
+    return steps_of(dataset, spec, evaluator)
 
 
 @contextmanager

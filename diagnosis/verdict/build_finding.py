@@ -185,10 +185,15 @@ def _unidentified_sizes(genes: Sequence[GeneValue], best: Refit) -> tuple[str, .
     return (f"these recordings do not identify {', '.join(open_)}: its interval is not bounded",) if open_ else ()
 
 
+def _bare(value: float, unit: str) -> str:
+    """Return ``value`` as :func:`amount` does, without its unit."""
+    return amount(value, unit).split(" ")[0]
+
+
 def _worsened(rows: Sequence[RecordingMisfit], best: Refit, unit: str) -> tuple[str, ...]:
     """Return a remark on recordings that fit worse with the added effects; empty if there are none."""
     worse = [
-        f"{row.name} from {amount(row.before.value, unit)} to {amount(row.after.value, unit)}"
+        f"{row.name} from {_bare(row.before.value, unit)} to {amount(row.after.value, unit)}"
         for row in rows
         if best.names and row.after.value > WORSE_FACTOR * row.before.value
     ]

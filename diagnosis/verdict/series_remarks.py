@@ -15,7 +15,8 @@ SOURCES = {
     "repeats": "the differences between repeats",
     "period": "the differences between periods",
     "stated": "what the dataset states",
-    "highest frequencies": "the highest frequencies, as white noise; slow noise is not in it",
+    "highest frequencies": "the highest frequencies, which show no slow noise; state it, or record repeats",
+    "resolution": "the resolution of the recorder",
 }
 
 
@@ -53,9 +54,9 @@ def _contradicted(data: WhitenedData) -> Iterator[str]:
     noises = data.series.noises if data.series else {}
     for c, channel in enumerate(data.recordings[0].channels):
         ratios = [
-            noises[one.name].high[c] / noises[one.name].standard_deviation[c]
+            noises[one.name].visible[c] / noises[one.name].standard_deviation[c]
             for one in data.recordings
-            if noises[one.name].source == "stated" and np.isfinite(noises[one.name].high[c])
+            if noises[one.name].source == "stated" and np.isfinite(noises[one.name].visible[c])
         ]
         if not ratios:
             continue

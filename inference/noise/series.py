@@ -5,9 +5,9 @@ discrete cosine transform of its samples (orthonormal, type II). White noise of 
 
 - **Repeats**: recordings of one experiment differ by noise alone. The density is that of their differences.
 - **Period**: the residual of a periodic recording after its harmonics is noise (at least three periods).
-- **Stated**: white noise of the stated standard deviation.
-- **Highest frequencies**: sampled fast enough, a motion has no power in the upper half of the frequencies, and white
-  noise has. This is refused where the power there is not flat, since then it is not white noise, or not noise.
+- **Stated**: noise of the stated standard deviation, of the colour that its visible part has.
+- **Highest frequencies**: sampled fast enough, a motion has no power at the highest frequencies, and noise has
+  (:mod:`wingfit.inference.noise.visible_noise`). Refused where the power there is not that of noise.
 """
 
 from __future__ import annotations
@@ -21,19 +21,18 @@ import numpy as np
 import scipy
 
 from wingfit.inference.noise.mean_beat import fourier_basis
+from wingfit.inference.noise.visible_noise import LEAST_SAMPLES, visible_noise
 from wingfit.records.array_types import Array, Float
 from wingfit.records.series import Series, difference_of_repeats
 
-Source = Literal["repeats", "period", "stated", "highest frequencies"]
+Source = Literal["repeats", "period", "stated", "highest frequencies", "resolution"]
+SOURCES: tuple[Source, ...] = ("highest frequencies", "resolution", "stated", "period", "repeats")  # least sure first
 
-LEAST_SAMPLES = 24  # of a channel whose noise is estimated from its highest frequencies
 LEAST_PERIODS = 3.0
 BANDS_PER_OCTAVE = 2.0
 LEAST_PER_BAND = 6  # coefficients
-FLAT_RATIO = 2.0  # largest ratio of the densities in two bands of white noise, beyond chance
-CHANCE = 3.0  # standard errors of that ratio
 STATED_ERROR = 0.15  # standard error of a stated variance, relative
-MEASURED_ERROR = 0.05  # the least for one that is estimated: it is not exactly white, or stationary
+MEASURED_ERROR = 0.05  # the least for one that is estimated: noise is not exactly stationary
 FLOOR = 1e-6  # of the largest value: smallest standard deviation
 QUANTUM = 1e-6  # relative distance from a multiple of the smallest step within which values are quantised
 EXCEEDS = 2.0  # times: a stated and an estimated standard deviation that differ by more get a remark
@@ -48,15 +47,14 @@ class SeriesNoise:
         density: [C, T] spectral density at the coefficients of the cosine transform, divided by the variance.
         relative_error: standard error of the variance, relative.
         source: where it comes from.
-        high: [C] standard deviation that white noise with the power of the highest frequencies would have; NaN if that
-            is not flat.
+        visible: [C] standard deviation of the noise that the highest frequencies show; NaN if they show none.
     """
 
     standard_deviation: Float[Array, " C"]
     density: Float[Array, "C T"]
     relative_error: float
     source: Source
-    high: Float[Array, " C"]
+    visible: Float[Array, " C"]
 
 
 class UnknownNoiseError(ValueError):
@@ -71,21 +69,41 @@ def noise_of(recordings: Sequence[Series]) -> dict[str, SeriesNoise]:
 
 def _alone(recording: Series) -> SeriesNoise:
     """Noise of a recording that was not repeated."""
-    high, error = _highest(recording)
+    visible = _visible(recording)
     if recording.period is not None and np.ptp(recording.times) >= LEAST_PERIODS * recording.period:
-        return _from_period(recording, high)
-    floor = _floor(recording)
-    stated = recording.standard_deviation
+        return _from_period(recording, visible)
+    channels = [_of_channel(recording, k) for k in range(len(recording.quantities))]
+    density = np.stack([own for _, own, _, _ in channels])
+    sources = {source for *_, source in channels}
+    return SeriesNoise(
+        np.maximum([deviation for deviation, *_ in channels], FLOOR * _largest(recording)),
+        density / np.maximum(density.mean(axis=1, keepdims=True), 1e-300),
+        max(error for _, _, error, _ in channels),
+        min(sources, key=SOURCES.index),
+        visible,
+    )
+
+
+def _of_channel(recording: Series, column: int) -> tuple[float, Array, float, Source]:
+    """Return standard deviation, density [T], relative error and source of the noise of one channel."""
+    values = recording.values[recording.valid[:, column], column]
+    stated, least = recording.quantities[column].standard_deviation, quantum(values) / np.sqrt(12.0)
+    frequency = np.arange(len(recording.times)) / (2.0 * len(recording.times))
+    own = visible_noise(values, stated)
+    density = own.density(frequency) if own else np.ones(len(frequency))
     if stated is not None:
-        white = np.ones(recording.values.T.shape)
-        return SeriesNoise(np.maximum(stated, floor), white, STATED_ERROR, "stated", high)
-    found = np.where([one.standard_deviation is None for one in recording.quantities], np.maximum(high, floor), np.nan)
-    for k, channel in enumerate(recording.quantities):
-        if channel.standard_deviation is not None:
-            found[k] = max(channel.standard_deviation, floor[k])
-        elif not np.isfinite(high[k]):
-            raise UnknownNoiseError(_unknown(recording, k))
-    return SeriesNoise(found, np.ones(recording.values.T.shape), error, "highest frequencies", high)
+        return max(stated, least), density, STATED_ERROR, "stated"
+    if own is not None and own.variance > least**2:
+        return float(np.sqrt(own.variance)), density, own.error, "highest frequencies"
+    if least > 0.0:
+        return least, np.ones(len(frequency)), STATED_ERROR, "resolution"
+    raise UnknownNoiseError(_unknown(recording, column))
+
+
+def _visible(recording: Series) -> Array:
+    """Return the standard deviation [C] of the noise that the highest frequencies show; NaN if they show none."""
+    found = [visible_noise(own[seen]) for own, seen in zip(recording.values.T, recording.valid.T, strict=True)]
+    return np.array([np.nan if one is None else np.sqrt(one.variance) for one in found])
 
 
 def _unknown(recording: Series, column: int) -> str:
@@ -93,7 +111,7 @@ def _unknown(recording: Series, column: int) -> str:
     why = (
         f"it has {count} samples, and an estimate needs {LEAST_SAMPLES}"
         if count < LEAST_SAMPLES
-        else "the power of its highest frequencies is not flat, so it is not white noise alone"
+        else "no frequency shows noise alone, or slower noise than it shows may be much larger"
     )
     return (
         f"recording {recording.name!r}: the noise of channel {name!r} is not known: {why}; state its "
@@ -123,7 +141,7 @@ def _from_repeats(recordings: Sequence[Series]) -> Iterator[tuple[str, SeriesNoi
         density = np.stack([smoothed(own) for own in power]) / variance[:, None]
         error = float(np.hypot(MEASURED_ERROR, np.sqrt(2.0 / ((len(group) - 1.0) * len(first.times)))))
         for one in group:
-            yield one.name, SeriesNoise(np.sqrt(variance), density, error, "repeats", _highest(one)[0])
+            yield one.name, SeriesNoise(np.sqrt(variance), density, error, "repeats", _visible(one))
 
 
 def _check_repeat(first: Series, other: Series) -> None:
@@ -136,7 +154,7 @@ def _check_repeat(first: Series, other: Series) -> None:
         )
 
 
-def _from_period(recording: Series, high: Array) -> SeriesNoise:
+def _from_period(recording: Series, visible: Array) -> SeriesNoise:
     """Noise of a periodic recording: what its harmonics leave."""
     times, period = recording.times, float(recording.period or 0.0)
     step = float(np.median(np.diff(times)))
@@ -151,56 +169,24 @@ def _from_period(recording: Series, high: Array) -> SeriesNoise:
     variance = np.maximum((left**2).sum(axis=0) / freedom, _floor(recording) ** 2)
     power = (cosine_transform(left) ** 2).T
     density = np.stack([smoothed(own) for own in power])
+    lowest = int(
+        2.0 * np.ptp(times) / period
+    )  # coefficients below the period: the fit has absorbed some of their noise
+    density[:, :lowest] = np.maximum(density[:, :lowest], density[:, lowest : 2 * lowest + 1].max(axis=1)[:, None])
     density = density / np.maximum(density.mean(axis=1, keepdims=True), 1e-300)
     error = float(np.hypot(MEASURED_ERROR, np.sqrt(2.0 / freedom.min())))
-    return SeriesNoise(np.sqrt(variance), density, error, "period", high)
+    return SeriesNoise(np.sqrt(variance), density, error, "period", visible)
 
 
-def _highest(recording: Series) -> tuple[Array, float]:
-    """Return the standard deviation [C] of white noise with the power of the highest frequencies, and its error.
-
-    NaN where that power is not flat, so that it is not that of white noise. The error is relative, of the variance.
-    """
-    found, counts = np.full(recording.values.shape[1], np.nan), [LEAST_SAMPLES]
-    for k, seen in enumerate(recording.valid.T):
-        values = recording.values[seen, k]
-        if len(values) >= LEAST_SAMPLES:
-            found[k] = np.sqrt(_flat_power(values))
-            counts.append(len(values))
-    return found, float(np.hypot(MEASURED_ERROR, np.sqrt(8.0 / min(counts[1:] or counts))))
-
-
-def _flat_power(values: Array) -> float:
-    """Return the density of ``values`` [T] in the upper half of their frequencies; NaN if it is not flat there.
-
-    Second differences remove trends, whose leakage would otherwise cover the noise; a taper that of the ends.
-    """
-    second = np.diff(values, 2)
-    taper = scipy.signal.windows.hann(len(second) + 2)[1:-1]
-    power = np.abs(np.fft.rfft(second * taper)) ** 2 / (taper**2).sum()
-    frequency = np.arange(len(power)) / len(second)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        density = power / (2.0 * np.sin(np.pi * frequency)) ** 4
-    upper = float(density[frequency >= 0.25].mean())
-    for low, middle, high in ((0.125, 0.25, 0.51), (0.25, 0.375, 0.51)):
-        one, other = ((density[(frequency >= a) & (frequency < b)]) for a, b in ((low, middle), (middle, high)))
-        if min(len(one), len(other)) < 3:
-            continue
-        by_chance = CHANCE * np.sqrt(2.0 * (1.0 / len(one) + 1.0 / len(other)))  # neighbours are not independent
-        ratio = np.log(max(one.mean(), 1e-300) / max(other.mean(), 1e-300))
-        if abs(ratio) <= np.log(FLAT_RATIO) + by_chance and (one.mean() > 0 or other.mean() > 0):
-            return upper
-    return 0.0 if upper == 0.0 else float("nan")
+def _largest(recording: Series) -> Array:
+    """Return the largest absolute value [C] of each channel."""
+    return np.asarray(np.maximum(np.where(recording.valid, np.abs(recording.values), 0.0).max(axis=0), 1e-290))
 
 
 def _floor(recording: Series) -> Array:
     """Return the least standard deviation [C]: that of rounding to the smallest step, or of round-off."""
-    found = np.zeros(recording.values.shape[1])
-    for k, seen in enumerate(recording.valid.T):
-        values = recording.values[seen, k]
-        largest = float(np.abs(values).max(initial=0.0))
-        found[k] = max(FLOOR * largest, quantum(values) / np.sqrt(12.0), 1e-300)
-    return found
+    steps = [quantum(own[seen]) for own, seen in zip(recording.values.T, recording.valid.T, strict=True)]
+    return np.asarray(np.maximum(np.array(steps) / np.sqrt(12.0), FLOOR * _largest(recording)))
 
 
 def quantum(values: Float[Array, " T"]) -> float:

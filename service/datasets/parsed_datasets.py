@@ -142,5 +142,5 @@ def _served(dataset: AnyDataset, label: str) -> Dataset:
     try:
         return wing_or_vehicle(dataset)
     except ValueError as error:
-        message = f"{error}; calibrate and diagnose it in Python, without a server"
+        message = f"{error}; diagnose it without a server: wingfit diagnose FOLDER --local --rig my_rig.py"
         raise fail(label, dataset.kind, message) from None

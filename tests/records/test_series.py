@@ -25,13 +25,13 @@ def test_a_wing_is_not_a_series() -> None:
         wing_or_vehicle(arm_dataset())
 
 
-def test_what_computes_with_beats_refuses_a_series(tmp_path: Path) -> None:
+def test_a_series_needs_the_simulation_of_its_rig(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=WRONG_KIND):
         wingfit.calibrate(arm_dataset())
-    with pytest.raises(ValueError, match=WRONG_KIND):
+    with pytest.raises(ValueError, match="has series of rig 'motor arm'; give its simulation as rig"):
         wingfit.diagnose(arm_dataset())
     save_dataset(arm_dataset(), tmp_path / "arm")
-    with pytest.raises(WingfitError, match=f"arm cannot be diagnosed here: {WRONG_KIND}"):
+    with pytest.raises(WingfitError, match="has series of rig 'motor arm': name its simulation"):
         local.diagnose(tmp_path / "arm", {}, 1, lambda *_: None)
 
 

@@ -15,7 +15,8 @@ from wingfit.diagnosis.verdict.proof import ResidualPair, _misfits
 def data(kind: str, recordings: int, channels: int) -> Any:
     """Recordings of a kind whose channels are all used."""
     beat_fit = SimpleNamespace(used=np.ones(channels, bool))
-    return SimpleNamespace(recordings=[SimpleNamespace(kind=kind)] * recordings, beat_fits=[beat_fit] * recordings)
+    recorded = [SimpleNamespace(kind=kind)] * recordings
+    return SimpleNamespace(kind=kind, recordings=recorded, reduced=[beat_fit] * recordings)
 
 
 def test_forces_are_bootstrapped_in_blocks_of_time() -> None:

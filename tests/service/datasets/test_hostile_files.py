@@ -118,7 +118,7 @@ def test_a_series_of_any_other_rig_is_refused_with_the_remedy(api: Api) -> None:
     (error,) = refused.json()["errors"]
     assert error["where"] == "wing.nc"
     assert "is a series of rig 'motor arm'; this needs a wing or a vehicle" in error["message"]
-    assert "in Python, without a server" in error["message"]
+    assert "wingfit diagnose FOLDER --local --rig my_rig.py" in error["message"]
     assert api.get("/v1/datasets")["items"] == []
 
 
