@@ -24,7 +24,7 @@ from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.problem import Problem, base_genome
 from wingfit.calibration.result import Result, judge
 from wingfit.calibration.search import CalibrationSpec, Generation, calibrate, model_for, prepare
-from wingfit.records import Dataset, Genome, load_dataset
+from wingfit.records import Dataset, Genome, load_dataset, wing_or_vehicle
 from wingfit.sim.virtual_rigs.campaign import (
     REFERENCE,
     Tracking,
@@ -158,7 +158,7 @@ def measure(kind: EvaluatorKind, seed: int, joint: bool) -> dict[str, Any]:
 
     ``kind``: of the evaluator; ``joint``: whether to search all genes at once too.
     """
-    dataset = load_dataset(EXAMPLE)
+    dataset = wing_or_vehicle(load_dataset(EXAMPLE))
     truth = read_truth(TRUTH)
     spec = CalibrationSpec(division="11", seed=seed)
     evaluator = make_evaluator(kind)

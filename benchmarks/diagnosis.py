@@ -26,7 +26,7 @@ from benchmarks.concealed.trials import FREQUENCIES, LAGS, THICK_PA, THIN_PA, Bu
 from wingfit.calibration.spec import CalibrationSpec
 from wingfit.cli.base.output import progress
 from wingfit.diagnosis import DiagnosisSpec, Progress, diagnose
-from wingfit.records import Dataset, load_dataset, save_dataset
+from wingfit.records import Dataset, load_dataset, save_dataset, wing_or_vehicle
 from wingfit.workers import EvaluatorKind, make_evaluator
 
 HIDDEN: Concealed = {"added_mass": {"strength": 1.0}}
@@ -60,7 +60,7 @@ def measured(path: Path, division: str, evaluator: EvaluatorKind, workers: int) 
     began = time.perf_counter()
     try:
         with progress("diagnosing") as tell:
-            for report in diagnose(load_dataset(path), spec, pool):
+            for report in diagnose(wing_or_vehicle(load_dataset(path)), spec, pool):
                 reports.append((time.perf_counter() - began, report))
                 tell(report.fraction, None, report.stage)
     finally:

@@ -25,7 +25,7 @@ from wingfit.calibration.estimates.linearised import free_genes, values_at
 from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.problem import Problem, base_genome
 from wingfit.calibration.search import CalibrationSpec, calibrate, model_for, prepare
-from wingfit.records import Dataset, load_dataset
+from wingfit.records import Dataset, load_dataset, wing_or_vehicle
 from wingfit.workers import EvaluatorKind, make_evaluator
 
 EXAMPLE = EXAMPLES / "robird"
@@ -105,7 +105,7 @@ def estimators(kind: EvaluatorKind = "processes", starts: int = 4, seed: int = 1
     ``kind``: of the evaluator; ``starts``: number of random starts of Gauss-Newton, which have one row: the median of
     those that reach the floor, with their number.
     """
-    dataset, evaluator = load_dataset(EXAMPLE), make_evaluator(kind)
+    dataset, evaluator = wing_or_vehicle(load_dataset(EXAMPLE)), make_evaluator(kind)
     try:
         _warm(dataset, evaluator)
         traces = {

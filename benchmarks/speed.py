@@ -34,7 +34,7 @@ from benchmarks.simulator import CONDITIONS, DIVISIONS, Peer, case, run_peer, se
 from wingfit.calibration.estimates.linearised import unit_at, values_at
 from wingfit.calibration.search import CalibrationSpec
 from wingfit.inference.differences import TANGENT_STEP, differences
-from wingfit.records import Condition, load_dataset, save_dataset
+from wingfit.records import Condition, load_dataset, save_dataset, wing_or_vehicle
 from wingfit.sim.kernels import LANES
 from wingfit.sim.solver.numerics import Numerics
 from wingfit.sim.virtual_rigs.campaign import blank_recording
@@ -114,7 +114,7 @@ def calibrations() -> dict[str, Any]:
     evaluator = make_evaluator("processes", WORKERS)
     try:
         spec = CalibrationSpec(division=str(BODIES), method="gauss_newton", mode="joint")
-        joint = calibration.run(spec, load_dataset(calibration.EXAMPLE), evaluator, "joint")
+        joint = calibration.run(spec, wing_or_vehicle(load_dataset(calibration.EXAMPLE)), evaluator, "joint")
     finally:
         evaluator.close()
     return {

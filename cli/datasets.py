@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -12,6 +12,9 @@ from wingfit.cli.base.output import Columns, emit, moment, number, progress, rec
 from wingfit.cli.jobs import upload as upload_dataset
 from wingfit.client import answers as a
 from wingfit.client.client import DEFAULT_URL, Client, WingfitError
+
+if TYPE_CHECKING:
+    from wingfit.records import Series, SeriesDataset
 
 app = typer.Typer(no_args_is_help=True, help="Upload, list, fetch, delete and check datasets.")
 
@@ -86,7 +89,7 @@ def check(path: Source) -> None:
 
     Example: wingfit datasets check my-campaign/
     """
-    from wingfit.records import Recording, load_dataset  # imported late: other commands start faster
+    from wingfit.records import Recording, SeriesDataset, load_dataset  # imported late: other commands start faster
 
     try:
         dataset = load_dataset(path)
@@ -94,6 +97,10 @@ def check(path: Source) -> None:
         faults = [vars(fault) for fault in getattr(error, "errors", [])]
         detail = f"{len(faults)} errors" if faults else str(error)
         raise WingfitError(f"{path} is not a valid dataset", detail, errors=faults) from error
+    if isinstance(dataset, SeriesDataset):
+        say(f"{path} is valid: '{dataset.name}', rig '{dataset.rig}'")
+        records(dataset.recordings, _series_columns(dataset))
+        return
     what = "wing" if dataset.kind == "tracks" else "vehicle"
     say(f"{path} is valid: '{dataset.name}', {what} '{dataset.rig.name}'")
     columns: Columns[Recording] = {
@@ -101,9 +108,24 @@ def check(path: Source) -> None:
         "rig": lambda r: r.rig,
         "use": lambda r: _use(held_out=r.name in dataset.held_out),
         ">frames": lambda r: len(r.times),
-        ">missing": lambda r: f"{100 * float((~r.valid).mean()) if r.valid.size else 0:.1f} %",
+        ">missing": lambda r: _missing(r.valid),
     }
     records(dataset.recordings, columns)
+
+
+def _series_columns(dataset: SeriesDataset) -> Columns[Series]:
+    return {
+        "recording": lambda r: r.name,
+        "use": lambda r: _use(held_out=r.name in dataset.held_out),
+        "repeats": lambda r: r.repeats or "–",
+        ">samples": lambda r: len(r.times),
+        ">duration": lambda r: number(float(r.times[-1] - r.times[0]), unit="s"),
+        ">missing": lambda r: _missing(r.valid),
+    }
+
+
+def _missing(valid: Any) -> str:
+    return f"{100 * float((~valid).mean()) if valid.size else 0:.1f} %"
 
 
 def _list(datasets: list[a.Dataset]) -> None:

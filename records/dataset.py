@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 
 from wingfit.records.array_types import Array, Bool, Float, Mask
+from wingfit.records.series import Series, SeriesDataset
 from wingfit.records.vehicle import Vehicle, WingMotion
 from wingfit.records.wing import Wing
 
@@ -149,3 +150,17 @@ class Dataset:
     def fitted(self) -> tuple[Recording, ...]:
         """Return the recordings that a calibration may fit: all that are not held out."""
         return tuple(r for r in self.recordings if r.name not in self.held_out)
+
+
+AnyRecording = Recording | Series
+"""A recording of a wing, of a vehicle, or of any other rig."""
+
+AnyDataset = Dataset | SeriesDataset
+"""Recordings of a wing, of a vehicle, or of any other rig."""
+
+
+def wing_or_vehicle(dataset: AnyDataset) -> Dataset:
+    """Return ``dataset`` if it describes a wing or a vehicle; ValueError if it is a series of any other rig."""
+    if isinstance(dataset, SeriesDataset):
+        raise ValueError(f"dataset {dataset.name!r} is a series of rig {dataset.rig!r}; this needs a wing or a vehicle")
+    return dataset

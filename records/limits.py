@@ -17,6 +17,7 @@ MAX_STATIONS = 500
 MAX_RODS = 50
 MAX_HARMONICS = 50
 MAX_ESTIMATES = 1000
+MAX_QUANTITIES = 1000  # channels of a series, at most; as many inputs, and settings
 
 MIN_FRAMES = 8  # instants in one recording, at least; fewer cannot resolve a beat
 MAX_ROWS = 200_000  # instants in one recording, at most

@@ -11,6 +11,9 @@ import numpy as np
 
 from wingfit.records.array_types import Array, Bool, Float, Mask
 
+SAME_TIMES = 1e-6  # of the duration: largest difference of the times of repeats
+SAME_INPUTS = 1e-3  # largest relative difference of their inputs
+
 
 @dataclass(frozen=True)
 class Quantity:
@@ -86,6 +89,19 @@ class Series:
     def valid(self) -> Bool[Mask, "T C"]:
         """True [T, C] where a value was recorded, False where it is missing (NaN)."""
         return np.isfinite(self.values)
+
+
+def difference_of_repeats(first: Series, other: Series) -> str | None:
+    """Return in what ``other`` does not repeat the experiment of ``first``, such as "settings"; None if it does."""
+    span = max(float(np.ptp(first.times)), 1e-300)
+    if len(first.times) != len(other.times) or not np.allclose(
+        first.times, other.times, rtol=0.0, atol=SAME_TIMES * span
+    ):
+        return "sample times"
+    if dict(first.settings) != dict(other.settings):
+        return "settings"
+    same = (np.allclose(samples, other.inputs[name], rtol=SAME_INPUTS) for name, samples in first.inputs.items())
+    return None if all(same) else "inputs"
 
 
 def recording_gene(gene: str, recording: str) -> str:

@@ -27,7 +27,20 @@ if TYPE_CHECKING:
     from wingfit.client.transport import ServerAwayError, WingfitError
     from wingfit.diagnosis.finding import Finding
     from wingfit.diagnosis.spec import DiagnosisSpec
-    from wingfit.records import Condition, Dataset, DatasetError, Gene, Genome, Recording, load_dataset, save_dataset
+    from wingfit.records import (
+        Channel,
+        Condition,
+        Dataset,
+        DatasetError,
+        Gene,
+        Genome,
+        Quantity,
+        Recording,
+        Series,
+        SeriesDataset,
+        load_dataset,
+        save_dataset,
+    )
     from wingfit.report import finding_json, html
     from wingfit.rigs.ports import Port
     from wingfit.rigs.rig import Rig
@@ -36,6 +49,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "CalibrationSpec",
+    "Channel",
     "Client",
     "Condition",
     "Dataset",
@@ -47,11 +61,14 @@ __all__ = [
     "GeneResult",
     "Genome",
     "Port",
+    "Quantity",
     "Recording",
     "RecordingResult",
     "Result",
     "Rig",
     "Run",
+    "Series",
+    "SeriesDataset",
     "ServerAwayError",
     "SimulationError",
     "Suspect",
@@ -74,12 +91,16 @@ _MODULES = {
     "wingfit.diagnosis.finding": ("Finding",),
     "wingfit.diagnosis.spec": ("DiagnosisSpec",),
     "wingfit.records": (
+        "Channel",
         "Condition",
         "Dataset",
         "DatasetError",
         "Gene",
         "Genome",
+        "Quantity",
         "Recording",
+        "Series",
+        "SeriesDataset",
         "load_dataset",
         "save_dataset",
     ),

@@ -12,7 +12,7 @@ from wingfit.calibration.spec import CalibrationSpec
 from wingfit.calibration.summary import summarise
 from wingfit.diagnosis import DiagnosisSpec, Finding, Progress, diagnose_rig
 from wingfit.diagnosis import diagnose as steps_of
-from wingfit.records import Dataset, SeriesDataset
+from wingfit.records import AnyDataset, SeriesDataset, wing_or_vehicle
 from wingfit.rigs.rig import Rig
 from wingfit.workers import RunningEvaluator, make_evaluator
 
@@ -20,7 +20,7 @@ OnProgress = Callable[[float, str], object]
 
 
 def calibrate(
-    dataset: Dataset,
+    dataset: AnyDataset,
     spec: CalibrationSpec | None = None,
     *,
     workers: int = 1,
@@ -42,22 +42,22 @@ def calibrate(
         A :class:`Result` for a wing (distances in m), a :class:`ForceResult` for a vehicle (forces in N).
 
     Raises:
-        ValueError: the spec does not fit the dataset.
+        ValueError: the spec does not fit the dataset, or the dataset is of neither a wing nor a vehicle.
     """
-    spec = spec or CalibrationSpec()
+    known, spec = wing_or_vehicle(dataset), spec or CalibrationSpec()
     checkpoint = None
     with _evaluator(workers) as evaluator:
-        for generation in generations_of(spec, dataset, evaluator):
+        for generation in generations_of(spec, known, evaluator):
             checkpoint = generation.checkpoint
             if on_progress:
                 on_progress(generation.progress, generation.stage)
         if checkpoint is None:
             raise ValueError("the search ended without a generation; check max_generations")
-        return summarise(spec, dataset, evaluator, checkpoint)
+        return summarise(spec, known, evaluator, checkpoint)
 
 
 def diagnose(
-    dataset: Dataset | SeriesDataset,
+    dataset: AnyDataset,
     spec: DiagnosisSpec | None = None,
     *,
     rig: Rig | None = None,
@@ -90,7 +90,7 @@ def diagnose(
 
 
 def _steps(
-    dataset: Dataset | SeriesDataset, rig: Rig | None, spec: DiagnosisSpec, evaluator: RunningEvaluator
+    dataset: AnyDataset, rig: Rig | None, spec: DiagnosisSpec, evaluator: RunningEvaluator
 ) -> Iterator[Progress]:
     if isinstance(dataset, SeriesDataset):
         if rig is None:

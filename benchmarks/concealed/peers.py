@@ -25,7 +25,7 @@ from benchmarks.concealed.score import WORSE, Mark, blank, side_of
 from benchmarks.concealed.strength import Refit, rms, stacked
 from wingfit.calibration.spec import CalibrationSpec, model_for
 from wingfit.diagnosis.rigs import subject_of
-from wingfit.records import Recording, load_dataset
+from wingfit.records import Recording, load_dataset, wing_or_vehicle
 from wingfit.rigs.suspect import Suspect
 from wingfit.sim.wing.flexible_wing import FlexibleWing
 
@@ -93,7 +93,7 @@ def run(task: Task) -> tuple[PeerOutcome, PeerOutcome]:
 
 def gathered(task: Task) -> Material:
     """Refit the nominal model to the dataset of ``task``, and compute the input of both comparison methods."""
-    dataset = load_dataset(task.dataset)
+    dataset = wing_or_vehicle(load_dataset(task.dataset))
     spec = CalibrationSpec(without=task.without)
     spec = replace(spec, division=task.division) if task.division else spec
     model, fitted = model_for(dataset, spec), dataset.fitted

@@ -22,7 +22,7 @@ from benchmarks.concealed.plant.law import Concealed
 from benchmarks.concealed.seal import read, seal
 from benchmarks.concealed.strength import Refit, rms, stacked, strength_for
 from benchmarks.concealed.trials import Trial, conditions, name_of
-from wingfit.records import Condition, Dataset, Recording, load_dataset, save_dataset
+from wingfit.records import Condition, Dataset, Recording, load_dataset, save_dataset, wing_or_vehicle
 
 Array = npt.NDArray[np.float64]
 
@@ -137,7 +137,7 @@ def make(order: Order) -> str:
 
 def add(order: Addition) -> None:
     """Record one more condition of a trial's rig, and save the dataset extended by it."""
-    dataset, answer = load_dataset(order.dataset), read(order.sealed / f"{order.trial.name}.json")
+    dataset, answer = wing_or_vehicle(load_dataset(order.dataset)), read(order.sealed / f"{order.trial.name}.json")
     hidden = {secret.name: dict(secret.parameters) for secret in answer.secrets}
     bench = bench_of(order.trial.build)
     specimen = Specimen(bench, answer.seed, answer.attempt, answer.genome, hidden, answer.level)

@@ -10,7 +10,7 @@ from wingfit.calibration.spec import CalibrationSpec
 from wingfit.diagnosis import DiagnosisSpec, diagnose
 from wingfit.diagnosis.finding import Finding
 from wingfit.diagnosis.policy import POLICY, Policy
-from wingfit.records import load_dataset
+from wingfit.records import load_dataset, wing_or_vehicle
 from wingfit.workers import make_evaluator
 
 
@@ -47,7 +47,9 @@ def run(task: Task) -> Outcome:
         calibration = replace(calibration, division=task.division)
     evaluator = make_evaluator("in_process")
     try:
-        for progress in diagnose(load_dataset(task.dataset), DiagnosisSpec(calibration, policy=task.policy), evaluator):
+        for progress in diagnose(
+            wing_or_vehicle(load_dataset(task.dataset)), DiagnosisSpec(calibration, policy=task.policy), evaluator
+        ):
             finding = progress.finding
         reason = "" if finding else "it ended without a finding"
     except Exception as error:  # a crash counts as a failed trial; the other trials continue

@@ -8,7 +8,7 @@ from decimal import Decimal
 import numpy as np
 
 from wingfit.records.array_types import Array, Float
-from wingfit.records.description.dataset_file import DatasetFile, VehicleDatasetFile
+from wingfit.records.description.dataset_file import DatasetFile, SeriesDatasetFile, VehicleDatasetFile
 from wingfit.records.description.fields import FourierFile
 from wingfit.records.description.vehicle_file import MotionFile, VehicleFile, VehicleRecordingFile
 from wingfit.records.description.wing_file import StationFile, WingFile
@@ -18,11 +18,15 @@ from wingfit.records.limits import MAX_OPEN_AT_START, PLANFORM_MARGIN
 from wingfit.records.vehicle import WINGS
 
 Inconsistency = tuple[Path, object, str]
+TIME = "time_s"  # the column of times
 
 
 def inconsistencies(dataset: DatasetFile) -> Iterator[Inconsistency]:
     """Yield every inconsistency between values of ``dataset``: path of keys in the file, wrong value, message."""
-    yield from _vehicle(dataset) if isinstance(dataset, VehicleDatasetFile) else _wing(dataset.wing)
+    if isinstance(dataset, SeriesDatasetFile):
+        yield from _series(dataset)
+    else:
+        yield from _vehicle(dataset) if isinstance(dataset, VehicleDatasetFile) else _wing(dataset.wing)
     recordings = [recording.name for recording in dataset.recordings]
     yield from _unique(("recordings",), recordings, "name", ignore_case=True)
     yield from _references(("held_out",), dataset.held_out, recordings, "recording")
@@ -58,6 +62,34 @@ def _vehicle(dataset: VehicleDatasetFile) -> Iterator[Inconsistency]:
             yield (*path, "mass_kg"), mass, message
         if vehicle.claps and part.motion is not None:
             yield from _starts_closed(part.motion, (*path, "motion", "flap"))
+
+
+def _series(dataset: SeriesDatasetFile) -> Iterator[Inconsistency]:
+    seen: dict[str, str] = {}
+    for key in ("channels", "inputs", "settings"):
+        for index, name in enumerate(quantity.name for quantity in getattr(dataset, key)):
+            here = f"{key}[{index}]"
+            if name.lower() == TIME:
+                message = f"is {name!r}, the name of the column of times; name the quantity otherwise"
+                yield (key, index, "name"), name, message
+            elif name in seen:
+                message = (
+                    f"{name!r} is also the name of {seen[name]}; channels, inputs and settings each need a name of "
+                    "their own: rename one, or remove it"
+                )
+                yield (key, index, "name"), name, message
+            seen.setdefault(name, here)
+    known = [setting.name for setting in dataset.settings]
+    for index, recording in enumerate(dataset.recordings):
+        path = ("recordings", index, "settings")
+        for name in recording.settings:
+            if name not in known:
+                remedy = f"remove it, or list it under settings with its unit; {nearest(name, known)}"
+                yield (*path, name), name, f"no setting is called {name!r}; {remedy}"
+        for name in known:
+            if name not in recording.settings:
+                message = f"recording {recording.name!r} does not state the setting {name!r}; add its value"
+                yield path, None, message
 
 
 def _starts_closed(motion: MotionFile, path: Path) -> Iterator[Inconsistency]:

@@ -18,7 +18,7 @@ from pydantic import BaseModel
 
 from wingfit.records.array_types import Array, Float
 from wingfit.records.dataset import Condition, Recording
-from wingfit.records.description.dataset_file import DatasetFile, VehicleDatasetFile
+from wingfit.records.description.dataset_file import VehicleDatasetFile, WingDatasetFile
 from wingfit.records.description.fields import models_in, tag_of
 from wingfit.records.description.vehicle_file import VehicleFile, VehicleRecordingFile
 from wingfit.records.description.wing_file import WingFile, WingRecordingFile
@@ -36,7 +36,7 @@ _UNITS = {"deg": DEG, "mbar": MBAR, "c": CELSIUS}
 _OTHER_NAMES = {"body_pitch_deg": "angle_of_attack_deg"}
 
 
-def to_rig(dataset: DatasetFile) -> Wing | Vehicle:
+def to_rig(dataset: WingDatasetFile | VehicleDatasetFile) -> Wing | Vehicle:
     """Convert the wing or vehicle of a checked description to its dataclass, in SI units."""
     if isinstance(dataset, VehicleDatasetFile):
         return to_dataclass(Vehicle, dataset.vehicle)

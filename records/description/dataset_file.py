@@ -13,9 +13,10 @@ from typing import Annotated, Literal
 from pydantic import BeforeValidator, Field
 
 from wingfit.records.description.fields import Name, Prose, Strict, Title, whole
+from wingfit.records.description.series_file import ChannelFile, QuantityFile, SeriesRecordingFile
 from wingfit.records.description.vehicle_file import VehicleFile, VehicleRecordingFile
 from wingfit.records.description.wing_file import WingFile, WingRecordingFile
-from wingfit.records.limits import MAX_RECORDINGS
+from wingfit.records.limits import MAX_QUANTITIES, MAX_RECORDINGS
 
 
 class _DatasetFile(Strict):
@@ -39,11 +40,29 @@ class VehicleDatasetFile(_DatasetFile):
     recordings: list[VehicleRecordingFile] = Field(min_length=1, max_length=MAX_RECORDINGS)
 
 
-DatasetFile = WingDatasetFile | VehicleDatasetFile
+class SeriesDatasetFile(_DatasetFile):
+    """A dataset of any other rig: its channels, inputs and settings, and recordings of these."""
+
+    rig: Title = Field(description="name of the rig")
+    channels: list[ChannelFile] = Field(min_length=1, max_length=MAX_QUANTITIES)
+    inputs: list[QuantityFile] = Field(default_factory=list, max_length=MAX_QUANTITIES)
+    settings: list[QuantityFile] = Field(default_factory=list, max_length=MAX_QUANTITIES)
+    recordings: list[SeriesRecordingFile] = Field(min_length=1, max_length=MAX_RECORDINGS)
+
+
+DatasetFile = WingDatasetFile | VehicleDatasetFile | SeriesDatasetFile
 
 
 def model_of(data: object) -> type[DatasetFile]:
-    """Return the model for unchecked ``data``: a wing's, unless it has no key ``wing`` but one like ``vehicle``."""
+    """Return the model for unchecked ``data``, by the keys that it has, even if they are misspelt.
+
+    It is that of a vehicle for a key like ``vehicle``, that of any other rig for ``rig`` or one like ``channels``, and
+    that of a wing for ``wing`` or if there is none of them.
+    """
     keys = [str(key) for key in data] if isinstance(data, Mapping) else []
-    meant = "wing" not in keys and difflib.get_close_matches("vehicle", keys, 1, 0.7)
-    return VehicleDatasetFile if meant else WingDatasetFile
+    if "wing" in keys:
+        return WingDatasetFile
+    if difflib.get_close_matches("vehicle", keys, 1, 0.7):
+        return VehicleDatasetFile
+    series = "rig" in keys or difflib.get_close_matches("channels", keys, 1, 0.7)
+    return SeriesDatasetFile if series else WingDatasetFile

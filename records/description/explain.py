@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from wingfit.records.description.consistency import inconsistencies
-from wingfit.records.description.dataset_file import DatasetFile, VehicleDatasetFile, WingDatasetFile, model_of
+from wingfit.records.description.dataset_file import (
+    DatasetFile,
+    SeriesDatasetFile,
+    VehicleDatasetFile,
+    WingDatasetFile,
+    model_of,
+)
 from wingfit.records.description.fields import models_in, tag_of
 from wingfit.records.description.quantity import FAULT, kind
 from wingfit.records.description.yaml_text import Document, Path
@@ -28,16 +34,27 @@ _KINDS = {
     "string_type": "text",
     "bool_type": "true or false",
 }
-_RIGS = {"wing": "a wing with tracks of markers", "vehicle": "a vehicle with forces"}
-_ROOTS: dict[str, type[DatasetFile]] = {"wing": WingDatasetFile, "vehicle": VehicleDatasetFile}
+_RIGS = {
+    "wing": "a wing with tracks of markers",
+    "vehicle": "a vehicle with forces",
+    "rig": "any other rig with channels",
+}
+_ROOTS: dict[str, type[DatasetFile]] = {
+    "wing": WingDatasetFile,
+    "vehicle": VehicleDatasetFile,
+    "rig": SeriesDatasetFile,
+}
+_NAMES = {"wing": "a wing", "vehicle": "a vehicle", "rig": "a rig with channels"}
 
 
 def check_description(document: Document) -> DatasetFile:
     """Validate the parsed ``dataset.yaml`` and return it as a model; DatasetError lists all errors."""
     faults, data = Faults(), document.data
-    if isinstance(data, Mapping) and "wing" in data and "vehicle" in data:
-        message = f"both 'wing' and 'vehicle' are described; a dataset is of {' or '.join(_RIGS.values())}: split it"
-        raise fail(document.where(("vehicle",)), None, message)
+    described = [key for key in _RIGS if isinstance(data, Mapping) and key in data]
+    if len(described) > 1:
+        both = " and ".join(map(repr, described[:2]))
+        message = f"both {both} are described; a dataset is of {_either(_RIGS.values())}: split it"
+        raise fail(document.where((described[1],)), None, message)
     root = model_of(data)
     try:
         checked = root.model_validate(data)
@@ -72,7 +89,7 @@ class _Explainer:
         what, location = error["type"], error["loc"]
         if what == "missing":
             if location in {("wing",), ("vehicle",)}:
-                return "there is neither 'wing' nor 'vehicle'; describe " + " or ".join(_RIGS.values())
+                return f"there is neither {' nor '.join(map(repr, _RIGS))}; describe {_either(_RIGS.values())}"
             return "this key is missing; add it (docs/formats.md)"
         if what == "extra_forbidden":
             return self._unknown_key(location)
@@ -86,10 +103,13 @@ class _Explainer:
         if renamed is not None:
             return f"unknown key {key!r}; write {renamed[-1]!r} and give the value in that unit"
         fields = self._fields(location)
-        this, that = ("wing", "vehicle") if self.root is WingDatasetFile else ("vehicle", "wing")
-        parent = tuple(that if part == this else part for part in location[:-1])
-        if any(key in model.model_fields for model in _models(_ROOTS[that], parent)):
-            return f"key {key!r} is for a {that}, this is a {this}; {nearest(key, fields)}"
+        this = next(name for name, root in _ROOTS.items() if root is self.root)
+        for that, root in _ROOTS.items():
+            if that == this:
+                continue
+            parent = tuple(that if part == this else part for part in location[:-1])
+            if any(key in model.model_fields for model in _models(root, parent)):
+                return f"key {key!r} is for {_NAMES[that]}, this is {_NAMES[this]}; {nearest(key, fields)}"
         return f"unknown key {key!r}; {nearest(key, fields)}"
 
     def _renamed(self, location: Location) -> Location | None:
@@ -122,6 +142,11 @@ def _plain_message(error: ErrorDetails) -> str:
     if what in _KINDS:
         return f"is {kind(value)}; it must be {_KINDS[what]}"
     return error["msg"]
+
+
+def _either(texts: Iterable[str]) -> str:
+    *first, last = texts
+    return f"{', '.join(first)} or {last}"
 
 
 def _stem(key: str) -> str:

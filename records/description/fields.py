@@ -26,15 +26,15 @@ GeneName = Annotated[
     str,
     text("[A-Za-z][A-Za-z0-9_]*", 100, "gene name", "a gene name starts with a letter: letters, digits and '_'"),
 ]
-_UNPRINTABLE = r"\x00-\x1f\x7f-\x9f\ud800-\udfff\ufeff\ufffe\uffff"
+UNPRINTABLE = r"\x00-\x1f\x7f-\x9f\ud800-\udfff\ufeff\ufffe\uffff"
 Title = Annotated[
     str,
-    text(rf"[^{_UNPRINTABLE}]+", 200, "title", "a title is one line of printable text, not empty", portable=False),
+    text(rf"[^{UNPRINTABLE}]+", 200, "title", "a title is one line of printable text, not empty", portable=False),
 ]
 Prose = Annotated[
     str,
     text(
-        rf"(?:[^{_UNPRINTABLE}]|[\t\n])*",
+        rf"(?:[^{UNPRINTABLE}]|[\t\n])*",
         20_000,
         "free text",
         "it must be printable text without control characters",

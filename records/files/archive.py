@@ -12,7 +12,7 @@ import zipfile
 import zlib
 from collections.abc import Sequence
 
-from wingfit.records.dataset import Dataset
+from wingfit.records.dataset import AnyDataset
 from wingfit.records.errors import Faults, check_most, fail
 from wingfit.records.files.folder import DESCRIPTION, contents, read_files
 from wingfit.records.limits import MAX_COMPRESSION_RATIO, MAX_ENTRIES, MAX_EXPANDED_BYTES, MIB, RATIO_FREE_BYTES
@@ -24,7 +24,7 @@ _JUNK = re.compile(r"(?:^|/)(?:__MACOSX/|\.DS_Store$|Thumbs\.db$|desktop\.ini$|\
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 
 
-def read_zip(data: bytes, label: str) -> Dataset:
+def read_zip(data: bytes, label: str) -> AnyDataset:
     """Read a dataset from the bytes of a zip, which holds the dataset's files or one folder with them.
 
     ``label`` names the zip in messages. DatasetError lists its errors.
@@ -47,7 +47,7 @@ def read_zip(data: bytes, label: str) -> Dataset:
     return read_files(label, list(entries), read)
 
 
-def write_zip(dataset: Dataset) -> bytes:
+def write_zip(dataset: AnyDataset) -> bytes:
     """Return the bytes of a zip of the dataset; the same dataset gives the same bytes."""
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w") as archive:

@@ -5,39 +5,72 @@ The same checks are made before a dataset is written.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from operator import attrgetter
+from typing import TypeVar
 
 import numpy as np
 
-from wingfit.records.dataset import Dataset, Recording
+from wingfit.records.dataset import AnyDataset, Dataset, Recording
 from wingfit.records.description.convert import RecordingFile, describe_recording, describe_rig, to_recording, to_rig
+from wingfit.records.description.dataset_file import SeriesDatasetFile
 from wingfit.records.description.explain import check_description
+from wingfit.records.description.series_file import SeriesRecordingFile
 from wingfit.records.description.yaml_text import Document
 from wingfit.records.errors import DatasetError, Faults, nearest
 from wingfit.records.files.forces import AXES
 from wingfit.records.files.plausibility import check_numbers
+from wingfit.records.files.series_dataset import (
+    check_attributes,
+    check_series,
+    check_together,
+    describe_series,
+    to_series,
+    to_series_dataset,
+)
 from wingfit.records.files.table import Samples, too_much
 from wingfit.records.limits import FORMAT_VERSION, MAX_VALUES
+from wingfit.records.series import Series, SeriesDataset
 from wingfit.records.vehicle import Vehicle
 
 ReadSamples = Callable[[str, int], Samples]
 At = Callable[[str, Samples, int], str]
+Entry = TypeVar("Entry", RecordingFile, SeriesRecordingFile)
 
 
 def assemble(
     document: Document, read: ReadSamples, where: Callable[[str], str], at: At, room: int = MAX_VALUES
-) -> Dataset:
+) -> AnyDataset:
     """Build the dataset described by ``document``, of at most ``room`` numbers; DatasetError lists the faults.
 
     ``read(name, room)`` returns the samples, at most ``room`` numbers, of the recording called ``name``. For messages,
     ``where(name)`` says where these samples are stored, and ``at(name, samples, row)`` where one row of them is.
     """
-    checked = check_description(document)
-    rig = to_rig(checked)
-    faults, recordings = Faults(), list[Recording]()
+    checked, faults = check_description(document), Faults()
+    if isinstance(checked, SeriesDatasetFile):
+        series = list[Series]()
+        for _, one, samples in _read_all(checked.recordings, read, room, faults):
+            series.append(to_series(checked, one, samples))
+            check_series(series[-1], where(one.name), partial(at, one.name, samples), faults)
+        faults.raise_any()
+        check_together(series, document, faults)
+        faults.raise_any()
+        return to_series_dataset(checked, series)
+    rig, recordings = to_rig(checked), list[Recording]()
     entries: Sequence[RecordingFile] = checked.recordings
+    for index, entry, samples in _read_all(entries, read, room, faults):
+        recording = to_recording(entry, samples, document, ("recordings", index), faults)
+        check_numbers(recording, rig, where(entry.name), partial(at, entry.name, samples), faults)
+        recordings.append(recording)
+    faults.raise_any()
+    return Dataset(checked.name, rig, tuple(recordings), tuple(checked.held_out), checked.description)
+
+
+def _read_all(
+    entries: Sequence[Entry], read: ReadSamples, room: int, faults: Faults
+) -> Iterator[tuple[int, Entry, Samples]]:
+    """Yield index, description and samples of each of ``entries`` that can be read, until ``faults`` are many."""
     for index, entry in enumerate(entries):
         try:
             samples = read(entry.name, room)
@@ -45,18 +78,16 @@ def assemble(
             faults.extend(error)
             continue
         room -= samples.values.size + samples.times.size
-        recording = to_recording(entry, samples, document, ("recordings", index), faults)
-        check_numbers(recording, rig, where(entry.name), partial(at, entry.name, samples), faults)
-        recordings.append(recording)
+        yield index, entry, samples
         if faults.full:
             break
-    faults.raise_any()
-    return Dataset(checked.name, rig, tuple(recordings), tuple(checked.held_out), checked.description)
 
 
-def checked_description(dataset: Dataset) -> dict[str, object]:
+def checked_description(dataset: AnyDataset) -> dict[str, object]:
     """Check ``dataset`` as reading does, and return the plain data of ``dataset.yaml``; DatasetError lists errors."""
     faults = Faults()
+    if isinstance(dataset, SeriesDataset):
+        return _checked_series(dataset, faults)
     for recording in dataset.recordings:
         _check_kind(recording, dataset, faults)
         _check_shapes(recording, faults)
@@ -72,6 +103,26 @@ def checked_description(dataset: Dataset) -> dict[str, object]:
         numbers += recording.values.size + recording.times.size
     if numbers > MAX_VALUES:
         faults.extend(too_much(f"dataset {dataset.name!r}"))
+    faults.raise_any()
+    return data
+
+
+def _checked_series(dataset: SeriesDataset, faults: Faults) -> dict[str, object]:
+    for recording in dataset.recordings:
+        check_attributes(recording, dataset, faults)
+    faults.raise_any()
+    data = describe_series(dataset)
+    document = Document(f"dataset {dataset.name!r}", data)
+    check_description(document)
+    numbers = 0
+    for recording in dataset.recordings:
+        where = f"recording {recording.name!r}"
+        check_series(recording, where, f"{where}, sample {{}}".format, faults)
+        numbers += recording.values.size + recording.times.size * (1 + len(recording.inputs))
+    if numbers > MAX_VALUES:
+        faults.extend(too_much(document.file))
+    faults.raise_any()
+    check_together(dataset.recordings, document, faults)
     faults.raise_any()
     return data
 

@@ -3,24 +3,28 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from wingfit.records.dataset import Dataset
-from wingfit.records.description.dataset_file import VehicleDatasetFile, model_of
+from wingfit.records.array_types import Array
+from wingfit.records.dataset import AnyDataset, AnyRecording
+from wingfit.records.description.dataset_file import SeriesDatasetFile, VehicleDatasetFile, model_of
 from wingfit.records.description.yaml_text import read_yaml, write_yaml
 from wingfit.records.errors import DatasetError, Faults, check_most, fail
 from wingfit.records.files.assemble import assemble, checked_description
 from wingfit.records.files.forces import read_forces
+from wingfit.records.files.series_dataset import samples_of
+from wingfit.records.files.series_table import Columns, read_series
 from wingfit.records.files.table import Samples, write_table
 from wingfit.records.files.tracks import read_tracks
 from wingfit.records.limits import MAX_ENTRIES, MAX_EXPANDED_BYTES, MIB
+from wingfit.records.series import Series
 
 DESCRIPTION = "dataset.yaml"
 RECORDINGS = "recordings"
 
 
-def read_folder(path: Path) -> Dataset:
+def read_folder(path: Path) -> AnyDataset:
     """Read the dataset in the folder ``path``; DatasetError lists its errors."""
     top = [file.name for file in path.iterdir() if file.is_file()]
     names = top + [f"{RECORDINGS}/{file.name}" for file in (path / RECORDINGS).glob("*") if file.is_file()]
@@ -36,7 +40,7 @@ def read_folder(path: Path) -> Dataset:
     return read_files(str(path), names, read)
 
 
-def read_files(label: str, names: list[str], contents_of: Callable[[str], bytes]) -> Dataset:
+def read_files(label: str, names: list[str], contents_of: Callable[[str], bytes]) -> AnyDataset:
     """Read a dataset from the files ``names`` (folders separated by "/"); DatasetError lists its errors.
 
     ``contents_of(name)`` returns the bytes of a file. ``label`` names the folder or zip in messages.
@@ -52,7 +56,10 @@ def read_files(label: str, names: list[str], contents_of: Callable[[str], bytes]
         if file not in names:
             place = ("recordings", listed.index(name), "name") if name in listed else ("recordings",)
             raise fail(document.where(place), name, _no_samples(file, names))
-        if model_of(document.data) is VehicleDatasetFile:
+        model = model_of(document.data)
+        if model is SeriesDatasetFile:
+            return read_series(contents_of(file), file, Columns.of(document), room)
+        if model is VehicleDatasetFile:
             return read_forces(contents_of(file), file, room)
         return read_tracks(contents_of(file), file, markers, room)
 
@@ -73,16 +80,25 @@ def read_files(label: str, names: list[str], contents_of: Callable[[str], bytes]
     return dataset
 
 
-def contents(dataset: Dataset) -> dict[str, bytes]:
+def contents(dataset: AnyDataset) -> dict[str, bytes]:
     """Return the contents of the files of ``dataset`` by file name; DatasetError if it violates the format."""
     files = {DESCRIPTION: write_yaml(checked_description(dataset)).encode()}
-    for recording in sorted(dataset.recordings, key=lambda r: r.name):
-        columns = [f"{channel}_{'n' if recording.forces else 'm'}" for channel in recording.channels]
-        files[sample_file(recording.name)] = write_table(columns, recording.times, recording.values).encode()
-    return files
+    for recording in dataset.recordings:
+        columns, values = _columns(recording)
+        files[sample_file(recording.name)] = write_table(columns, recording.times, values).encode()
+    return dict(sorted(files.items()))
 
 
-def write_folder(dataset: Dataset, path: Path) -> None:
+def _columns(recording: AnyRecording) -> tuple[Sequence[str], Array]:
+    """Return the names of the columns with the samples of ``recording``, and the values in them."""
+    if isinstance(recording, Series):
+        samples = samples_of(recording)
+        return samples.quantities, samples.values
+    unit = "n" if recording.forces else "m"
+    return [f"{channel}_{unit}" for channel in recording.channels], recording.values
+
+
+def write_folder(dataset: AnyDataset, path: Path) -> None:
     """Write ``dataset`` into the new or empty folder ``path``; DatasetError if ``path`` is anything else."""
     if path.exists() and (not path.is_dir() or any(path.iterdir())):
         raise fail(str(path), None, "exists and is not an empty folder; choose a new name or remove it first")

@@ -1,9 +1,9 @@
 """Reads and writes a dataset as a NetCDF-4 file: text of ``dataset.yaml`` as an attribute, one group per recording.
 
 Layout: root attributes ``format`` and ``dataset_yaml``; group ``recordings/<name>`` with ``time_s(time)`` and, NaN
-where missing, ``position_m(time, marker, axis)`` with ``marker(marker)`` or ``force_n(time, axis)`` with
-``axis(axis)``. Written with h5netcdf; read with h5py, because an uploaded HDF5 file can link to other files of the
-server and every such link must be refused.
+where missing, ``position_m(time, marker, axis)`` with ``marker(marker)``, ``force_n(time, axis)`` with ``axis(axis)``,
+or ``value(time, quantity)`` with ``quantity(quantity)``, the names of channels and inputs. Written with h5netcdf; read
+with h5py, because an uploaded HDF5 file can link to other files of the server and every such link must be refused.
 
 Sizes of items and chunks, and filters, are checked before anything is read, which limits the memory for a valid file. A
 damaged or malicious one can still make the HDF5 library loop, crash or exhaust memory; so uploaded files are read only
@@ -24,16 +24,25 @@ import numpy as np
 
 from wingfit.records import limits
 from wingfit.records.array_types import Array
-from wingfit.records.dataset import Dataset, Recording
-from wingfit.records.description.dataset_file import VehicleDatasetFile, model_of
+from wingfit.records.dataset import AnyDataset, AnyRecording
+from wingfit.records.description.dataset_file import (
+    DatasetFile,
+    SeriesDatasetFile,
+    VehicleDatasetFile,
+    WingDatasetFile,
+    model_of,
+)
 from wingfit.records.description.yaml_text import read_yaml, write_yaml
-from wingfit.records.errors import DatasetError, Faults, check_most, fail, shown
+from wingfit.records.errors import DatasetError, Faults, check_most, fail, nearest, shown
 from wingfit.records.files.assemble import assemble, check_markers, checked_description
 from wingfit.records.files.folder import RECORDINGS
 from wingfit.records.files.forces import AXES
 from wingfit.records.files.parsed import Parsed
+from wingfit.records.files.series_dataset import samples_of
+from wingfit.records.files.series_table import Columns
 from wingfit.records.files.table import Samples, too_much
 from wingfit.records.limits import MAX_CHUNK_BYTES, MAX_DESCRIPTION_BYTES, MIB
+from wingfit.records.series import Series
 
 FORMAT = "wingfit dataset"
 BLOCK = 2**20  # numbers
@@ -50,7 +59,24 @@ class Limit(NamedTuple):
     storage: bool
 
 
-def write_netcdf(dataset: Dataset) -> bytes:
+class _Layout(NamedTuple):
+    """Variables of a recording: ``values`` [T, C, ...] with ``inner`` dimensions, ``labels`` [C], at most ``most``."""
+
+    labels: str
+    values: str
+    inner: tuple[int, ...]
+    fitting: str
+    most: int
+
+
+_LAYOUTS: dict[type[DatasetFile], _Layout] = {
+    WingDatasetFile: _Layout("marker", "position_m", (3,), "[T], [M] and [T, M, 3]", limits.MAX_MARKERS),
+    VehicleDatasetFile: _Layout("axis", "force_n", (), "[T], [C] and [T, C]", limits.MAX_MARKERS),
+    SeriesDatasetFile: _Layout("quantity", "value", (), "[T], [C] and [T, C]", 2 * limits.MAX_QUANTITIES),
+}
+
+
+def write_netcdf(dataset: AnyDataset) -> bytes:
     """Return the bytes of a NetCDF-4 file with the dataset; DatasetError if the dataset violates the format."""
     text = write_yaml(checked_description(dataset))
     buffer = io.BytesIO()
@@ -63,10 +89,13 @@ def write_netcdf(dataset: Dataset) -> bytes:
     return buffer.getvalue()
 
 
-def _write_recording(group: Any, recording: Recording) -> None:
+def _write_recording(group: Any, recording: AnyRecording) -> None:
     labels: tuple[str, ...]
     dimensions: tuple[str, ...]
-    if recording.kind == "forces":
+    if isinstance(recording, Series):
+        samples = samples_of(recording)
+        dimensions, labels, name, unit, data = ("time", "quantity"), samples.quantities, "value", "", samples.values
+    elif recording.kind == "forces":
         dimensions, labels, name, unit, data = ("time", "axis"), recording.forces, "force_n", "N", recording.values
     else:
         dimensions, labels = ("time", "marker", "axis"), recording.markers
@@ -76,17 +105,18 @@ def _write_recording(group: Any, recording: Recording) -> None:
     group.create_variable(of, (of,), dtype=h5py.string_dtype(), data=np.array(labels, dtype=object))
     group.create_variable("time_s", ("time",), data=recording.times).attrs["units"] = "s"
     values = group.create_variable(name, dimensions, data=data, fillvalue=np.nan, compression="gzip", shuffle=True)
-    values.attrs["units"] = unit
+    if unit:
+        values.attrs["units"] = unit
 
 
-def read_netcdf(data: bytes, label: str) -> Dataset:
+def read_netcdf(data: bytes, label: str) -> AnyDataset:
     """Read a dataset from the bytes of a trusted NetCDF-4 file, called ``label`` in messages."""
     return parse_netcdf(io.BytesIO(data), label)[0]
 
 
 def parse_netcdf(
     opened: BinaryIO, label: str, most: int = limits.MAX_VALUES, *, storage: bool = True
-) -> tuple[Dataset, Parsed]:
+) -> tuple[AnyDataset, Parsed]:
     """Read a NetCDF-4 file of at most ``most`` numbers; return the dataset, and its text and samples as stored.
 
     ``label`` names the file in messages. ``storage``: refuse chunks, filters and fixed-length texts by which a small
@@ -110,9 +140,9 @@ def parse_netcdf(
             where = place(name)
             with _damage(where):
                 group = _group(listed, name, where)
-                forces = model_of(document.data) is VehicleDatasetFile
-                limit = Limit(room, most, storage)
-                samples[name] = _samples(group, where, None if forces else markers, limit)
+                model = model_of(document.data)
+                known = Columns.of(document).names if model is SeriesDatasetFile else tuple(markers)
+                samples[name] = _samples(group, where, _LAYOUTS[model], known, Limit(room, most, storage))
                 return samples[name]
 
         dataset = assemble(document, read, place, lambda name, _, row: f"{place(name)}, time index {row}", most)
@@ -171,29 +201,46 @@ def _variable(group: Any, name: str, where: str) -> Any:
     return variable
 
 
-def _samples(group: Any, where: str, known: list[str] | None, limit: Limit) -> Samples:
-    """Read the samples in ``group``: tracks of ``known`` markers, or forces if ``known`` is None."""
-    labels, name, inner = ("axis", "force_n", ()) if known is None else ("marker", "position_m", (3,))
-    times, values, names = (_variable(group, each, where) for each in ("time_s", name, labels))
+def _samples(group: Any, where: str, layout: _Layout, known: tuple[str, ...], limit: Limit) -> Samples:
+    """Read the samples in ``group``; ``known`` are the names of the wing's markers, or those of a series' columns."""
+    times, values, names = (_variable(group, each, where) for each in ("time_s", layout.values, layout.labels))
     frames = times.shape[0] if len(times.shape) == 1 else -1
-    if len(names.shape) != 1 or values.shape != (frames, *names.shape, *inner):
-        shapes = f"time_s {list(times.shape)}, {labels} {list(names.shape)}, {name} {list(values.shape)}"
-        fitting = "[T], [C] and [T, C]" if known is None else "[T], [M] and [T, M, 3]"
-        raise fail(where, list(values.shape), f"shapes {shapes} do not fit; they must be {fitting}")
-    check_most(where, "", names.size, limits.MAX_MARKERS, f"entries of {labels}", "remove some")
+    if len(names.shape) != 1 or values.shape != (frames, *names.shape, *layout.inner):
+        shapes = (
+            f"time_s {list(times.shape)}, {layout.labels} {list(names.shape)}, {layout.values} {list(values.shape)}"
+        )
+        raise fail(where, list(values.shape), f"shapes {shapes} do not fit; they must be {layout.fitting}")
+    check_most(where, "", names.size, layout.most, f"entries of {layout.labels}", "remove some")
     _check_size(times, values, where, limit)
-    found = _names(names, labels, where, limit)
+    found = _names(names, layout.labels, where, limit)
     instants, numbers = np.arange(frames), _numbers(values)
-    if known is not None:
+    if layout.labels == "marker":
         faults = Faults()
         check_markers(found, known, where, faults)
         faults.raise_any()
         return Samples(_numbers(times), numbers.reshape(frames, 3 * len(found)), instants, markers=found)
+    if layout.labels == "quantity":
+        _check_quantities(found, known, where)
+        return Samples(_numbers(times), numbers, instants, quantities=found)
     axes = tuple(axis for axis in AXES if axis in found)
     if not axes or len(axes) != len(found):
         raise fail(where, ", ".join(found), f"axis is {', '.join(found) or 'empty'}; it must hold x, z, or both")
     ordered = np.ascontiguousarray(numbers[:, [found.index(axis) for axis in axes]])
     return Samples(_numbers(times), ordered, instants, forces=axes)
+
+
+def _check_quantities(found: tuple[str, ...], known: tuple[str, ...], where: str) -> None:
+    """Raise DatasetError unless ``found`` are the ``known`` names of channels and inputs, in any order."""
+    faults = Faults()
+    for index, name in enumerate(found):
+        if name not in known:
+            faults.add(where, name, f"no channel or input is called {name!r}; {nearest(name, known)}")
+        elif name in found[:index]:
+            faults.add(where, name, f"quantity {name!r} appears twice; keep one")
+    for name in known:
+        if name not in found:
+            faults.add(where, name, f"quantity {name!r} is missing; add it (NaN where a channel was not recorded)")
+    faults.raise_any()
 
 
 def _numbers(variable: Any) -> Array:

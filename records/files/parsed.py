@@ -1,9 +1,9 @@
 """The internal storage format of a dataset, to which an uploaded NetCDF file is converted once.
 
 It is a zip that the service writes for its own use and does not accept as an upload: ``dataset.yaml`` byte for byte;
-``layout.json`` with the number of instants of each recording and its markers or axes of force; ``recordings/<name>.f8``
-with its times [T], then its values [T, C], as little-endian 64-bit numbers. Reading restores the same dataset, bit for
-bit.
+``layout.json`` with the number of instants of each recording and its markers, axes of force, or quantities of a series;
+``recordings/<name>.f8`` with its times [T], then its values [T, C], as little-endian 64-bit numbers. Reading restores
+the same dataset, bit for bit.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from typing import IO, Any
 import numpy as np
 
 from wingfit.records.array_types import Array
-from wingfit.records.dataset import Dataset
+from wingfit.records.dataset import AnyDataset
 from wingfit.records.description.yaml_text import read_yaml
 from wingfit.records.errors import DatasetError, fail
 from wingfit.records.files.assemble import assemble
@@ -49,7 +49,9 @@ class Parsed:
 def pack(parsed: Parsed, into: IO[bytes]) -> None:
     """Write ``parsed`` to ``into`` in the storage format, piece by piece; the same contents give the same bytes."""
     layout = {
-        n: {"instants": len(s.times), "markers": s.markers, "forces": s.forces} for n, s in parsed.samples.items()
+        name: {"instants": len(one.times), "markers": one.markers, "forces": one.forces}
+        | ({"quantities": one.quantities} if one.quantities else {})
+        for name, one in parsed.samples.items()
     }
     with zipfile.ZipFile(into, "w", zipfile.ZIP_DEFLATED, compresslevel=DEFLATE_LEVEL) as archive:
         for name, text in ((DESCRIPTION, parsed.description), (LAYOUT, json.dumps(layout).encode())):
@@ -62,7 +64,7 @@ def pack(parsed: Parsed, into: IO[bytes]) -> None:
                         stream.write(array[start : start + BLOCK].astype(NUMBER, copy=False).data)
 
 
-def load_parsed(data: bytes, label: str) -> Dataset:
+def load_parsed(data: bytes, label: str) -> AnyDataset:
     """Read the dataset that :func:`pack` wrote; ``label`` names it in messages. DatasetError if ``data`` is damaged."""
     try:
         _check_directory(data)
@@ -84,7 +86,7 @@ def _check_directory(data: bytes) -> None:
         raise ValueError(f"it lists {entries} entries over {size} bytes; at most {MAX_RECORDINGS + 2} were written")
 
 
-def _dataset(archive: zipfile.ZipFile, label: str) -> Dataset:
+def _dataset(archive: zipfile.ZipFile, label: str) -> AnyDataset:
     if any(entry.compress_type != zipfile.ZIP_DEFLATED or entry.flag_bits & 1 for entry in archive.infolist()):
         raise ValueError("an entry is not deflated, or is encrypted")
     document = read_yaml(_text(archive, DESCRIPTION), f"{label}: {DESCRIPTION}")
@@ -105,12 +107,13 @@ def _text(archive: zipfile.ZipFile, name: str) -> bytes:
 
 def _samples(archive: zipfile.ZipFile, name: str, layout: Mapping[str, Any], room: int) -> Samples:
     instants, markers, forces = int(layout["instants"]), tuple(layout["markers"]), tuple(layout["forces"])
-    channels = 3 * len(markers) + len(forces)
+    quantities = tuple(layout.get("quantities", ()))
+    channels = 3 * len(markers) + len(forces) + len(quantities)
     if not 0 <= instants * (1 + channels) <= room:
         raise too_much(name)
     with archive.open(_numbers(name)) as stream:
         times, values = _array(stream, (instants,)), _array(stream, (instants, channels))
-    return Samples(times, values, np.arange(instants), markers, forces)
+    return Samples(times, values, np.arange(instants), markers, forces, quantities)
 
 
 def _array(stream: IO[bytes], shape: tuple[int, ...]) -> Array:

@@ -25,13 +25,11 @@ def check_numbers(recording: Recording, rig: Wing | Vehicle, where: str, at: Loc
     """
     times, values, frames = recording.times, recording.values, len(recording.times)
     quantity = "force" if isinstance(rig, Vehicle) else "position"
-    if not limits.MIN_FRAMES <= frames <= limits.MAX_ROWS:
-        message = f"{frames} frames; it must be {limits.MIN_FRAMES} to {limits.MAX_ROWS}: record longer, or split it"
-        faults.add(where, frames, message)
+    check_frames(frames, where, faults)
     markers = len(recording.markers)
     if isinstance(rig, Wing) and not 1 <= markers <= limits.MAX_MARKERS:
         faults.add(where, markers, f"{markers} markers; it must be 1 to {limits.MAX_MARKERS}: add or remove some")
-    increasing = _check_times(times, at, faults)
+    increasing = check_times(times, at, faults)
     infinite = np.flatnonzero(np.isinf(values).any(axis=1))
     for row in infinite[:_SHOWN]:
         faults.add(at(int(row)), "inf", f"a {quantity} is infinite; it must be finite, or missing")
@@ -48,7 +46,14 @@ def check_numbers(recording: Recording, rig: Wing | Vehicle, where: str, at: Loc
         _check_clock(recording, where, at, faults)
 
 
-def _check_times(times: Float[Array, " T"], at: Locate, faults: Faults) -> bool:
+def check_frames(frames: int, where: str, faults: Faults, what: str = "frames") -> None:
+    """Add a fault if a recording has too few or too many ``frames``, called ``what`` in the message."""
+    if not limits.MIN_FRAMES <= frames <= limits.MAX_ROWS:
+        message = f"{frames} {what}; it must be {limits.MIN_FRAMES} to {limits.MAX_ROWS}: record longer, or split it"
+        faults.add(where, frames, message)
+
+
+def check_times(times: Float[Array, " T"], at: Locate, faults: Faults) -> bool:
     """Return whether the times [T] (s) are finite and increase; add faults for the first rows at which not."""
     bad = np.flatnonzero(~np.isfinite(times))
     for row in bad[:_SHOWN]:

@@ -6,7 +6,7 @@ import os
 import tempfile
 from pathlib import Path
 
-from wingfit.records.dataset import Dataset
+from wingfit.records.dataset import AnyDataset
 from wingfit.records.errors import check_most, fail, shown
 from wingfit.records.files.archive import read_zip, write_zip
 from wingfit.records.files.folder import read_folder, write_folder
@@ -25,7 +25,7 @@ _OTHERS = {
 }
 
 
-def load_dataset(path: str | Path) -> Dataset:
+def load_dataset(path: str | Path) -> AnyDataset:
     """Read the dataset in the folder, zip or NetCDF file ``path``; DatasetError lists its errors."""
     path = Path(path)
     if path.is_dir():
@@ -49,7 +49,7 @@ def is_netcdf(data: bytes) -> bool:
     return data[: len(_HDF5)] == _HDF5
 
 
-def load_archive(data: bytes, filename: str) -> Dataset:
+def load_archive(data: bytes, filename: str) -> AnyDataset:
     """Read a dataset from the bytes of a zip or NetCDF file; ``filename`` is used in messages only.
 
     DatasetError lists its errors. For untrusted NetCDF files use :func:`wingfit.records.files.confined.convert_netcdf`.
@@ -68,7 +68,7 @@ def load_archive(data: bytes, filename: str) -> Dataset:
     raise fail(label, data[:8].hex(" "), f"this is {found}")
 
 
-def save_dataset(dataset: Dataset, path: str | Path) -> None:
+def save_dataset(dataset: AnyDataset, path: str | Path) -> None:
     """Write ``dataset`` as zip (``.zip``), NetCDF (``.nc``) or folder (anything else).
 
     An existing file is replaced atomically; a folder must be new or empty. DatasetError if the dataset violates the

@@ -11,7 +11,7 @@ import io
 import math
 import re
 from array import array
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,8 +29,9 @@ _MISSING_WORDS = {"nan", "na", "n/a", "null", "none", "-", "--", "missing", "#n/
 
 @dataclass(frozen=True)
 class Samples:
-    """The numbers of a recording of ``markers`` or of ``forces`` (see :class:`wingfit.records.Recording`).
+    """The numbers of a recording of ``markers`` or of ``forces`` (see :class:`wingfit.records.Recording`), or a series.
 
+    ``quantities`` names the columns of ``values`` of a series: its channels, then its inputs.
     ``lines`` [T] are for messages: the line of a CSV file that holds each instant, or its index in other files.
     """
 
@@ -39,6 +40,7 @@ class Samples:
     lines: Int[Index, " T"]
     markers: tuple[str, ...] = ()
     forces: tuple[ForceAxis, ...] = ()
+    quantities: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -49,6 +51,7 @@ class Layout:
     columns: list[int]
     markers: tuple[str, ...] = ()
     forces: tuple[ForceAxis, ...] = ()
+    quantities: tuple[str, ...] = ()
 
 
 def write_table(columns: Sequence[str], times: Float[Array, " T"], values: Float[Array, "T C"]) -> str:
@@ -80,13 +83,16 @@ def read_table(raw: bytes, file: str, read_layout: Callable[[list[str], str], La
         message = f"not valid CSV: {error}; separate with commas, without stray quotes or NUL bytes"
         raise fail(f"{file}, line {reader.line_num}", None, message) from None
     values = np.ascontiguousarray(matrix[:, layout.columns])
-    return Samples(matrix[:, layout.time].copy(), values, lines, layout.markers, layout.forces)
+    return Samples(matrix[:, layout.time].copy(), values, lines, layout.markers, layout.forces, layout.quantities)
 
 
-def read_columns(header: Sequence[str], where: str, problem: Callable[[str], str | None]) -> dict[str, int]:
+def read_columns(
+    header: Sequence[str], where: str, problem: Callable[[str], str | None], known: Collection[str] = ()
+) -> dict[str, int]:
     """Check the names of the columns and return the index of each by name; DatasetError lists wrong names.
 
-    ``problem(name)`` returns what is wrong with a name other than ``time_s``, or None.
+    ``problem(name)`` returns what is wrong with a name other than ``time_s``, or None. ``known`` names may be such as
+    otherwise mean times in another unit.
     """
     for separator, word in ((";", "semicolons"), ("\t", "tabs")):
         if len(header) == 1 and separator in header[0]:
@@ -94,7 +100,7 @@ def read_columns(header: Sequence[str], where: str, problem: Callable[[str], str
             raise fail(where, header[0], message)
     columns, faults = dict[str, int](), Faults()
     for index, name in enumerate(header):
-        wrong = _column_problem(name, columns) or (problem(name) if name != "time_s" else None)
+        wrong = _column_problem(name, columns, known) or (problem(name) if name != "time_s" else None)
         if wrong:
             faults.add(f"{where}, column {index + 1}", name, wrong)
         columns.setdefault(name, index)
@@ -104,12 +110,12 @@ def read_columns(header: Sequence[str], where: str, problem: Callable[[str], str
     return columns
 
 
-def _column_problem(name: str, earlier: dict[str, int]) -> str | None:
+def _column_problem(name: str, earlier: dict[str, int], known: Collection[str]) -> str | None:
     if name in earlier:
         return f"column {name!r} is also column {earlier[name] + 1}; keep one"
     if not name:
         return "this column has no name; name it or remove the comma at the end of the lines"
-    if name != "time_s" and (name.lower() in _TIMES or name.lower() == "time_s"):
+    if name != "time_s" and name not in known and (name.lower() in _TIMES or name.lower() == "time_s"):
         return f"unknown column {name!r}; write 'time_s', with times in seconds"
     return None
 

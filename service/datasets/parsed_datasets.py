@@ -14,7 +14,8 @@ from typing import NamedTuple
 from sqlalchemy.exc import OperationalError
 from sqlalchemy.orm import Session
 
-from wingfit.records import Dataset, DatasetError
+from wingfit.records import AnyDataset, Dataset, DatasetError, wing_or_vehicle
+from wingfit.records.errors import fail
 from wingfit.records.files.confined import STORED, Limits, convert_netcdf
 from wingfit.records.files.parsed import load_parsed
 from wingfit.records.files.storage import is_netcdf, label_of
@@ -68,16 +69,17 @@ class Datasets:
         ``limits``: on time and memory of the process that reads NetCDF; None: those of an upload.
         """
         if not is_netcdf(archive):
-            return Opened(self._engine.load(archive, filename), None)
+            return Opened(_served(self._engine.load(archive, filename), label_of(filename)), None)
         label = label_of(filename)
         parsed = convert_netcdf(archive, label, limits)
-        return Opened(load_parsed(parsed, label), parsed)
+        return Opened(_served(load_parsed(parsed, label), label), parsed)
 
     def _load(self, dataset_id: str, filename: str) -> Dataset:
         with self._database.read() as session:
             parsed = store.parsed(session, dataset_id)
             archive = store.archive(session, dataset_id) if parsed is None else b""
-        return self._engine.load(archive, filename) if parsed is None else load_parsed(parsed, filename)
+        loaded = self._engine.load(archive, filename) if parsed is None else load_parsed(parsed, filename)
+        return _served(loaded, filename)
 
     def _is_old(self, dataset_id: str) -> bool:
         """Return whether an earlier version stored this NetCDF dataset without its form in the internal format."""
@@ -133,3 +135,12 @@ class Datasets:
         with self._lock:
             self._kept.pop(dataset_id, None)
             self._damaged.pop(dataset_id, None)
+
+
+def _served(dataset: AnyDataset, label: str) -> Dataset:
+    """Return ``dataset``, called ``label`` in messages; DatasetError for a kind that the server does not compute."""
+    try:
+        return wing_or_vehicle(dataset)
+    except ValueError as error:
+        message = f"{error}; diagnose it without a server: wingfit diagnose FOLDER --local --rig my_rig.py"
+        raise fail(label, dataset.kind, message) from None

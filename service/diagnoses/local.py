@@ -15,7 +15,7 @@ from wingfit.calibration.spec import CalibrationSpec
 from wingfit.client.transport import WingfitError
 from wingfit.diagnosis import DiagnosisSpec, Progress, diagnose_rig
 from wingfit.diagnosis.finding import Finding
-from wingfit.records import Dataset, SeriesDataset, load_dataset
+from wingfit.records import AnyDataset, Dataset, SeriesDataset, load_dataset
 from wingfit.rigs.load import RigError, load_rig
 from wingfit.service.diagnoses.checks import checked
 from wingfit.service.diagnoses.diagnoser import Diagnoser
@@ -99,7 +99,7 @@ def _steps_of_rig(dataset: SeriesDataset, request: dict[str, Any], rig: str | No
     return lambda evaluator: diagnose_rig(loaded, dataset, spec, evaluator)
 
 
-def _loaded(path: Path) -> Dataset | SeriesDataset:
+def _loaded(path: Path) -> AnyDataset:
     try:
         return load_dataset(path)
     except ValueError as error:

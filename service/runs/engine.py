@@ -16,7 +16,7 @@ from wingfit.calibration.problem import base_genome
 from wingfit.calibration.result import Comparison, GeneResult, Result
 from wingfit.calibration.search import CalibrationSpec, Generation
 from wingfit.calibration.spec import vehicle_model, wing_model
-from wingfit.records import Condition, Dataset, Recording, load_archive
+from wingfit.records import AnyDataset, Condition, Dataset, Recording, load_archive
 from wingfit.sim.wing.loads import simulate_outputs
 from wingfit.sim.wing.outputs import Outputs
 
@@ -28,7 +28,7 @@ class Engine:
     raise a ValueError with a message for the user if a request cannot be fulfilled.
     """
 
-    def load(self, data: bytes, filename: str) -> Dataset:
+    def load(self, data: bytes, filename: str) -> AnyDataset:
         """Parse ``data``, an uploaded zip called ``filename``; DatasetError says where it is malformed."""
         return load_archive(data, filename)
 

@@ -20,7 +20,7 @@ import numpy.typing as npt
 import scipy
 
 from wingfit.calibration.search import CalibrationSpec, calibrate, model_for
-from wingfit.records import Dataset, load_dataset
+from wingfit.records import Dataset, load_dataset, wing_or_vehicle
 from wingfit.workers.in_process import InProcessEvaluator
 
 Array = npt.NDArray[np.float64]
@@ -45,7 +45,7 @@ def motion(example: str, recordings: int, **settings: Any) -> Callable[[], Array
     """What the model of an example predicts for its first recordings: nominal genes, and two genomes near by."""
 
     def compute() -> Array:
-        dataset = load_dataset(EXAMPLES / example)
+        dataset = wing_or_vehicle(load_dataset(EXAMPLES / example))
         model = model_for(dataset, CalibrationSpec(**settings))
         rng = np.random.default_rng(7)
         nominal = np.array([gene.nominal for gene in model.genes])
@@ -61,7 +61,7 @@ def search(example: str, recordings: int, *, genes: bool = True, **settings: Any
     """The history of a short search in this process: fitness and, with ``genes``, best genome of each generation."""
 
     def compute() -> Array:
-        dataset = load_dataset(EXAMPLES / example)
+        dataset = wing_or_vehicle(load_dataset(EXAMPLES / example))
         names = tuple(recording.name for recording in _spread(dataset, recordings))
         spec = replace(CalibrationSpec(recordings=names, seed=3), **settings)
         generations = list(calibrate(spec, dataset, InProcessEvaluator()))

@@ -8,7 +8,7 @@ from dataclasses import fields, is_dataclass
 
 import numpy as np
 
-from wingfit.records import Dataset
+from wingfit.records import AnyDataset
 
 
 def fingerprint(value: object) -> object:
@@ -27,5 +27,5 @@ def fingerprint(value: object) -> object:
     return value
 
 
-def assert_same(a: Dataset, b: Dataset) -> None:
+def assert_same(a: AnyDataset, b: AnyDataset) -> None:
     assert fingerprint(a) == fingerprint(b)

@@ -24,7 +24,7 @@ from wingfit.calibration.problem import Evaluation, Problem, base_genome
 from wingfit.calibration.result import judge
 from wingfit.calibration.search import CalibrationSpec, calibrate, model_for, prepare
 from wingfit.diagnosis import DiagnosisSpec, diagnose_subject
-from wingfit.records import Dataset, load_dataset
+from wingfit.records import Dataset, load_dataset, wing_or_vehicle
 from wingfit.records.blas_threads import OneBlasThread
 from wingfit.workers.in_process import InProcessEvaluator
 
@@ -60,7 +60,7 @@ def bits(evaluation: Evaluation) -> list[object]:
 
 def problem(division: str = "11") -> tuple[Problem, np.ndarray[tuple[int, int], np.dtype[np.float64]]]:
     """The aerodynamic stage of the example campaign, and nine individuals."""
-    dataset, spec = load_dataset(EXAMPLE), CalibrationSpec(division=division)
+    dataset, spec = wing_or_vehicle(load_dataset(EXAMPLE)), CalibrationSpec(division=division)
     model, stage = model_for(dataset, spec), prepare(spec, dataset).stages[1]
     genes = [gene for gene in model.genes if gene.name in stage.free]
     rng = np.random.default_rng(0)
@@ -70,7 +70,7 @@ def problem(division: str = "11") -> tuple[Problem, np.ndarray[tuple[int, int], 
 
 def campaign() -> Dataset:
     """Two recordings of the example, 14,880 samples each: OpenBLAS splits sums of more than 10,000."""
-    dataset = load_dataset(EXAMPLE)
+    dataset = wing_or_vehicle(load_dataset(EXAMPLE))
     return replace(dataset, recordings=dataset.recordings[:2], held_out=())
 
 

@@ -21,7 +21,7 @@ from benchmarks.concealed.suite import make as make_all
 from benchmarks.concealed.table import Advised, Rate, Table, at
 from benchmarks.concealed.trials import COUNTS, EQUAL, VEHICLE, Trial, any_condition, conditions, name_of, plan
 from wingfit.diagnosis.finding import Finding, Floors, GeneValue, Hypothesis, Interval, RecordingMisfit, Verdict, Where
-from wingfit.records import Condition, load_dataset
+from wingfit.records import Condition, load_dataset, wing_or_vehicle
 from wingfit.report import finding_json
 
 CONDITION = Condition(3.0, 0.05, 1e5, 293.15)
@@ -302,7 +302,7 @@ def test_recording_a_trial_is_reproducible_and_reaches_the_target_strength(tmp_p
     orders = [Order(vehicle_trial("stroke_amplitude"), tmp_path / f"{k}.nc", tmp_path) for k in (1, 2)]
     hashes = [make(order) for order in orders]
     assert hashes[0] == hashes[1]
-    one, two = (load_dataset(order.dataset) for order in orders)
+    one, two = (wing_or_vehicle(load_dataset(order.dataset)) for order in orders)
     assert all(np.array_equal(a.values, b.values) for a, b in zip(one.recordings, two.recordings, strict=True))
     truth = read(tmp_path / "trial-0007.json")
     assert truth.strength == pytest.approx(3.0, rel=0.35)
@@ -318,10 +318,10 @@ def test_recording_a_trial_is_reproducible_and_reaches_the_target_strength(tmp_p
 def test_a_later_recording_is_of_the_same_rig(tmp_path: Path) -> None:
     trial = vehicle_trial("induced_inflow", group="advice")
     make(Order(trial, tmp_path / "a.nc", tmp_path))
-    first = load_dataset(tmp_path / "a.nc")
+    first = wing_or_vehicle(load_dataset(tmp_path / "a.nc"))
     again = first.recordings[0].condition
     add(Addition(trial, again, tmp_path / "a.nc", tmp_path / "b.nc", tmp_path))
-    longer = load_dataset(tmp_path / "b.nc")
+    longer = wing_or_vehicle(load_dataset(tmp_path / "b.nc"))
     assert longer.held_out == first.held_out
     assert len(longer.recordings) == len(first.recordings) + 1
     old, new = longer.recordings[0], longer.recordings[-1]

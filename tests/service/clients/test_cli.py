@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 import typer
 
+from tests.records.series_samples import arm_dataset
 from tests.service import toy
 from tests.service.processes import ROOT, ServerProcess, free_port, heed_interrupts
 from wingfit.cli import main as cli
@@ -277,6 +278,17 @@ def test_check_reads_a_dataset_without_a_server(wingfit: Wingfit, tmp_path: Path
     assert code == 1
     assert csv_file.name in err
     assert "line 2" in err
+
+
+def test_check_reads_a_series(wingfit: Wingfit, tmp_path: Path) -> None:
+    save_dataset(arm_dataset(), tmp_path / "arm.nc")
+    code, out, _ = wingfit("datasets", "check", str(tmp_path / "arm.nc"))
+    assert code == 0
+    assert "is valid: 'arm', rig 'motor arm'" in out
+    assert [line.split()[:4] for line in out.splitlines()[2:4]] == [
+        ["light-1", "fitted", "light", "40"],
+        ["light-2", "fitted", "light", "40"],
+    ]
 
 
 def test_campaign_passes_its_options_on(wingfit: Wingfit, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

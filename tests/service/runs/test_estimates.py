@@ -10,7 +10,7 @@ import pytest
 
 from tests.service.conftest import Api, serving
 from tests.service.runs import force_data
-from wingfit.records import load_dataset
+from wingfit.records import load_dataset, wing_or_vehicle
 from wingfit.service.app import create_app
 from wingfit.service.settings import Settings
 from wingfit.workers import make_evaluator
@@ -43,7 +43,7 @@ def test_a_submission_names_the_estimate(api: Api, estimates: dict[str, float], 
 
 
 def test_a_wings_estimate_is_named_too(api: Api) -> None:
-    wing = load_dataset(EXAMPLE)
+    wing = wing_or_vehicle(load_dataset(EXAMPLE))
     spoilt = replace(wing, rig=replace(wing.wing, estimates={"E_r": 180.0}))  # in gigapascal
     dataset = api.client.post("/v1/datasets", files={"file": ("robird.zip", force_data.zipped(spoilt))}).json()
     answer = api.client.post("/v1/runs", json={"dataset_id": dataset["id"]})

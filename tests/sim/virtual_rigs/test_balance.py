@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from wingfit.records import load_dataset
+from wingfit.records import load_dataset, wing_or_vehicle
 from wingfit.records.dataset import STANDARD_GRAVITY
 from wingfit.sim.vehicle.lift_drag import lift_drag
 from wingfit.sim.virtual_rigs.balance import (
@@ -120,7 +120,7 @@ def test_same_seed_same_noise() -> None:
 
 def test_campaign_is_written_with_its_truth(tmp_path: Path) -> None:
     truth = read_truth(write_campaign(tmp_path / "delfly"))
-    dataset = load_dataset(tmp_path / "delfly")
+    dataset = wing_or_vehicle(load_dataset(tmp_path / "delfly"))
     assert truth["test-8"] == {"C_D0": 0.0, "C_Dpi2": 2.0, "C_l": 2.02, "C_r": 1.57, "C_F": 0.67}
     assert dataset.held_out == HELD_OUT
     assert dataset.vehicle == delfly()

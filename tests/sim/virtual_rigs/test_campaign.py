@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from wingfit.records import Dataset, Genome, Recording, load_dataset
+from wingfit.records import Dataset, Genome, Recording, load_dataset, wing_or_vehicle
 from wingfit.sim.solver.numerics import Numerics
 from wingfit.sim.virtual_rigs import campaign as campaign_module
 from wingfit.sim.virtual_rigs.campaign import (
@@ -209,7 +209,7 @@ def test_same_seed_same_campaign() -> None:
 def test_written_campaign_reads_back_and_keeps_its_secret(tmp_path: Path) -> None:
     dataset, truth = campaign(division="4", small=True, seed=5)
     beside = write_campaign(tmp_path / "flight", division="4", small=True, seed=5)
-    read = load_dataset(tmp_path / "flight")
+    read = wing_or_vehicle(load_dataset(tmp_path / "flight"))
     assert read.held_out == dataset.held_out == (dataset.recordings[1].name,)
     for found, made in zip(read.recordings, dataset.recordings, strict=True):
         assert (found.name, found.markers, found.rig) == (made.name, made.markers, made.rig)
