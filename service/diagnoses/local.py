@@ -29,8 +29,8 @@ from wingfit.workers.jobs import eta_seconds
 OnProgress = Callable[[float, float | None, str], None]
 Steps = Callable[[Evaluator], Iterator[Progress]]
 
-RIG_SETTINGS = {"genes", "fixed", "recordings", "suspects", "refits", "name"}
-"""Settings of a diagnosis that apply to a rig of the user's own."""
+RIG_SETTINGS = {"genes", "fixed", "recordings", "suspects", "refits", "name", "refine", "seed"}
+"""Settings of a diagnosis that a rig of the user's own accepts; it has no finer discretisation, and draws nothing."""
 
 
 def diagnose(
