@@ -41,7 +41,7 @@ def print_finding(finding: Json) -> None:
 def _ranking(finding: Json) -> None:
     hypotheses = finding["hypotheses"]
     misfits = [one["misfit"] for one in hypotheses]
-    unit = Unit("mm", MM) if finding["unit"] == "m" else force_unit(misfits)
+    unit = {"m": Unit("mm", MM), "noise": Unit("/ noise", 1.0)}.get(finding["unit"]) or force_unit(misfits)
     columns: Columns[Json] = {
         "hypothesis": lambda one: " + ".join(one["effects"]) or NOMINAL,
         ">probability": lambda one: _probability(one["probability"]),
@@ -65,7 +65,7 @@ def _genes(finding: Json) -> None:
         "90 % interval": lambda gene: interval(gene["value"]["low"], gene["value"]["high"]),
         "description": "description",
     }
-    genes = [gene for gene in finding["genes"] if gene["name"].partition(".")[0] in finding["named"]]
+    genes = [gene for gene in finding["genes"] if any(gene["name"].startswith(f"{name}.") for name in finding["named"])]
     if genes:
         say("")
         records(genes, columns)

@@ -65,7 +65,7 @@ def diagnose_rig(rig: Rig, dataset: SeriesDataset, spec: DiagnosisSpec, evaluato
     fixed = {*spec.calibration.fixed, *elsewhere}
     free = tuple(name for name in subject.model.searched if name in wanted and name not in fixed)
     held_out = dataset.select(dataset.held_out)
-    series = SeriesReduction.of(dataset.recordings)
+    series = SeriesReduction.of(dataset.recordings, fitted)
     yield from diagnose_subject(subject, dataset.name, fitted, held_out, spec, evaluator, free=free, series=series)
 
 

@@ -70,3 +70,12 @@ def check_fits(rig: Rig, dataset: SeriesDataset) -> None:
         missing = [name for name in wanted if name not in stated]
         if missing and what != "channel":
             raise ValueError(f"rig {rig.name!r} needs the {what} {missing[0]!r}, which dataset {dataset.name!r} lacks")
+    own = [gene.name for gene in rig.recording_genes]
+    for one in dataset.recordings:
+        for name in one.estimates:
+            if name not in own:
+                have = ", ".join(own) or "none"
+                raise ValueError(
+                    f"recording {one.name!r} has an estimate of {name!r}, but the genes of one recording of rig "
+                    f"{rig.name!r} are: {have}; correct the name"
+                )

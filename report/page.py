@@ -13,10 +13,13 @@ from wingfit.report.number_format import (
     listed,
     number,
     percent,
+    scale_for,
     stages,
     titles_of,
 )
 from wingfit.report.svg import Axis, drawing, text, x_axis
+
+MOST_NOISES = 2  # channels whose noise is shown at the top
 
 
 def html(finding: Finding) -> str:
@@ -58,10 +61,13 @@ def _tiles(finding: Finding) -> list[tuple[str, str, str]]:
     """Return name, value and meaning of each of the main numbers."""
     scale = channel_scale(finding)
     correlation = number(finding.floors.lag1_autocorrelation, 2)
+    noise, floor = scale.text(finding.floors.noise), scale.text(finding.floors.total)
+    if finding.channels:
+        noise = ", ".join(scale_for([one.noise], one.unit).text(one.noise) for one in finding.channels[:MOST_NOISES])
     tiles = [
         ("Strength d", number(finding.strength), "residual of the refitted nominal model / noise"),
-        ("Noise", scale.text(finding.floors.noise), f"lag-1 autocorrelation {correlation}"),
-        ("Floor", scale.text(finding.floors.total), "expected misfit of a correct model"),
+        ("Noise", noise, f"lag-1 autocorrelation {correlation}"),
+        ("Floor", floor, "expected misfit of a correct model"),
     ]
     if finding.proof is not None and "after" in stages(finding):
         change = f"{number(finding.proof.before.value)} → {number(finding.proof.after.value)}"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from wingfit.records import Gene
@@ -39,14 +39,14 @@ class Rig:
     """
 
     name: str
-    genes: tuple[Gene, ...]
+    genes: Sequence[Gene]
     channels: Mapping[str, str]
     simulate: Simulate
-    suspects: tuple[Suspect, ...] = ()
-    recording_genes: tuple[Gene, ...] = ()
+    suspects: Sequence[Suspect] = ()
+    recording_genes: Sequence[Gene] = ()
     inputs: Mapping[str, str] = field(default_factory=dict)
     settings: Mapping[str, str] = field(default_factory=dict)
-    ports: tuple[Port, ...] = ()
+    ports: Sequence[Port] = ()
     faults: bool = True
     description: str = ""
     reference: str = ""

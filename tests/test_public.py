@@ -87,6 +87,7 @@ def test_the_wheel_holds_one_package() -> None:
         "diagnosis",
         "records",
         "report",
+        "rigs",
         "service",
         "sim",
         "tracking",

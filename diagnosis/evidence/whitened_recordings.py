@@ -232,13 +232,18 @@ class WhitenedData:
         every = self.weight * self.variance
         if self.kind == "series":
             error = max(one.relative_error for one in self.reduced if isinstance(one, SeriesFit))
-            return float(error * every.sum() + np.sqrt(2.0 * np.sum(every**2)))
+            return float(error * every.sum() + self.excess_standard_error_of_samples)
         independent = sum(
             1.0 if recording.kind == "forces" else fit.used.sum() / 3.0
             for recording, fit in zip(self.recordings, self.beat_fits, strict=True)
         )
         slow = np.concatenate([np.tile((v.order == 0) | v.trend, int(v.used.sum())) for v in self.beat_fits])
         return float(every[slow].sum() / 2.0 + np.sqrt(2.0 / independent) * every.sum())
+
+    @cached_property
+    def excess_standard_error_of_samples(self) -> float:
+        """Standard error of :meth:`excess` (m^2, N^2) by noise of known variance that is independent of each other."""
+        return float(np.sqrt(2.0 * np.sum((self.weight * self.variance) ** 2)))
 
     def evaluate(
         self, problem: Problem, evaluator: Evaluator, values: Float[Array, "B F"]

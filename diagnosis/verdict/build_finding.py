@@ -132,7 +132,7 @@ def _finding(
 
 def _noise_remarks(data: WhitenedData, nominal: Refit, unit: str) -> tuple[str, ...]:
     if data.kind == "series":
-        return series_remarks(data, nominal.fit.coefficients)
+        return series_remarks(data, nominal.fit)
     return noise_remarks(data, unit)
 
 

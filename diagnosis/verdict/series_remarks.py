@@ -6,9 +6,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from wingfit.diagnosis.evidence.fit import Fit
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
+from wingfit.diagnosis.verdict.noise_doubt import overstated, residual_to_noise, uncertain
 from wingfit.inference.noise.series import EXCEEDS
-from wingfit.records.array_types import Array, Float
 
 UNEVEN = 3.0  # times the least noise of a channel: recordings with more get a remark
 SOURCES = {
@@ -20,9 +21,9 @@ SOURCES = {
 }
 
 
-def series_remarks(data: WhitenedData, coefficients: Float[Array, " D"]) -> tuple[str, ...]:
-    """Return remarks on the noise; ``coefficients`` [D]: residuals of the nominal model."""
-    return (*_sources(data), *_uneven(data), *_contradicted(data), *_overstated(data, coefficients))
+def series_remarks(data: WhitenedData, nominal: Fit) -> tuple[str, ...]:
+    """Return remarks on the noise; ``nominal``: fit of the nominal model."""
+    return (*_sources(data), *_uneven(data), *_contradicted(data), *_overstated(data, nominal))
 
 
 def _sources(data: WhitenedData) -> Iterator[str]:
@@ -68,23 +69,15 @@ def _contradicted(data: WhitenedData) -> Iterator[str]:
             )
 
 
-def _overstated(data: WhitenedData, coefficients: Float[Array, " D"]) -> Iterator[str]:
-    ratio = residual_to_noise(data, coefficients)
-    if overstated(data, coefficients):
+def _overstated(data: WhitenedData, nominal: Fit) -> Iterator[str]:
+    ratio = residual_to_noise(data, nominal)
+    if uncertain(data, nominal):
+        yield (
+            f"the residual is {ratio:.2g} times the noise that the highest frequencies show; whether slow noise or "
+            "missing physics causes it cannot be known: state the standard deviation, or record repeats"
+        )
+    if overstated(data, nominal):
         yield (
             f"the residual is {ratio:.2g} times the assumed noise, so the noise is smaller; physics may be "
             "missing that is smaller than the assumed noise; state the right standard deviation, or record repeats"
         )
-
-
-def residual_to_noise(data: WhitenedData, coefficients: Float[Array, " D"]) -> float:
-    """Return the root mean square of a residual with ``coefficients`` [D] divided by the assumed noise."""
-    return float(np.sqrt(max(data.excess(coefficients) + data.noise**2, 0.0)) / data.noise)
-
-
-def overstated(data: WhitenedData, coefficients: Float[Array, " D"]) -> bool:
-    """Return whether a residual is so far below the assumed noise that the noise must be smaller."""
-    below = -data.excess(coefficients)
-    return data.kind == "series" and below > max(
-        (1.0 - EXCEEDS**-2) * data.noise**2, data.policy.allowance * data.excess_standard_error
-    )

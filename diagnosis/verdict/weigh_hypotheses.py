@@ -23,6 +23,7 @@ import numpy as np
 from wingfit.diagnosis.evidence.refit import Refit
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.policy import POLICY, Policy
+from wingfit.diagnosis.verdict.noise_doubt import noise_may_hide
 from wingfit.records.array_types import Array, Float
 
 
@@ -68,9 +69,11 @@ def weigh(
     elif drifts(data):
         weight *= [_explains_drift(data, nominal, one) for one in hypotheses]
     total = weight.sum() + other
-    return HypothesisWeights(
-        hypotheses, evidence - evidence[0], weight / total, float(other / total), excess, data.policy
-    )
+    probabilities, unknown = weight / total, float(other / total)
+    if noise_may_hide(data, nominal.fit):
+        doubted = max(probabilities[0] - policy.doubted_noise, 0.0)
+        probabilities[0], unknown = probabilities[0] - doubted, unknown + doubted
+    return HypothesisWeights(hypotheses, evidence - evidence[0], probabilities, unknown, excess, data.policy)
 
 
 def nominal_refuted(data: WhitenedData, excess: float, floor: float) -> bool:

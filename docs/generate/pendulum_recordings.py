@@ -16,7 +16,7 @@ from wingfit.records.array_types import Array
 FOLDER = Path(__file__).parents[2] / "examples" / "pendulum"
 STARTS = (0.9, 0.55, 1.2, 0.35, 0.75, 1.05)  # rad
 DAMPING, GRAVITY, FRICTION, NOISE = 0.12, 38.0, 0.3, 0.004  # 1/s, 1/s^2, 1/s^2, rad
-TIMES = 0.03 * np.arange(200)
+TIMES: Array = 0.03 * np.arange(200, dtype=np.float64)
 
 
 def swing(start: float) -> Array:

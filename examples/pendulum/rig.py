@@ -8,7 +8,7 @@ import wingfit
 def simulate(genes, run):
     """Return the angle (rad) at run.times for one recording; ``genes`` has the values of all genes by name."""
 
-    def rate(t, state):
+    def rate(_, state):
         angle, speed = state
         moment = -genes["damping"] * speed - genes["gravity"] * np.sin(angle) + run.force("pivot", angle, speed)
         return speed, moment

@@ -63,10 +63,13 @@ class SeriesReduction:
     scale: Float[Array, " C"]
 
     @classmethod
-    def of(cls, recordings: Sequence[Series]) -> SeriesReduction:
-        """Estimate the noise of all ``recordings``, fitted and held out; ValueError if that of one cannot be known."""
+    def of(cls, recordings: Sequence[Series], fitted: Sequence[Series] = ()) -> SeriesReduction:
+        """Estimate the noise of all ``recordings``; ValueError if that of one cannot be known.
+
+        The scale of a channel is its noise in the recordings ``fitted``; none: in all.
+        """
         noises = noise_of(recordings)
-        inside = [_in_band(one, noises[one.name]) for one in recordings]
+        inside = [_in_band(one, noises[one.name]) for one in fitted or recordings]
         return cls(noises, np.sqrt(np.mean(inside, axis=0)))
 
     def __call__(self, recording: Series) -> SeriesFit:

@@ -68,7 +68,7 @@ def test_a_rig_that_contradicts_itself_is_refused(changes: dict[str, object], me
 
 
 def test_lists_are_accepted() -> None:
-    rig = Rig("a", list(GENES), {"position": "m", "speed": "m/s"}, simulate)  # type: ignore[arg-type]
+    rig = Rig("a", list(GENES), {"position": "m", "speed": "m/s"}, simulate)
     assert rig.genes == GENES
 
 

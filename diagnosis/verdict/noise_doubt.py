@@ -1,0 +1,43 @@
+"""Whether the noise of series is known well enough for a model to be called adequate."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy
+
+from wingfit.diagnosis.evidence.fit import Fit
+from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
+from wingfit.inference.noise.series import EXCEEDS, MEASURED_ERROR
+
+BY_CHANCE = 1e-3  # probability that noise as assumed is so much smaller than its standard deviation
+
+
+def noise_may_hide(data: WhitenedData, nominal: Fit) -> bool:
+    """Return whether missing physics may hide in the noise of series; ``nominal``: fit of the nominal model."""
+    return data.kind == "series" and (overstated(data, nominal) or uncertain(data, nominal))
+
+
+def residual_to_noise(data: WhitenedData, fit: Fit) -> float:
+    """Return the root mean square of the residual of ``fit`` divided by the assumed noise."""
+    return float(np.sqrt(max(data.excess(fit.coefficients) + data.noise**2, 0.0)) / data.noise)
+
+
+def overstated(data: WhitenedData, fit: Fit) -> bool:
+    """Return whether the residual is so far below the assumed noise that the noise must be smaller.
+
+    Those coefficients are tested whose assumed noise is far above the residual; genes that were fitted count as
+    coefficients that they made small.
+    """
+    squares = fit.coefficients**2
+    loud = data.variance > EXCEEDS**2 * float(np.mean(squares))
+    freedom = int(loud.sum()) - len(fit.unit)
+    return freedom > 0 and bool(
+        scipy.special.chdtr(freedom, float(np.sum(squares[loud] / data.variance[loud]))) < BY_CHANCE
+    )
+
+
+def uncertain(data: WhitenedData, fit: Fit) -> bool:
+    """Return whether the residual clearly exceeds the visible noise, and only slow noise could explain that."""
+    sure = MEASURED_ERROR * data.noise**2 + data.excess_standard_error_of_samples
+    beyond = data.excess(fit.coefficients) - (data.policy.negligible * data.noise) ** 2
+    return beyond > data.policy.refuting_excess * sure
