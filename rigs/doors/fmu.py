@@ -101,8 +101,8 @@ class Fmu:
             return self._steps(instance, values, run)
         except instance.failure as error:
             self._own.drop(free=instance.may_be_freed(error))
-            said = short(" / ".join(instance.messages[-3:]))
-            raise SimulationError(f"the FMU fails: {error}{' ' + said if said else ''}") from error
+            said = [str(error).rstrip("."), *instance.messages[-3:]]
+            raise SimulationError(f"the FMU fails: {short(': '.join(said))}") from error
         except BaseException:
             self._own.drop()
             raise
@@ -160,35 +160,40 @@ def _check_count(count: int) -> None:
 
 
 class _Unpacked:
-    """The FMU as this process has it: unpacked, with one instance at most."""
+    """The FMU as this process has it: unpacked, with one instance at most; both go with the object that owns them."""
 
     def __init__(self) -> None:
         self.pid = 0
         self.resets: bool | None = None
-        self._made: Instance | None = None
+        self._held: list[Instance] = []
 
     def open(self, door: Fmu) -> None:
         """Unpack the file; DoorError if it is no FMU that can be used."""
         folder = tempfile.mkdtemp(prefix="wingfit-fmu-")
-        weakref.finalize(self, _removed, folder, os.getpid())
+        self._held = []  # instances of the process that this one was forked from are left alone
+        weakref.finalize(self, _removed, folder, self._held, os.getpid())
         self._make = load(door.file, folder, door.variables)
-        self.pid, self.resets, self._made = os.getpid(), None, None
+        self.pid, self.resets = os.getpid(), None
 
     def instance(self) -> Instance:
         """Return an instance that is as new: the one that there is, after a reset, or another."""
-        if self._made is not None and not self._made.reset():
+        if self._held and not self._held[0].reset():
             self.drop()
-        if self._made is None:
-            self._made = self._make()
-        return self._made
+        if not self._held:
+            self._held.append(self._make())
+        return self._held[0]
 
     def drop(self, free: bool = True) -> None:
         """Free the instance; without ``free``, only forget it: after a fatal error it must not be called."""
-        made, self._made = self._made, None
-        if made is not None and free:
-            made.free()
+        while self._held:
+            made = self._held.pop()
+            if free:
+                made.free()
 
 
-def _removed(folder: str, owner: int) -> None:
-    if os.getpid() == owner:
-        shutil.rmtree(folder, ignore_errors=True)
+def _removed(folder: str, held: list[Instance], owner: int) -> None:
+    if os.getpid() != owner:
+        return
+    while held:
+        held.pop().free()
+    shutil.rmtree(folder, ignore_errors=True)

@@ -57,14 +57,15 @@ def load(file: str, folder: str, variables: Variables) -> Callable[[], Instance]
                 description,
                 "CoSimulation",
                 logger=_logger(messages, version),
-                require_functions=False,  # files in use lack functions that this does not call
             )
         except Exception as error:
-            have = ", ".join(fmpy.supported_platforms(file)) or "none"
-            raise DoorError(
-                f"{Path(file).name} cannot be instantiated: {short(str(error))} {short(' / '.join(messages))}; it holds "
-                f"code for {have}, needed is {fmpy.platform}: export it for that"
-            ) from error
+            have = fmpy.supported_platforms(file)
+            wanted = {fmpy.platform, fmpy.platform_tuple}
+            remedy = "export it again, with all functions of FMI"
+            if not wanted & set(have):
+                remedy = f"it holds code for {', '.join(have) or 'no platform'}: export it for {fmpy.platform}"
+            said = short(" / ".join([str(error), *messages]))
+            raise DoorError(f"{Path(file).name} cannot be instantiated ({said}); {remedy}") from error
         return Instance(made, version, description, references, messages)
 
     return make
@@ -160,14 +161,15 @@ def _references(description: Any, variables: Variables, real: str) -> References
     known = {variable.name: variable for variable in description.modelVariables}
 
     def one(name: str, causalities: tuple[str, ...], what: str) -> int:
+        a = "a" if what == "parameter" else "an"
         if name not in known:
             near = ", ".join(sorted(n for n, v in known.items() if v.causality in causalities)[:20]) or "none"
             raise DoorError(f"the FMU has no variable {name!r}; its {what}s are {near}")
         variable = known[name]
         if variable.type != real or variable.dimensions or variable.dimensionValueReferences:
-            raise DoorError(f"variable {name!r} of the FMU is {variable.type}; a {what} must be a single {real}")
+            raise DoorError(f"variable {name!r} of the FMU is {variable.type}; name {a} {what} that is a single {real}")
         if what != "output" and variable.causality not in causalities:
-            raise DoorError(f"variable {name!r} of the FMU is a {variable.causality}; name a {what}")
+            raise DoorError(f"variable {name!r} of the FMU is of causality {variable.causality}; name {a} {what}")
         if what == "parameter" and variable.variability == "constant":
             raise DoorError(f"variable {name!r} of the FMU is constant; name a parameter that can be set")
         return int(variable.valueReference)
