@@ -11,8 +11,9 @@ A request is one line, a JSON object:
 - ``inputs``: samples [N] of each input by name, linear between ``input_times`` ([N], s) and constant beyond;
 - ``channels``: names of the channels that are wanted.
 
-The answer is ``{"channels": {"angle": [...], ...}}`` with T numbers each, or ``{"error": "why it is impossible"}``. With
-``answer="csv"`` it is a line with the names of columns, then a line for each time. Log messages go to standard error.
+The answer is ``{"channels": {"angle": [...], ...}}`` with T numbers each, or ``{"error": "why it is impossible"}``.
+With ``answer="csv"`` it is a line with the names of columns, then a line for each time. Log messages go to standard
+error.
 """
 
 from __future__ import annotations
@@ -61,7 +62,9 @@ def command(
         environment: variables that are set in addition to those of this process.
     """
     if isinstance(program, str | bytes) or not program:
-        raise DoorError(f"program is {program!r}; give a list of the program and its arguments, ['./simulate', '--fast']")
+        raise DoorError(
+            f"program is {program!r}; give a list of the program and its arguments, ['./simulate', '--fast']"
+        )
     if isinstance(channels, str) or not channels:
         raise DoorError(f"channels is {channels!r}; give a list of names, such as ['angle']")
     if not timeout > 0.0:

@@ -35,7 +35,9 @@ def value_of(name: str, genes: Mapping[str, float], run: Run) -> float:
     if name in run.settings:
         return float(run.settings[name])
     have = ", ".join([*genes, *run.settings]) or "none"
-    raise DoorError(f"{name!r} is neither a gene of the rig nor a setting of recording {run.recording!r}; it has {have}")
+    raise DoorError(
+        f"{name!r} is neither a gene of the rig nor a setting of recording {run.recording!r}; it has {have}"
+    )
 
 
 def checked(answer: Mapping[str, Any], names: Iterable[str], count: int, source: str) -> dict[str, Array]:

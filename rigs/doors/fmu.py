@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import scipy
 
-from wingfit.records.array_types import Array, Float
+from wingfit.records.array_types import Array, Float, Index, Int
 from wingfit.rigs.doors.door import DoorError, checked, named, short, value_of
 from wingfit.rigs.doors.fmu_instance import Instance, Variables, load
 from wingfit.rigs.run import Run, SimulationError
@@ -127,29 +127,29 @@ class Fmu:
             instance.set_inputs(nodes[k + 1])
             found[k + 1] = instance.outputs()
         if kept is not None:
-            return found[kept]
+            return np.asarray(found[kept])
         return np.asarray(scipy.interpolate.make_interp_spline(grid, found, min(3, len(grid) - 1))(times))
 
     def _input_values(self, run: Run, times: Array) -> Float[Array, "N U"]:
         columns = [run.input(name, times) for name in self.variables.inputs]
         return np.stack(columns, axis=1) if columns else np.zeros((len(times), 0))
 
-    def _grid(self, times: Array, even: bool) -> tuple[Array, Array | None]:
+    def _grid(self, times: Array, even: bool) -> tuple[Array, Int[Index, " T"] | None]:
         """Return the communication points, and which of them are ``times``; None: the outputs are interpolated."""
         gaps = np.diff(times)
         if not len(gaps):
-            return times, np.arange(len(times))
+            return times, np.arange(len(times), dtype=np.int64)
         longest = self.step or np.inf
         if even and np.ptp(gaps) > EVEN * gaps.min():
             count = int(np.ceil((times[-1] - times[0]) / min(longest, gaps.min()) - EVEN))
             _check_count(count)
             return np.linspace(times[0], times[-1], count + 1), None
-        parts = np.maximum(np.ceil(gaps / longest - EVEN), 1.0).astype(int)
+        parts = np.maximum(np.ceil(gaps / longest - EVEN), 1.0).astype(np.int64)
         if even:
             parts[:] = parts.max()
         _check_count(int(parts.sum()))
         firsts = np.repeat(times[:-1], parts)
-        kept = np.concatenate([[0], np.cumsum(parts)])
+        kept = np.append(np.int64(0), np.cumsum(parts))
         within = np.arange(len(firsts)) - np.repeat(kept[:-1], parts)
         return np.append(firsts + within * np.repeat(gaps / parts, parts), times[-1]), kept
 

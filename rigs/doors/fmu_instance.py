@@ -44,8 +44,8 @@ def load(file: str, folder: str, variables: Variables) -> Callable[[], Instance]
     version = str(description.fmiVersion)[:1]
     if version not in REAL or description.coSimulation is None:
         raise DoorError(
-            f"{Path(file).name} is FMI {description.fmiVersion}, {_kinds(description)}; export it for co-simulation, as "
-            "FMI 2.0 or 3.0"
+            f"{Path(file).name} is FMI {description.fmiVersion}, {_kinds(description)}; export it for "
+            "co-simulation, as FMI 2.0 or 3.0"
         )
     references = _references(description, variables, REAL[version])
 
@@ -82,9 +82,7 @@ class References(NamedTuple):
 class Instance:
     """An instance of an FMU, as new until :meth:`begin`."""
 
-    def __init__(
-        self, made: Any, version: str, description: Any, references: References, messages: list[str]
-    ) -> None:
+    def __init__(self, made: Any, version: str, description: Any, references: References, messages: list[str]) -> None:
         from fmpy.fmi1 import FMICallException
 
         self.failure = FMICallException
@@ -97,7 +95,7 @@ class Instance:
         self._get = made.getReal if version == "2" else made.getFloat64
 
     def begin(self, values: Mapping[str, float], start: float, tolerance: float | None) -> None:
-        """Set the parameters to ``values`` by the name of the variable, and begin the initialisation at ``start`` (s)."""
+        """Set the parameters to ``values`` by name of the variable, and begin the initialisation at ``start`` (s)."""
         self.messages.clear()
         if values:
             self._set([self._references.parameters[name] for name in values], list(values.values()))
@@ -153,8 +151,14 @@ class Instance:
 
 
 def _kinds(description: Any) -> str:
-    named = {"coSimulation": "co-simulation", "modelExchange": "model exchange", "scheduledExecution": "scheduled execution"}
-    return " and ".join(words for name, words in named.items() if getattr(description, name, None)) or "of no known kind"
+    named = {
+        "coSimulation": "co-simulation",
+        "modelExchange": "model exchange",
+        "scheduledExecution": "scheduled execution",
+    }
+    return (
+        " and ".join(words for name, words in named.items() if getattr(description, name, None)) or "of no known kind"
+    )
 
 
 def _references(description: Any, variables: Variables, real: str) -> References:

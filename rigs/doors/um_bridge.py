@@ -102,7 +102,9 @@ class UmBridge:
         found = self._post("Evaluate", {"name": self.model, "input": vectors, "config": config}).get("output")
         if not isinstance(found, list) or len(found) != len(self.outputs):
             count = len(found) if isinstance(found, list) else 0
-            raise DoorError(f"{self._name} returned {count} output vectors, outputs names {len(self.outputs)}; correct it")
+            raise DoorError(
+                f"{self._name} returned {count} output vectors, outputs names {len(self.outputs)}; correct it"
+            )
         answer: dict[str, Any] = {}
         for k, names in enumerate(self.outputs):
             answer |= self._channels(k, names, found[k], len(run.times))
@@ -133,7 +135,9 @@ class UmBridge:
         info = self._sent("GET", "Info", None)
         version, models = info.get("protocolVersion"), info.get("models", [])
         if version != PROTOCOL:
-            raise DoorError(f"{self.url} speaks protocol {version!r}; a server of UM-Bridge protocol {PROTOCOL} is needed")
+            raise DoorError(
+                f"{self.url} speaks protocol {version!r}; a server of UM-Bridge protocol {PROTOCOL} is needed"
+            )
         if self.model not in models:
             raise DoorError(f"{self.url} has no model {self.model!r}; it has {', '.join(map(str, models)) or 'none'}")
         if not self._post("ModelInfo", {"name": self.model}).get("support", {}).get("Evaluate"):
@@ -141,11 +145,14 @@ class UmBridge:
         request = {"name": self.model, "config": config}
         expected = [len(one) for one in self.inputs]
         if (sizes := self._post("InputSizes", request).get("inputSizes")) != expected:
-            raise DoorError(f"{self._name} takes input vectors of sizes {sizes}, inputs names {expected}; correct inputs")
+            raise DoorError(
+                f"{self._name} takes input vectors of sizes {sizes}, inputs names {expected}; correct inputs"
+            )
         wanted = [count * (1 if isinstance(one, str) else len(one)) if one else None for one in self.outputs]
         sizes = self._post("OutputSizes", request).get("outputSizes")
-        right = isinstance(sizes, list) and len(sizes) == len(wanted)
-        if not right or any(b is not None and a != b for a, b in zip(sizes, wanted, strict=True)):
+        returned = sizes if isinstance(sizes, list) else []
+        wrong = any(b is not None and a != b for a, b in zip(returned, wanted, strict=False))
+        if wrong or len(returned) != len(wanted):
             shown = ["any" if one is None else one for one in wanted]
             raise DoorError(
                 f"{self._name} returns output vectors of sizes {sizes}, outputs needs {shown} for {count} times; "

@@ -110,10 +110,11 @@ def test_an_answer_of_the_wrong_form_ends_the_diagnosis(way: str, remedy: str, p
 def test_answers_of_a_persistent_program_cannot_be_mixed_up(way: str) -> None:
     simulate = door(way, persistent=True)
     simulate(NOMINAL, run())
-    with pytest.raises(DoorError, match=r"line that is read"):
-        for _ in range(2):
-            simulate(STIFF, run())
-            time.sleep(0.1)
+    if way == "twice":  # its second line is there when the next request is sent
+        simulate(STIFF, run())
+        time.sleep(0.1)
+    with pytest.raises(DoorError, match="line that is read"):
+        simulate(STIFF, run())
 
 
 def test_a_program_that_is_not_persistent_is_noticed() -> None:
@@ -193,7 +194,7 @@ def test_it_runs_in_its_folder_with_its_environment(tmp_path: Path) -> None:
 def test_it_can_be_pickled_while_a_program_runs(persistent: bool) -> None:
     simulate = door(persistent=persistent)
     first = simulate(NOMINAL, run())
-    copy = pickle.loads(pickle.dumps(simulate))
+    copy = pickle.loads(pickle.dumps(simulate))  # noqa: S301
     assert all(np.array_equal(copy(NOMINAL, run())[name], first[name]) for name in CHANNELS)
     assert np.allclose(first["position"], oscillate(NOMINAL, run())["position"], atol=1e-9)
 

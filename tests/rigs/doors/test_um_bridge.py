@@ -82,7 +82,10 @@ def test_a_simulation_that_fails_is_a_reason_for_one_individual(server: Server, 
         ({"inputs": [["stiffness", "damping", "mass", "start"]]}, r"takes input vectors of sizes \[2, 2\]"),
         ({"outputs": ["position"]}, r"returns output vectors of sizes \[101, 101, 1\], outputs needs \[101\]"),
         ({"outputs": ["position", "speed", "power"]}, r"outputs needs \[101, 101, 101\]"),
-        ({"inputs": [["stiffness", "dumping"], ["mass", "start"]]}, "'dumping' is neither a gene of the rig nor a setting"),
+        (
+            {"inputs": [["stiffness", "dumping"], ["mass", "start"]]},
+            "'dumping' is neither a gene of the rig nor a setting",
+        ),
     ],
 )
 def test_a_wrong_layout_ends_the_diagnosis(server: Server, changed: dict[str, Any], remedy: str) -> None:
@@ -166,5 +169,5 @@ def test_wrong_arguments_are_refused(changed: dict[str, Any], remedy: str) -> No
 def test_it_can_be_pickled_while_connected(server: Server) -> None:
     simulate = door(server)
     first = simulate(NOMINAL, run())
-    copy = pickle.loads(pickle.dumps(simulate))
+    copy = pickle.loads(pickle.dumps(simulate))  # noqa: S301
     assert all(np.array_equal(copy(NOMINAL, run())[name], first[name]) for name in CHANNELS)

@@ -1,4 +1,4 @@
-"""A UM-Bridge server (protocol 1.0) on loopback that offers the oscillator, and misbehaves where the stiffness says so."""
+"""A UM-Bridge server (protocol 1.0) on loopback: the oscillator. For some values of the stiffness it misbehaves."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from wingfit.rigs.run import Run
 MODEL = "oscillator"
 
 
-class Refused(Exception):
+class RefusedError(Exception):
     """An error of the protocol, with its status."""
 
     def __init__(self, status: int, kind: str, message: str) -> None:
@@ -49,7 +49,7 @@ class Server(ThreadingHTTPServer):
         if path == "/Info":
             return {"protocolVersion": self.version, "models": [MODEL, "other"]}
         if body["name"] != MODEL:
-            raise Refused(400, "ModelNotFound", f"Model {body['name']} not supported!")
+            raise RefusedError(400, "ModelNotFound", f"Model {body['name']} not supported!")
         if path == "/ModelInfo":
             return {"support": {"Evaluate": self.evaluates, "Gradient": False}}
         config = body["config"]
@@ -68,7 +68,7 @@ class Server(ThreadingHTTPServer):
         if 50.0 < stiffness < 51.0:
             raise ArithmeticError("the spring breaks")
         if 51.0 < stiffness < 52.0:
-            raise Refused(500, "InvalidOutput", "Model output is not a list of lists!")
+            raise RefusedError(500, "InvalidOutput", "Model output is not a list of lists!")
         if 52.0 < stiffness < 53.0:
             time.sleep(2.0)
         times, inputs = (np.array(config[name]) for name in ("times", "input_times"))
@@ -85,6 +85,7 @@ class Server(ThreadingHTTPServer):
 
 class _Handler(BaseHTTPRequestHandler):
     protocol_version = "HTTP/1.1"
+    disable_nagle_algorithm = True
     server: Server
 
     def do_GET(self) -> None:
@@ -108,7 +109,7 @@ class _Handler(BaseHTTPRequestHandler):
             return
         try:
             found = self.server.answered(self.path, body)
-        except Refused as error:
+        except RefusedError as error:
             self._send(error.status, json.dumps({"error": {"type": error.kind, "message": str(error)}}))
         except ArithmeticError as error:
             self._send(500, f"Internal Server Error: {error}")

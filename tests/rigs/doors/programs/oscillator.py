@@ -17,7 +17,12 @@ PARTS = 20  # steps between two times
 
 def simulated(request: dict[str, Any]) -> dict[str, list[float]]:
     """Position (m) and speed (m/s) at the times of the request."""
-    genes, times, force, mass = request["genes"], request["times"], request["inputs"]["force"], request["settings"]["mass"]
+    genes, times, force, mass = (
+        request["genes"],
+        request["times"],
+        request["inputs"]["force"],
+        request["settings"]["mass"],
+    )
     assert request["input_times"] == times
 
     def rate(x: float, v: float, u: float) -> tuple[float, float]:
@@ -41,13 +46,13 @@ def simulated(request: dict[str, Any]) -> dict[str, list[float]]:
     return {"position": positions, "speed": speeds}
 
 
-def answer(way: str, request: dict[str, Any]) -> str:
-    """The line that answers ``request``; misbehaves where the stiffness is above 30 N/m, or always (``way`` ends in !)."""
+def answer(way: str, request: dict[str, Any]) -> str:  # noqa: C901  a way to misbehave for each case
+    """The line that answers ``request``; it misbehaves where the stiffness is above 30 N/m."""
     channels = simulated(request)
     found: dict[str, Any] = {"id": request["id"], "channels": channels}
-    if not way.endswith("!") and request["genes"]["stiffness"] <= 30.0:
+    if request["genes"]["stiffness"] <= 30.0:
         return json.dumps(found)
-    match way.rstrip("!"):
+    match way:
         case "exit":
             print("first line\nthe spring breaks", file=sys.stderr)
             sys.exit(3)
