@@ -20,6 +20,7 @@ from wingfit.rigs.doors.command import command
 from wingfit.rigs.doors.door import DoorError
 from wingfit.rigs.run import SimulationError
 
+ROOT = Path(__file__).parents[3]
 PROGRAMS = Path(__file__).parent / "programs"
 PROGRAM = PROGRAMS / "oscillator.py"
 STIFF = NOMINAL | {"stiffness": 35.0}  # with which the program misbehaves
@@ -200,6 +201,32 @@ def test_it_can_be_pickled_while_a_program_runs(persistent: bool) -> None:
     copy = pickle.loads(pickle.dumps(simulate))  # noqa: S301
     assert all(np.array_equal(copy(NOMINAL, run())[name], first[name]) for name in CHANNELS)
     assert np.allclose(first["position"], oscillate(NOMINAL, run())["position"], atol=1e-9)
+
+
+@pytest.mark.parametrize("end", ["sys.exit()", "os.kill(os.getpid(), 9)"])
+def test_a_program_ends_with_the_process_that_started_it(tmp_path: Path, end: str) -> None:
+    noted, own, starter = (tmp_path / name for name in ("pid", "own.py", "starter.py"))
+    own.write_text(
+        "import json, os, sys\n"
+        "open('pid', 'w').write(str(os.getpid()))\n"
+        "for line in sys.stdin:\n"
+        "    request = json.loads(line)\n"
+        "    channels = {'position': request['times']}\n"
+        "    print(json.dumps({'id': request['id'], 'channels': channels}), flush=True)\n"
+    )
+    starter.write_text(
+        "import os, sys\n"
+        "from tests.rigs.doors.oscillator import NOMINAL, run\n"
+        "from wingfit.rigs.doors.command import command\n"
+        "simulate = command([sys.executable, 'own.py'], ['position'], persistent=True)\n"
+        f"simulate(NOMINAL, run())\n{end}\n"
+    )
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    subprocess.run([sys.executable, starter], check=False, cwd=tmp_path, env=environment)
+    pid, deadline = int(noted.read_text()), time.monotonic() + 10.0
+    while Path(f"/proc/{pid}/cmdline").exists() and Path(f"/proc/{pid}/cmdline").read_bytes():  # empty: a zombie
+        assert time.monotonic() < deadline, "the program still runs"
+        time.sleep(0.02)
 
 
 def test_no_program_is_left(tmp_path: Path) -> None:
