@@ -1,0 +1,122 @@
+"""One diagnosis of a real recording: its rig and data, what others document about it, and how a finding is judged."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+from wingfit.diagnosis import DiagnosisSpec, diagnose_rig
+from wingfit.diagnosis.finding import Finding
+from wingfit.inference.noise.series import UnknownNoiseError
+from wingfit.records import SeriesDataset
+from wingfit.rigs.rig import Rig
+from wingfit.workers import make_evaluator
+
+Judgement = Literal["abstained"] | bool
+DATA_VARIABLE = "WINGFIT_REAL_DATA"
+SIBLING = Path(__file__).resolve().parents[3] / "shared" / "data"
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A rig and its recordings, and what a diagnosis should find.
+
+    Attributes:
+        name: of the trial, for ``--only``.
+        documented: what others say is missing in the nominal model, in words.
+        build: returns rig and dataset from the data folder.
+        right: sets of effects that are a right name, each exactly.
+        adequate: whether "adequate" is right.
+        claims: effects that must not be named; a verdict that names none of them is right where no name is wanted.
+        control: whether the trial is a control, which is listed apart.
+    """
+
+    name: str
+    documented: str
+    build: Callable[[Path], tuple[Rig, SeriesDataset]]
+    right: tuple[frozenset[str], ...] = ()
+    adequate: bool = False
+    claims: frozenset[str] = field(default_factory=frozenset)
+    control: bool = False
+
+    def judge(self, finding: Finding) -> Judgement:
+        """Return whether ``finding`` is right; "abstained" where it names nothing, or the right name among others."""
+        named = frozenset(finding.named)
+        if finding.verdict == "adequate":
+            return self.adequate
+        if finding.verdict == "unnamed":
+            return True if not self.right and not self.adequate and not self.claims else "abstained"
+        if finding.verdict == "ambiguous":
+            possible = [frozenset(one) for one in finding.indistinguishable]
+            return "abstained" if not self.right or any(one in self.right for one in possible) else False
+        if self.claims:
+            return not named & self.claims
+        return named in self.right
+
+
+def data_folder(given: str | None) -> Path | None:
+    """Return the folder of the recordings: as ``given``, of the environment, or beside the project; None if absent."""
+    folder = Path(given or os.environ.get(DATA_VARIABLE, "") or SIBLING)
+    return folder if folder.is_dir() else None
+
+
+def run(trial: Trial, folder: Path, say: Callable[[str], None]) -> dict[str, Any]:
+    """Diagnose ``trial`` and return its row of the table; ``say`` takes lines for the reader."""
+    began = time.monotonic()
+    row: dict[str, Any] = {"name": trial.name, "documented": trial.documented}
+    try:
+        rig, dataset = trial.build(folder)
+        finding = _diagnosed(rig, dataset)
+    except UnknownNoiseError as error:
+        say(f"{trial.name}: refused: {error}")
+        blank = dict.fromkeys(("probability", "heldout_before", "heldout_after", "floor"))
+        refused = {"verdict": "refused", "names": [], **blank, "right": "abstained", "reason": str(error)}
+        return row | refused | {"seconds": round(time.monotonic() - began, 1)}
+    for line in _told(trial, finding):
+        say(line)
+    proof = finding.proof
+    return row | {
+        "verdict": finding.verdict,
+        "names": list(finding.named),
+        "probability": round(finding.probabilities[finding.verdict], 3),
+        "heldout_before": round(proof.before.value, 3) if proof else None,
+        "heldout_after": round(proof.after.value, 3) if proof else None,
+        "floor": round(finding.floors.total, 3),
+        "right": trial.judge(finding),
+        "seconds": round(time.monotonic() - began, 1),
+        "strength": round(finding.strength, 3),
+        "sizes": {gene.name: gene.value.value for gene in finding.genes if "[" not in gene.name},
+        "evaluations": finding.evaluations,
+    }
+
+
+def _diagnosed(rig: Rig, dataset: SeriesDataset) -> Finding:
+    *_, last = diagnose_rig(rig, dataset, DiagnosisSpec(), make_evaluator("in_process"))
+    if last.finding is None:
+        raise ValueError("the diagnosis ended without a finding")
+    return last.finding
+
+
+def _told(trial: Trial, finding: Finding) -> Iterable[str]:
+    yield f"{trial.name}: {finding.verdict} {', '.join(finding.named)} ({finding.seconds:.1f} s)"
+    yield f"  {finding.summary}"
+    for one in finding.hypotheses[:6]:
+        effects = " + ".join(one.effects) or "(nominal)"
+        yield f"  {effects}: p {one.probability:.3f}, evidence {one.evidence:.1f}, misfit {one.misfit:.3g}"
+    for channel in finding.channels:
+        yield (
+            f"  {channel.name}: noise {channel.noise:.3g} {channel.unit} ({channel.source}), residual "
+            f"{channel.before:.3g} before, {channel.after:.3g} after"
+        )
+    sizes = (f"{g.name} {g.value.value:.4g} [{_end(g.value.low)}, {_end(g.value.high)}]" for g in finding.genes)
+    yield "  genes: " + ", ".join(one for one in sizes if "[" not in one.split(" ")[0])
+    for remark in finding.remarks:
+        yield f"  remark: {remark}"
+
+
+def _end(value: float | None) -> str:
+    return "" if value is None else f"{value:.4g}"
