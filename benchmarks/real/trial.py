@@ -14,6 +14,7 @@ from wingfit.diagnosis.finding import Finding
 from wingfit.inference.noise.series import UnknownNoiseError
 from wingfit.records import SeriesDataset
 from wingfit.rigs.rig import Rig
+from wingfit.rigs.rig_model import RigModel
 from wingfit.workers import make_evaluator
 
 Judgement = Literal["abstained"] | bool
@@ -32,6 +33,7 @@ class Trial:
         right: sets of effects that are a right name, each exactly.
         adequate: whether "adequate" is right.
         claims: effects that must not be named; a verdict that names none of them is right where no name is wanted.
+        without: suspects that are removed.
         control: whether the trial is a control, which is listed apart.
     """
 
@@ -41,21 +43,27 @@ class Trial:
     right: tuple[frozenset[str], ...] = ()
     adequate: bool = False
     claims: frozenset[str] = field(default_factory=frozenset)
+    without: frozenset[str] = field(default_factory=frozenset)
     control: bool = False
 
     def judge(self, finding: Finding) -> Judgement:
-        """Return whether ``finding`` is right; "abstained" where it names nothing, or the right name among others."""
+        """Return whether ``finding`` is right; "abstained" where it names nothing, or the right name among others.
+
+        A name is wanted where :attr:`right` is not empty; else "adequate", or "unnamed" if :attr:`adequate` is False.
+        An ambiguous verdict is right if all its alternatives are.
+        """
         named = frozenset(finding.named)
+        possible = [frozenset(one) for one in finding.indistinguishable] or [named]
         if finding.verdict == "adequate":
             return self.adequate
         if finding.verdict == "unnamed":
-            return True if not self.right and not self.adequate and not self.claims else "abstained"
-        if finding.verdict == "ambiguous":
-            possible = [frozenset(one) for one in finding.indistinguishable]
-            return "abstained" if not self.right or any(one in self.right for one in possible) else False
+            return "abstained" if self.right or self.claims else not self.adequate
+        if self.right:
+            good = [one in self.right for one in possible] if finding.verdict == "ambiguous" else [named in self.right]
+            return all(good) or ("abstained" if any(good) else False)
         if self.claims:
-            return not named & self.claims
-        return named in self.right
+            return not named & self.claims or ("abstained" if finding.verdict == "ambiguous" else False)
+        return "abstained" if finding.verdict == "ambiguous" and not self.adequate else False
 
 
 def data_folder(given: str | None) -> Path | None:
@@ -70,7 +78,7 @@ def run(trial: Trial, folder: Path, say: Callable[[str], None]) -> dict[str, Any
     row: dict[str, Any] = {"name": trial.name, "documented": trial.documented}
     try:
         rig, dataset = trial.build(folder)
-        finding = _diagnosed(rig, dataset)
+        finding = _diagnosed(rig, dataset, trial.without)
     except UnknownNoiseError as error:
         say(f"{trial.name}: refused: {error}")
         blank = dict.fromkeys(("probability", "heldout_before", "heldout_after", "floor"))
@@ -94,8 +102,10 @@ def run(trial: Trial, folder: Path, say: Callable[[str], None]) -> dict[str, Any
     }
 
 
-def _diagnosed(rig: Rig, dataset: SeriesDataset) -> Finding:
-    *_, last = diagnose_rig(rig, dataset, DiagnosisSpec(), make_evaluator("in_process"))
+def _diagnosed(rig: Rig, dataset: SeriesDataset, without: frozenset[str]) -> Finding:
+    known = (suspect.name for suspect in RigModel(rig, dataset.recordings).suspects)
+    spec = DiagnosisSpec(suspects=tuple(name for name in known if name not in without) if without else ())
+    *_, last = diagnose_rig(rig, dataset, spec, make_evaluator("in_process"))
     if last.finding is None:
         raise ValueError("the diagnosis ended without a finding")
     return last.finding
@@ -104,7 +114,7 @@ def _diagnosed(rig: Rig, dataset: SeriesDataset) -> Finding:
 def _told(trial: Trial, finding: Finding) -> Iterable[str]:
     yield f"{trial.name}: {finding.verdict} {', '.join(finding.named)} ({finding.seconds:.1f} s)"
     yield f"  {finding.summary}"
-    for one in finding.hypotheses[:6]:
+    for one in (one for one in finding.hypotheses if one.refitted):
         effects = " + ".join(one.effects) or "(nominal)"
         yield f"  {effects}: p {one.probability:.3f}, evidence {one.evidence:.1f}, misfit {one.misfit:.3g}"
     for channel in finding.channels:
