@@ -13,10 +13,10 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from benchmarks.real import balls, pendulum
+from benchmarks.real import balls, flutter, pendulum
 from benchmarks.real.trial import DATA_VARIABLE, SIBLING, Trial, data_folder, run
 
-TRIALS: tuple[Trial, ...] = (*balls.TRIALS, *pendulum.TRIALS)
+TRIALS: tuple[Trial, ...] = (*balls.TRIALS, *pendulum.TRIALS, *flutter.TRIALS)
 
 
 def main() -> None:
