@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.real import balls, flutter, pendulum
+from benchmarks.real.fetch import fetch
 from benchmarks.real.trial import DATA_VARIABLE, SIBLING, Trial, data_folder, run
 
 TRIALS: tuple[Trial, ...] = (*balls.TRIALS, *pendulum.TRIALS, *flutter.TRIALS)
@@ -27,18 +28,27 @@ def main() -> None:
     parser.add_argument("--data", help="folder of the recordings")
     parser.add_argument("--fetch", metavar="DIR", help="download the recordings to DIR and end")
     options = parser.parse_args()
+    if options.fetch:
+        sys.exit(0 if fetch(Path(options.fetch), print) else 1)
     folder = data_folder(options.data)
     if folder is None:
         print(f"skipped: no folder {options.data or SIBLING}; give --data or set {DATA_VARIABLE}, or --fetch DIR")
         return
     chosen = [one for one in TRIALS if not options.only or any(one.name.startswith(name) for name in options.only)]
-    rows, controls = list[dict[str, Any]](), list[dict[str, Any]]()
+    if not chosen:
+        sys.exit(f"no trial begins with {' or '.join(options.only)}; there are {', '.join(one.name for one in TRIALS)}")
+    rows, controls, absent = list[dict[str, Any]](), list[dict[str, Any]](), list[str]()
     for trial in chosen:
-        row = run(trial, folder, lambda line: print(line, file=sys.stderr, flush=True))
+        try:
+            row = run(trial, folder, lambda line: print(line, file=sys.stderr, flush=True))
+        except FileNotFoundError as error:
+            print(f"{trial.name} skipped: {error.filename} is absent; --fetch DIR downloads it", flush=True)
+            absent.append(trial.name)
+            continue
         (controls if trial.control else rows).append(row)
         print(_line(row), flush=True)
     if options.json:
-        print(json.dumps({"rigs": rows, **_counts(rows), "controls": controls}))
+        print(json.dumps({"rigs": rows, **_counts(rows), "controls": controls, "skipped": absent}))
 
 
 def _line(row: dict[str, Any]) -> str:

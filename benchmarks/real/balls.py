@@ -1,4 +1,4 @@
-"""Balls that fall from a bridge (de Silva et al. 2020): which of them show drag?
+"""Balls that fall from a bridge (de Silva et al. 2020): in which of them is drag seen.
 
 ``balls/drops.csv`` holds heights of ten balls, dropped twice each and filmed at 15 frames/s. The first drop of each
 ball is fitted, the second is held out; balls of one kind form one dataset. Decided from the physics, before fitting:

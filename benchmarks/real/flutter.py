@@ -1,4 +1,4 @@
-"""Free decays of heave and pitch of a wing on springs, without wind (Lee et al.): what does a linear model leave out?
+"""Free decays of heave and pitch of a wing on springs, without wind (Lee et al.): what a linear model leaves out.
 
 ``flutter-still-air/Measured_data.mat`` (model 1) and ``Measured_data2.mat`` (model 2) hold one decay each, at 5 kHz:
 pitch in rad, and heave in volts with the sensitivity ``sen`` (m/V). Decided from the physics, before fitting:
@@ -23,9 +23,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from scipy.io import loadmat
 
-from benchmarks.real.trial import Trial
+from benchmarks.real.trial import Trial, read_mat
 from wingfit.records import Channel, Gene, Series, SeriesDataset
 from wingfit.records.array_types import Array
 from wingfit.records.series import Quantity
@@ -70,7 +69,7 @@ class Wing:
 
 def read(model: int, folder: Path) -> tuple[Wing, Array, Array]:
     """Return the wing, pitch (rad) and heave (m) [N] about their positions at rest, at 5 kHz."""
-    found = loadmat(folder / "flutter-still-air" / FILES[model][0])
+    found = read_mat(folder / "flutter-still-air" / FILES[model][0])
     one = {name: float(value.item()) for name, value in found.items() if getattr(value, "size", 0) == 1}
     pitch, heave = found["data"][0], found["data"][1] * one["sen"]
     inertia = one["m"] * (one["b"] * one["r_a"]) ** 2

@@ -1,10 +1,11 @@
-"""A single pendulum that swings freely (MultiArm-Pendulum): is its friction viscous alone, as its authors model it?
+"""A single pendulum that swings freely (MultiArm-Pendulum): its authors' model has viscous friction alone.
 
 ``pendulum/Single.mat`` holds one decay from 95 to 14 degrees, cut into six recordings of 9.2 s at 1 kHz, four to
 identify (``Y_id``) and two to validate (``Y_vad``); that division is kept. Decided from the physics, before fitting:
 
 - **Samples.** Every twentieth: 50 Hz, twenty times the frequency of the swing, whose seventh harmonic (8 Hz) is the
-  last above the noise. The first 4 s of each recording: five swings, which six amplitudes follow. The rate in the file is a derivative of the angle, not a measurement, and is not used.
+  last above the noise. Of each recording the first 4 s, five swings, are used: the six recordings still show six
+  amplitudes. The rate in the file is a derivative of the angle, not a measurement, and is not used.
 - **Nominal model.** q'' = -stiffness sin q - damping q', q from the hanging position, whose encoder angle is a gene;
   the authors' own model, in terms of what a free swing can show. Angle and rate at the start of each recording are
   genes of the recording.
@@ -22,9 +23,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
-from scipy.io import loadmat
 
-from benchmarks.real.trial import Trial
+from benchmarks.real.trial import Trial, read_mat
 from wingfit.records import Channel, Gene, Series, SeriesDataset
 from wingfit.records.array_types import Array
 from wingfit.rigs.ports import Port
@@ -42,7 +42,7 @@ FRICTIONS = frozenset({*DRY, DRAG})
 
 def dataset_of(folder: Path) -> SeriesDataset:
     """Return the six recordings; those to validate are held out."""
-    file, channel, recordings = loadmat(folder / "pendulum" / "Single.mat"), Channel("angle", "rad"), []
+    file, channel, recordings = read_mat(folder / "pendulum" / "Single.mat"), Channel("angle", "rad"), []
     for kind in ("id", "vad"):
         for k, (times, angles) in enumerate(zip(file[f"Time_{kind}"][:, 0], file[f"Y_{kind}"][:, 0], strict=True)):
             time, angle = times.ravel()[::EVERY][:COUNT], angles[0, ::EVERY][:COUNT] - np.pi
@@ -90,7 +90,7 @@ def rig_of(*, with_friction: bool = False) -> Rig:
     )
 
 
-RIGHT = tuple(frozenset(one) for dry in DRY for one in ({dry}, {dry, DRAG})) + (frozenset({DRAG}),)
+RIGHT = (*(frozenset(one) for dry in DRY for one in ({dry}, {dry, DRAG})), frozenset({DRAG}))
 TRIALS = (
     Trial(
         "pendulum",

@@ -9,6 +9,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
+from scipy.io import loadmat
+
 from wingfit.diagnosis import DiagnosisSpec, diagnose_rig
 from wingfit.diagnosis.finding import Finding
 from wingfit.inference.noise.series import UnknownNoiseError
@@ -70,6 +72,13 @@ def data_folder(given: str | None) -> Path | None:
     """Return the folder of the recordings: as ``given``, of the environment, or beside the project; None if absent."""
     folder = Path(given or os.environ.get(DATA_VARIABLE, "") or SIBLING)
     return folder if folder.is_dir() else None
+
+
+def read_mat(path: Path) -> dict[str, Any]:
+    """Return the variables of the MATLAB file ``path``; FileNotFoundError where there is none."""
+    with path.open("rb") as file:
+        found: dict[str, Any] = loadmat(file)
+    return found
 
 
 def run(trial: Trial, folder: Path, say: Callable[[str], None]) -> dict[str, Any]:
