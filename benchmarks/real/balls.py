@@ -31,7 +31,7 @@ from wingfit.records.array_types import Array
 from wingfit.records.series import Quantity
 from wingfit.rigs.rig import Rig
 from wingfit.rigs.run import Run
-from wingfit.rigs.suspect import Suspect
+from wingfit.rigs.suspect import Family, Suspect
 
 GRAVITY, AIR = 9.81, 1.2  # m/s^2, kg/m^3
 OUNCE, CENTIMETRE = 0.0283495, 0.01
@@ -113,7 +113,7 @@ def suspects(recordings: tuple[str, ...]) -> tuple[Suspect, ...]:
 
     def one(name: str, title: str, unit: str, low: float, high: float, typical: float, source: str) -> Suspect:
         gene = Gene(f"{name}.size", unit, 0.0, low, high, "linear", title)
-        family = "measurement" if name == "perspective" else "physics"
+        family: Family = "measurement" if name == "perspective" else "physics"
         like = tuple(DRAGS - {name}) if name in DRAGS else ()
         return Suspect(name, title, family, (gene,), typical={gene.name: typical}, source=source, confused_with=like)
 
@@ -206,7 +206,7 @@ def _trial(kind: str, documented: str, *, hidden: bool = False, drag: bool = Fal
         build=lambda folder: _build(kind, folder, with_drag=drag),
         right=(frozenset({"square_drag"}), frozenset({"linear_drag"})) if wanted else (),
         adequate=drag or (not wanted and not hidden),
-        claims=frozenset() if wanted or hidden else DRAGS,
+        claims=frozenset() if wanted or hidden or drag else DRAGS,
         without=without,
         control=hidden or drag,
     )

@@ -96,7 +96,7 @@ def dataset_of(model: int, folder: Path) -> SeriesDataset:
     channels, recordings = (Channel("pitch", "rad"), Channel("heave", "m")), []
     for k in range(PARTS):
         span = slice(k * PART * EVERY, (k + 1) * PART * EVERY, EVERY)
-        values = np.stack([pitch[span], heave[span]], axis=1)
+        values = np.array([pitch[span], heave[span]], np.float64).T
         rates = (values[1] - values[0]) / (EVERY * 0.0002)
         start = {"pitch0": values[0, 0], "heave0": values[0, 1], "pitch_rate0": rates[0], "heave_rate0": rates[1]}
         recordings.append(

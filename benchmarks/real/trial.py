@@ -90,9 +90,9 @@ def run(trial: Trial, folder: Path, say: Callable[[str], None]) -> dict[str, Any
         finding = _diagnosed(rig, dataset, trial.without)
     except UnknownNoiseError as error:
         say(f"{trial.name}: refused: {error}")
-        blank = dict.fromkeys(("probability", "heldout_before", "heldout_after", "floor"))
-        refused = {"verdict": "refused", "names": [], **blank, "right": "abstained", "reason": str(error)}
-        return row | refused | {"seconds": round(time.monotonic() - began, 1)}
+        row |= dict.fromkeys(("probability", "heldout_before", "heldout_after", "floor"))
+        row |= {"verdict": "refused", "names": [], "right": "abstained", "reason": str(error)}
+        return row | {"seconds": round(time.monotonic() - began, 1)}
     for line in _told(trial, finding):
         say(line)
     proof = finding.proof
