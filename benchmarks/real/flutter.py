@@ -102,7 +102,7 @@ def dataset_of(model: int, folder: Path) -> SeriesDataset:
         recordings.append(
             Series(
                 f"part-{k + 1}",
-                np.arange(PART) * EVERY * 0.0002,
+                np.arange(PART, dtype=np.float64) * EVERY * 0.0002,
                 channels,
                 values,
                 settings={"wing_mass": wing.wing_mass},
