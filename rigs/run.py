@@ -14,6 +14,9 @@ from wingfit.rigs.ports import Law, Values
 RTOL = 1e-8
 ATOL = 1e-9  # of the largest initial value, at least ATOL_LEAST
 ATOL_LEAST = 1e-12
+ESCAPED = 1e100  # in any unit: a state that large has escaped to infinity, which a solver never reaches
+MOST_RATES = 200_000  # evaluations of the rate in one integration, and
+RATES_PER_SAMPLE = 1_000  # more for a long recording: a solver that needs more makes no progress
 SAMPLES_PER_STEP = 10.0  # of an input: longest step of an integration, so that no change of an input is missed
 
 
@@ -92,8 +95,15 @@ class Run:
         remembering = [law for own in self.laws.values() for law in own if law.slip is not None]
         self._memory, self._slip = [0.0] * len(remembering), [0.0] * len(remembering)
         size, times = len(first), np.asarray(self.times, float)
+        most, calls = max(MOST_RATES, RATES_PER_SAMPLE * len(times)), 0
 
         def derivative(t: float, state: Array) -> ArrayLike:
+            nonlocal calls
+            calls += 1
+            if calls > most:
+                raise SimulationError(f"the integration makes no progress at {t:.6g} s; {most} rates were evaluated")
+            if not state @ state < ESCAPED**2:
+                raise SimulationError(f"the motion grows without bound: its state escapes at {t:.6g} s")
             if not remembering:
                 return rate(t, state)
             self._memory = state[size:].tolist()

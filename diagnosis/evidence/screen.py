@@ -24,6 +24,7 @@ from wingfit.rigs.suspect import Suspect
 
 LOCATION_SAMPLES = 15  # besides the typical location; 16 in all fill the lanes of the processor twice
 SHAPE_SAMPLES = 7  # for a suspect with other shape genes
+LARGER = 0.5  # residual over change: a trial that changes a series by more is tried with smaller sizes too
 VISIBLE_CHANGE = 1e-3  # of the noise: a trial that changes the recordings less is ignored
 
 
@@ -117,7 +118,40 @@ def score_tests(
 def _suspect_trials(
     context: FitContext, problem: Problem, nominal: Fit, suspect: Suspect, nuisance: Nuisance
 ) -> list[Trial]:
-    groups = list(_genes_to_try(suspect))
+    trials = _tried(context, problem, nominal, suspect, nuisance, list(_genes_to_try(suspect)))
+    if trials and context.data.kind == "series":
+        smaller = list(_smaller_sizes(suspect, trials[0], nuisance))
+        trials += _tried(context, problem, nominal, suspect, nuisance, smaller) if smaller else []
+    return sorted(trials, key=lambda trial: -trial.gain)
+
+
+def _smaller_sizes(suspect: Suspect, trial: Trial, nuisance: Nuisance) -> Iterator[Array]:
+    """Yield the genes of ``trial`` [S, E] with sizes that change the recordings about as much as the residual is.
+
+    A much larger change is not in proportion to the size, so that it shows neither the gain nor the size to expect. The
+    laws at a port have bounds that the user states, without knowing how exact the recordings are.
+    """
+    off, size = off_units(suspect), size_columns(suspect)
+    change = float(np.linalg.norm(nuisance.project_out(trial.changes), axis=-1).min())
+    part = float(np.linalg.norm(nuisance.residual)) / max(change, 1e-300)
+    if part >= LARGER:
+        return
+    for sign in (part, -part):
+        genes = trial.unit.copy()
+        genes[:, size] = np.clip(off[size] + sign * (trial.unit[:, size] - off[size]), 0.0, 1.0)
+        if (genes[:, size] != off[size]).any(axis=1).all():
+            yield genes
+
+
+def _tried(
+    context: FitContext,
+    problem: Problem,
+    nominal: Fit,
+    suspect: Suspect,
+    nuisance: Nuisance,
+    groups: Sequence[Array],
+) -> list[Trial]:
+    """Return the trial of each of ``groups`` of genes [S, E] that can be simulated, best first."""
     units = np.concatenate(groups)
     found, reasons, _ = context.evaluate(problem, values_at(free_genes(problem), units))
     bad = np.array([reason is not None for reason in reasons])
