@@ -34,6 +34,8 @@ class Channel:
         standard_deviation: of the noise of one sample, in ``unit``; None if it is not known.
         place: where it is measured, as text for reports; "" if that has no meaning.
         description: for reports.
+        accepted_error: root mean square, in ``unit``, by which the simulation may differ from the truth and still
+            count as adequate, for a sensor that is more exact than any simulation; None: no more than the noise.
     """
 
     name: str
@@ -41,6 +43,7 @@ class Channel:
     standard_deviation: float | None = None
     place: str = ""
     description: str = ""
+    accepted_error: float | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,6 +12,7 @@ from wingfit.calibration.estimates.linearised import free_genes, values_at
 from wingfit.calibration.problem import Problem, base_genome
 from wingfit.diagnosis.evidence.context import FitContext
 from wingfit.diagnosis.evidence.fit import (
+    COST_TOLERANCE,
     FIT_ERRORS,
     PRIOR_SD,
     Fit,
@@ -131,8 +132,23 @@ def refit_with(context: FitContext, nominal: Fit, trials: Sequence[Trial], base:
             with suppress(*FIT_ERRORS):
                 first = _fit_added_genes(context, problem, *_fit_subset(context, problem, start, before, sizes))
                 fit = min((fit, first), key=lambda one: one.cost)
+        fit = _no_worse(context, problem, before, added, fit)
         return make_refit(data, fit, trials)
     return None
+
+
+def _no_worse(context: FitContext, problem: Problem, before: Fit, added: Sequence[Trial], fit: Fit) -> Fit:
+    """Return ``fit``, or a better fit from ``before`` with the suspects of ``added`` off if it is worse than that.
+
+    A model that includes another cannot fit worse: where it does, its fit has ended in a local minimum.
+    """
+    off = np.concatenate([_scaled_start(trial, 0.0) for trial in added])
+    if fit.cost <= before.cost + float(np.sum((off - 0.5) ** 2)) / PRIOR_SD**2 + COST_TOLERANCE:
+        return fit
+    with suppress(*FIT_ERRORS):
+        again = _fit_added_genes(context, problem, np.concatenate([before.unit, off]), before.jacobian)
+        return min((fit, again), key=lambda one: one.cost)
+    return fit
 
 
 def _fit_added_genes(context: FitContext, problem: Problem, start: Array, first_columns: Array) -> Fit:

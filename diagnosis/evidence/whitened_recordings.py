@@ -15,7 +15,7 @@ from wingfit.calibration.problem import Problem, compared
 from wingfit.diagnosis.policy import POLICY, Policy
 from wingfit.inference.noise.harmonic import HarmonicFit, harmonic_fit, whole_markers
 from wingfit.inference.noise.series_fit import SeriesFit, SeriesReduction
-from wingfit.records import AnyRecording, Recording
+from wingfit.records import AnyRecording, Recording, Series
 from wingfit.records.array_types import Array, Float
 from wingfit.records.dataset import AnyKind
 
@@ -114,6 +114,17 @@ class WhitenedData:
         """Root mean square of the noise of a sample over all used channels, m or N; at least the tolerance."""
         square = np.mean(np.concatenate([fit.noise[fit.used] ** 2 for fit in self.reduced]))
         return max(float(np.sqrt(square)), self.tolerance)
+
+    @cached_property
+    def accepted(self) -> float:
+        """Root mean square (of series: in scales) by which the user lets any model differ from the truth; 0 if none."""
+        squares = [
+            np.square([channel.accepted_error or 0.0 for channel in one.quantities])[fit.used]
+            / fit.scale[fit.used] ** 2
+            for one, fit in zip(self.recordings, self.reduced, strict=True)
+            if isinstance(one, Series) and isinstance(fit, SeriesFit)
+        ]
+        return float(np.sqrt(np.mean(np.concatenate(squares)))) if squares else 0.0
 
     @cached_property
     def drift(self) -> Float[Array, " R"]:

@@ -20,6 +20,7 @@ from wingfit.diagnosis.verdict.locate_in_beat import locate_in_beat
 from wingfit.diagnosis.verdict.next_experiment import rank_conditions, separations
 from wingfit.diagnosis.verdict.noise_remarks import drift_sentence, noise_remarks
 from wingfit.diagnosis.verdict.proof import ResidualPair, predict_held_out, proof, recording_misfits
+from wingfit.diagnosis.verdict.reservations import doubted_by_held_out, held_out_sentence, remaining_sentence
 from wingfit.diagnosis.verdict.series_remarks import series_remarks
 from wingfit.diagnosis.verdict.verdict import Decision, decide, hypotheses, summary
 from wingfit.records import AnyRecording
@@ -91,6 +92,7 @@ def _finding(
     if validation is not None:
         rows += recording_misfits(validation, held_out=True, floor=discretisation)
         proved = proof(validation, discretisation, unit, effects_added=bool(best.names))
+        decision = doubted_by_held_out(decision, proved, data)
     suspects, genes = {suspect.name: suspect for suspect in subject.suspects}, gene_values(data, best)
     weights = replace(weights, refits=tuple(best if one.names == best.names else one for one in weights.refits))
     return Finding(
@@ -100,7 +102,9 @@ def _finding(
         model=subject.description,
         verdict=decision.verdict,
         summary=summary(decision, suspects, _summary_texts(data, nominal, best, located, proved))
-        + ("" if data.kind == "series" else drift_sentence(data)),
+        + ("" if data.kind == "series" else drift_sentence(data))
+        + remaining_sentence(data, decision, best, discretisation)
+        + held_out_sentence(decision, proved, data),
         probabilities=decision.probabilities,
         named=decision.named,
         added_effects=best.names,
@@ -148,7 +152,7 @@ def _discretisation_error(state: SearchState) -> float:
 def _floors(state: SearchState, discretisation: float) -> Floors:
     data, nominal = state.data, state.fitted_nominal
     lag1 = float(np.median([one.lag1 for one in data.reduced]))
-    total = float(np.sqrt(data.noise**2 + discretisation**2 + data.tolerance**2))
+    total = float(np.sqrt(data.noise**2 + discretisation**2 + data.tolerance**2 + data.accepted**2))
     error = None if nominal.discretisation_error is None else discretisation
     return Floors(data.noise, lag1, error, nominal.finer, data.tolerance, total)
 

@@ -81,7 +81,7 @@ def nominal_refuted(data: WhitenedData, excess: float, floor: float) -> bool:
 
     Then physics is missing, even if it is not known which. The criterion does not depend on the number of samples.
     """
-    explainable = (data.policy.negligible * data.noise) ** 2 + floor**2
+    explainable = (data.policy.negligible * data.noise) ** 2 + floor**2 + data.accepted**2
     return excess - explainable > data.policy.refuting_excess * data.excess_standard_error
 
 
@@ -135,6 +135,7 @@ def tolerated_excess(data: WhitenedData, excess: float, floor: float) -> float:
     return (
         (policy.negligible * data.noise) ** 2
         + floor**2
+        + data.accepted**2
         + policy.form**2 * max(excess, 0.0)
         + policy.allowance * data.excess_standard_error
     )

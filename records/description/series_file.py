@@ -65,6 +65,17 @@ class ChannelFile(Strict):
         ]
         | None
     ) = Field(None, description="known noise; leave out if unknown")
+    accepted_error: (
+        Annotated[
+            Decimal,
+            limits(
+                "[1e-300, 1e300]",
+                "error that the simulation may have, in the unit of the channel",
+                "give it in the unit of the channel, or leave it out",
+            ),
+        ]
+        | None
+    ) = Field(None, description="error of the simulation that counts as none; leave out for no more than the noise")
     place: Line = Field("", description="where it is measured, for reports")
     description: fields.Prose = ""
 

@@ -85,6 +85,8 @@ def _quantity(quantity: Channel | Quantity) -> dict[str, object]:
     if isinstance(quantity, Channel):
         if quantity.standard_deviation is not None:
             data["standard_deviation"] = from_si(quantity.standard_deviation)
+        if quantity.accepted_error is not None:
+            data["accepted_error"] = from_si(quantity.accepted_error)
         if quantity.place:
             data["place"] = quantity.place
     return data | ({"description": quantity.description} if quantity.description else {})

@@ -30,6 +30,8 @@ def data(noise: float = 0.0) -> Any:
         chi_squared=lambda c: c,
         noise=noise,
         excess_standard_error=0.0,
+        accepted=0.0,
+        kind="tracks",
     )
 
 

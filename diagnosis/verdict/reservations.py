@@ -1,0 +1,55 @@
+"""What speaks against a verdict: a misfit that remains, and held-out recordings that are not predicted."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from wingfit.diagnosis.evidence.refit import Refit
+from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
+from wingfit.diagnosis.finding import Proof, amount
+from wingfit.diagnosis.verdict.verdict import Decision
+from wingfit.diagnosis.verdict.weigh_hypotheses import nominal_refuted
+
+NOT_PREDICTED = 2.0  # times the floor: the lower end of a held-out misfit from which a model does not predict
+
+
+def remaining_sentence(data: WhitenedData, decision: Decision, best: Refit, floor: float) -> str:
+    """Return a sentence on a misfit that the named effects leave; empty if none is significant.
+
+    ``floor`` (m or N): discretisation error.
+    """
+    if decision.verdict in ("adequate", "unnamed") or not nominal_refuted(data, best.excess, floor):
+        return ""
+    rest = amount(float(np.sqrt(best.excess)), data.unit)
+    return (
+        f" A misfit of {rest} beyond the noise remains that this does not explain: something else is missing as well."
+    )
+
+
+def doubted_by_held_out(decision: Decision, proved: Proof | None, data: WhitenedData) -> Decision:
+    """Return ``decision`` with less certainty if a model is called adequate that does not predict held-out series."""
+    if not _unpredicted(decision, proved, data):
+        return decision
+    found = dict(decision.probabilities)
+    moved = max(found["adequate"] - data.policy.doubted_noise, 0.0)
+    found["adequate"], found["unnamed"] = found["adequate"] - moved, found["unnamed"] + moved
+    return replace(decision, probabilities=found)
+
+
+def held_out_sentence(decision: Decision, proved: Proof | None, data: WhitenedData) -> str:
+    """Return a sentence on held-out series that a model, called adequate, does not predict; empty if there are none."""
+    if not _unpredicted(decision, proved, data) or proved is None:
+        return ""
+    return (
+        f" But it does not predict the held-out recordings: their misfit is {proved.before.value:.3g} times the floor. "
+        "Something is missing there, or the fitted recordings do not determine the genes."
+    )
+
+
+def _unpredicted(decision: Decision, proved: Proof | None, data: WhitenedData) -> bool:
+    if data.kind != "series" or decision.verdict != "adequate" or proved is None:
+        return False
+    low = proved.before.low
+    return (proved.before.value if low is None else low) > NOT_PREDICTED
