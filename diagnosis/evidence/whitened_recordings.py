@@ -187,7 +187,16 @@ class WhitenedData:
     @cached_property
     def effective_samples(self) -> float:
         """Number of independent samples of a model's error: a few for each recording, however long it is."""
-        return min(self.policy.effective_samples * len(self.recordings), self.policy.max_effective_samples)
+        most = self.policy.effective_samples
+        every = [min(fit.features, most) if isinstance(fit, SeriesFit) else most for fit in self.reduced]
+        return min(sum(every), self.policy.max_effective_samples)
+
+    @cached_property
+    def gene_cost(self) -> float:
+        """Evidence that a gene costs; of a few samples of a series less: half the logarithm of their number."""
+        if self.kind != "series":
+            return self.policy.gene_cost
+        return float(min(0.5 * np.log(max(self.effective_samples, np.e)), self.policy.gene_cost))
 
     def deviance(self, coefficients: Float[Array, "*B D"]) -> Float[Array, "*B"]:
         """Return minus twice the log-likelihood [...] of residual ``coefficients`` [..., D].

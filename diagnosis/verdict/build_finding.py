@@ -20,7 +20,12 @@ from wingfit.diagnosis.verdict.locate_in_beat import locate_in_beat
 from wingfit.diagnosis.verdict.next_experiment import rank_conditions, separations
 from wingfit.diagnosis.verdict.noise_remarks import drift_sentence, noise_remarks
 from wingfit.diagnosis.verdict.proof import ResidualPair, predict_held_out, proof, recording_misfits
-from wingfit.diagnosis.verdict.reservations import doubted_by_held_out, held_out_sentence, remaining_sentence
+from wingfit.diagnosis.verdict.reservations import (
+    doubted_by_held_out,
+    held_out_sentence,
+    noise_sentence,
+    remaining_sentence,
+)
 from wingfit.diagnosis.verdict.series_remarks import series_remarks
 from wingfit.diagnosis.verdict.verdict import Decision, decide, hypotheses, summary
 from wingfit.records import AnyRecording
@@ -104,6 +109,7 @@ def _finding(
         summary=summary(decision, suspects, _summary_texts(data, nominal, best, located, proved))
         + ("" if data.kind == "series" else drift_sentence(data))
         + remaining_sentence(data, decision, best, discretisation)
+        + noise_sentence(data, decision, nominal)
         + held_out_sentence(decision, proved, data),
         probabilities=decision.probabilities,
         named=decision.named,

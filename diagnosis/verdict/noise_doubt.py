@@ -40,4 +40,4 @@ def uncertain(data: WhitenedData, fit: Fit) -> bool:
     """Return whether the residual clearly exceeds the visible noise, and only slow noise could explain that."""
     sure = MEASURED_ERROR * data.noise**2 + data.excess_standard_error_of_samples
     beyond = data.excess(fit.coefficients) - (data.policy.negligible * data.noise) ** 2 - data.accepted**2
-    return beyond > data.policy.refuting_excess * sure
+    return data.policy.refuting_excess * sure < beyond <= data.policy.refuting_excess * data.excess_standard_error

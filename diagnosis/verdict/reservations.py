@@ -9,6 +9,7 @@ import numpy as np
 from wingfit.diagnosis.evidence.refit import Refit
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.finding import Proof, amount
+from wingfit.diagnosis.verdict.noise_doubt import noise_may_hide
 from wingfit.diagnosis.verdict.verdict import Decision
 from wingfit.diagnosis.verdict.weigh_hypotheses import nominal_refuted
 
@@ -26,6 +27,13 @@ def remaining_sentence(data: WhitenedData, decision: Decision, best: Refit, floo
     return (
         f" A misfit of {rest} beyond the noise remains that this does not explain: something else is missing as well."
     )
+
+
+def noise_sentence(data: WhitenedData, decision: Decision, nominal: Refit) -> str:
+    """Return a sentence on a noise that may hide missing physics, if the model is called adequate; else empty."""
+    if decision.verdict != "adequate" or not noise_may_hide(data, nominal.fit):
+        return ""
+    return " But the noise is not known well enough to exclude it: see the remarks."
 
 
 def doubted_by_held_out(decision: Decision, proved: Proof | None, data: WhitenedData) -> Decision:

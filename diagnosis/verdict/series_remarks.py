@@ -18,6 +18,7 @@ SOURCES = {
     "stated": "what the dataset states",
     "highest frequencies": "the highest frequencies, which show no slow noise; state it, or record repeats",
     "resolution": "the resolution of the recorder",
+    "other recordings": "the other recordings",
 }
 
 

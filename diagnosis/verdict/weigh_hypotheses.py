@@ -60,7 +60,7 @@ def weigh(
     evidence = _evidence(data, tau + excess, genes, effects, suspects)
     unknown = (
         -0.5 * data.effective_samples * np.log(tau + policy.unknown_residual**2 * excess[0])
-        - policy.gene_cost * policy.unknown_genes
+        - data.gene_cost * policy.unknown_genes
     )
     top = max(evidence.max(), unknown)
     weight, other = np.exp(evidence - top), np.exp(unknown - top)
@@ -110,9 +110,7 @@ def _explains_drift(data: WhitenedData, nominal: Refit, refit: Refit) -> bool:
 def _evidence(data: WhitenedData, excess: Array, genes: Array, effects: Array, suspects: int) -> Array:
     """Return the log evidence [H] for ``excess`` [H], a multiple of the noise variance, with the tolerated part."""
     return np.asarray(
-        -0.5 * data.effective_samples * np.log(excess)
-        - data.policy.gene_cost * genes
-        - np.log(max(suspects, 2)) * effects
+        -0.5 * data.effective_samples * np.log(excess) - data.gene_cost * genes - np.log(max(suspects, 2)) * effects
     )
 
 

@@ -25,13 +25,14 @@ from wingfit.inference.noise.visible_noise import LEAST_SAMPLES, visible_noise
 from wingfit.records.array_types import Array, Float
 from wingfit.records.series import Series
 
-Source = Literal["repeats", "period", "stated", "highest frequencies", "resolution"]
+Source = Literal["repeats", "period", "stated", "highest frequencies", "resolution", "other recordings"]
 SOURCES: tuple[Source, ...] = ("highest frequencies", "resolution", "stated", "period", "repeats")  # least sure first
 
 LEAST_PERIODS = 3.0
 BANDS_PER_OCTAVE = 2.0
 LEAST_PER_BAND = 6  # coefficients
 STATED_ERROR = 0.15  # standard error of a stated variance, relative
+BORROWED_ERROR = 1.0  # of a variance that is assumed to be that of other recordings
 MEASURED_ERROR = 0.05  # the least for one that is estimated: noise is not exactly stationary
 FLOOR = 1e-6  # of the largest value: smallest standard deviation
 QUANTUM = 1e-6  # relative distance from a multiple of the smallest step within which values are quantised
@@ -63,9 +64,30 @@ class UnknownNoiseError(ValueError):
 
 
 def noise_of(recordings: Sequence[Series]) -> dict[str, SeriesNoise]:
-    """Return the noise of each of ``recordings`` by name; UnknownNoiseError if that of one cannot be known."""
-    by_repeats = dict(_from_repeats(recordings))
-    return {one.name: by_repeats.get(one.name) or _alone(one) for one in recordings}
+    """Return the noise of each of ``recordings`` by name; UnknownNoiseError if that of a channel cannot be known.
+
+    Where one recording does not show the noise of a channel, it is assumed to be the largest of the other recordings.
+    """
+    found, unknown = dict(_from_repeats(recordings)), list[tuple[Series, UnknownNoiseError]]()
+    for one in recordings:
+        if one.name not in found:
+            try:
+                found[one.name] = _alone(one)
+            except UnknownNoiseError as error:
+                unknown.append((one, error))
+    known = list(found.values())
+    for one, reason in unknown:
+        if not known:
+            raise reason
+        found[one.name] = _as_others(one, known)
+    return found
+
+
+def _as_others(recording: Series, known: Sequence[SeriesNoise]) -> SeriesNoise:
+    """Return the largest of the ``known`` noises of each channel, for a recording that does not show its own."""
+    deviations = np.max([one.standard_deviation for one in known], axis=0)
+    white, error = np.ones(recording.values.T.shape), max(BORROWED_ERROR, *(one.relative_error for one in known))
+    return SeriesNoise(deviations, white, error, "other recordings", np.full(len(deviations), np.nan))
 
 
 def _alone(recording: Series) -> SeriesNoise:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,6 +34,7 @@ class SeriesFit:
         lag1: correlation of the noise of successive samples, mean over the channels.
         relative_error: standard error of the variance of the noise, relative.
         source: where the noise is known from.
+        features: number of coefficients that hold most of what was recorded: a smooth fall has two, a swing many.
     """
 
     scale: Float[Array, " C"]
@@ -45,6 +46,7 @@ class SeriesFit:
     lag1: float
     relative_error: float
     source: Source
+    features: float
 
     def of(self, residuals: Float[Array, "*B T C"]) -> Float[Array, "*B C P"]:
         """Coefficients [..., C, P] of ``residuals`` [..., T, C] (NaN: not recorded)."""
@@ -93,6 +95,7 @@ class SeriesReduction:
             float((noise.density * turns).mean()),
             noise.relative_error,
             noise.source,
+            features(recording, noise),
         )
 
 
@@ -105,14 +108,33 @@ def band(recording: Series, noise: SeriesNoise) -> int:
 
     Far above the highest frequency that was recorded, a residual is noise, which would only hide what lies below.
     """
-    times, last = recording.times, LEAST_COEFFICIENTS
+    last = LEAST_COEFFICIENTS
+    for power, expected in _powers(recording, noise):
+        (above,) = np.nonzero(smoothed(power) > SIGNAL * expected)
+        last = max(last, int(WIDER * (above.max(initial=0) + 1)))
+    return min(last, len(recording.times))
+
+
+def features(recording: Series, noise: SeriesNoise) -> float:
+    """Return the number of coefficients that hold most of what was recorded beyond the noise: sum^2 / sum of squares.
+
+    As many independent samples, about, has the error of a model: a smooth motion cannot contradict a model often.
+    """
+    beyond = np.sum([np.maximum(own / expected - SIGNAL, 0.0) for own, expected in _powers(recording, noise)], axis=0)
+    return float(max(np.sum(beyond) ** 2 / max(np.sum(beyond**2), 1e-300), 1.0))
+
+
+def _powers(recording: Series, noise: SeriesNoise) -> Iterator[tuple[Array, Array]]:
+    """Yield, for each channel with enough samples, the power [T] of its coefficients and that of their noise.
+
+    A quadratic trend is removed first: its leakage into high frequencies is not signal.
+    """
+    times = recording.times
     powers = np.vander((times - times.mean()) / max(float(np.ptp(times)), 1e-300), 3)
     for k, seen in enumerate(recording.valid.T):
         if seen.sum() < LEAST_SAMPLES:
             continue
         values = np.where(seen, recording.values[:, k], 0.0)
-        trend = powers @ np.linalg.lstsq(powers[seen], values[seen], rcond=None)[0]  # its leakage is not signal
-        power = smoothed(cosine_transform(np.where(seen, values - trend, 0.0)[:, None])[:, 0] ** 2)
-        (above,) = np.nonzero(power > SIGNAL * noise.density[k] * noise.standard_deviation[k] ** 2)
-        last = max(last, int(WIDER * (above.max(initial=0) + 1)))
-    return min(last, len(times))
+        trend = powers @ np.linalg.lstsq(powers[seen], values[seen], rcond=None)[0]
+        left = np.where(seen, values - trend, 0.0)
+        yield cosine_transform(left[:, None])[:, 0] ** 2, noise.density[k] * noise.standard_deviation[k] ** 2

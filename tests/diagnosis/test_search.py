@@ -44,7 +44,15 @@ def known(evidence: Sequence[float], *refits: Any) -> Any:
 
 def state(*tried: Trial) -> Any:
     """A search state with trials of ``tried`` and noise of 1."""
-    data = SimpleNamespace(noise=1.0, excess_standard_error=0.0, policy=POLICY, drift=0.0, accepted=0.0, kind="tracks")
+    data = SimpleNamespace(
+        noise=1.0,
+        excess_standard_error=0.0,
+        policy=POLICY,
+        drift=0.0,
+        accepted=0.0,
+        gene_cost=POLICY.gene_cost,
+        kind="tracks",
+    )
     return SimpleNamespace(data=data, trials=[[one] for one in tried])
 
 

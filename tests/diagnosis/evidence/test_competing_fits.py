@@ -31,6 +31,7 @@ def data(noise: float = 0.0) -> Any:
         noise=noise,
         excess_standard_error=0.0,
         accepted=0.0,
+        gene_cost=POLICY.gene_cost,
         kind="tracks",
     )
 
