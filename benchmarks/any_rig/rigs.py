@@ -22,7 +22,7 @@ def _motor(genes: Mapping[str, float], run: Run) -> dict[str, Array]:
         torque = k * current - genes["damping"] * speed + run.force("shaft", angle, speed)
         return speed, torque / genes["inertia"]
 
-    _, speed = run.integrate(rate, [0.0, genes["speed0"]])
+    _, speed = run.integrate(rate, [0.0, genes["speed0"]], steps=2)
     return {"speed": speed, "current": (run.input("voltage", run.times) - k * speed) / r}
 
 
@@ -34,7 +34,7 @@ def _circuit(genes: Mapping[str, float], run: Run) -> dict[str, Array]:
         voltage = float(run.input("source", t)) - genes["resistance"] * current - charge / genes["capacitance"]
         return current, (voltage + run.force("loop", charge, current)) / genes["inductance"]
 
-    charge, _ = run.integrate(rate, [genes["charge0"], 0.0])
+    charge, _ = run.integrate(rate, [genes["charge0"], 0.0], steps=2)
     return {"voltage": charge / genes["capacitance"]}
 
 
@@ -51,7 +51,7 @@ def _block(genes: Mapping[str, float], run: Run) -> dict[str, Array]:
         heat = float(run.input("heater", t))
         return (heat - across) / genes["capacity"], (across - lost) / genes["shell_capacity"]
 
-    block, shell = run.integrate(rate, [genes["block0"], genes["shell0"]])
+    block, shell = run.integrate(rate, [genes["block0"], genes["shell0"]], steps=1)
     return {"block": block, "shell": shell}
 
 
@@ -65,7 +65,7 @@ def _two_masses(genes: Mapping[str, float], run: Run) -> dict[str, Array]:
         outer = float(run.input("push", t)) - 20.0 * first - genes["drag"] * v1
         return v1, v2, outer + pull, -pull / 0.5
 
-    found = run.integrate(rate, [genes["first0"], genes["second0"], 0.0, 0.0])
+    found = run.integrate(rate, [genes["first0"], genes["second0"], 0.0, 0.0], steps=2)
     return {"first": found[0], "second": found[1]}
 
 

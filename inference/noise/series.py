@@ -112,7 +112,8 @@ def _of_channel(recording: Series, column: int) -> tuple[float, Array, float, So
     values = recording.values[recording.valid[:, column], column]
     stated, least = recording.quantities[column].standard_deviation, quantum(values) / np.sqrt(12.0)
     frequency = np.arange(len(recording.times)) / (2.0 * len(recording.times))
-    own = visible_noise(values, stated)
+    seen = recording.valid[:, column]
+    own = visible_noise(values, stated, [one[seen] for one in recording.inputs.values()])
     density = own.density(frequency) if own else np.ones(len(frequency))
     if stated is not None:
         return max(stated, least), density, STATED_ERROR, "stated"
@@ -125,7 +126,11 @@ def _of_channel(recording: Series, column: int) -> tuple[float, Array, float, So
 
 def _visible(recording: Series) -> Array:
     """Return the standard deviation [C] of the noise that the highest frequencies show; NaN if they show none."""
-    found = [visible_noise(own[seen]) for own, seen in zip(recording.values.T, recording.valid.T, strict=True)]
+    inputs = list(recording.inputs.values())
+    found = [
+        visible_noise(own[seen], None, [one[seen] for one in inputs])
+        for own, seen in zip(recording.values.T, recording.valid.T, strict=True)
+    ]
     return np.array([np.nan if one is None else np.sqrt(one.variance) for one in found])
 
 

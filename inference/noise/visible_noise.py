@@ -9,11 +9,13 @@ to any level, so nothing is estimated then. Noise that looks white may be modera
 it: this uncertainty is part of the error. Slower noise (the wander of a camera) cannot be seen beside a signal.
 
 The periodogram is that of tapered second differences, divided by their gain: differences remove trends, whose leakage
-would cover the noise.
+would cover the noise. What follows an input within a few samples (a current follows a step of the voltage) is no noise
+either: it is fitted by the input at neighbouring instants, and subtracted.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -22,6 +24,8 @@ import scipy
 from wingfit.records.array_types import Array, Float
 
 LEAST_SAMPLES = 24
+LAGS = 2  # samples around an instant of an input
+SPARE = 4  # least number of samples for each of these
 HIGHEST, LOWEST = 0.25, 0.004  # cycles per sample: the visible band begins at or below, and is not followed below
 STEP = 2.0**-0.5  # ratio of the band's beginning from one extension to the next
 MORE = 1.5  # times the fitted noise: a band with more power holds signal, with less another noise
@@ -59,14 +63,17 @@ class VisibleNoise(NamedTuple):
         return np.asarray(self.white + self.coloured * _colour(frequency, self.lag1))
 
 
-def visible_noise(values: Float[Array, " T"], stated: float | None = None) -> VisibleNoise | None:
+def visible_noise(
+    values: Float[Array, " T"], stated: float | None = None, inputs: Sequence[Float[Array, " T"]] = ()
+) -> VisibleNoise | None:
     """Estimate the noise in ``values`` [T], evenly sampled; None if no frequency shows it, or if it rises too far.
 
-    ``stated``: standard deviation of the noise, if it is known; its colour is estimated then.
+    ``stated``: standard deviation of the noise, if it is known; its colour is estimated then. ``inputs``: what drives
+    the rig, at the same instants.
     """
     if len(values) < LEAST_SAMPLES or not np.ptp(values) > 0.0:
         return None
-    frequency, power = periodogram(values)
+    frequency, power = periodogram(values, inputs)
     start = HIGHEST
     upper, lower = power[frequency >= 0.375], power[(frequency >= HIGHEST) & (frequency < 0.375)]
     if upper.mean() <= 0.0 or lower.mean() > STEEPEST_FLANK * upper.mean() * (1.0 + _chance(lower) + _chance(upper)):
@@ -85,13 +92,28 @@ def visible_noise(values: Float[Array, " T"], stated: float | None = None) -> Vi
     return found if stated is not None or around[0] <= MOST_RISE * around[1] else None
 
 
-def periodogram(values: Float[Array, " T"]) -> tuple[Float[Array, " n"], Float[Array, " n"]]:
-    """Return frequencies (cycles per sample) above zero and the density of ``values`` [T] there; mean: the variance."""
-    second = np.diff(values, 2)
+def periodogram(
+    values: Float[Array, " T"], inputs: Sequence[Float[Array, " T"]] = ()
+) -> tuple[Float[Array, " n"], Float[Array, " n"]]:
+    """Return frequencies (cycles per sample) above zero and the density of ``values`` [T] there; mean: the variance.
+
+    What follows the ``inputs`` within LAGS samples is left out.
+    """
+    second = _without(np.diff(values, 2), [np.diff(one, 2) for one in inputs])
     taper = scipy.signal.windows.hann(len(second) + 2)[1:-1]
     power = np.abs(np.fft.rfft(second * taper)) ** 2 / (taper**2).sum()
     frequency = np.arange(len(power)) / len(second)
     return frequency[1:], power[1:] / (2.0 * np.sin(np.pi * frequency[1:])) ** 4
+
+
+def _without(second: Array, inputs: Sequence[Array]) -> Array:
+    """Return second differences [n] without the part that those of ``inputs`` [n] at neighbouring instants explain."""
+    columns = [np.roll(one, lag) for one in inputs for lag in range(-LAGS, LAGS + 1) if np.ptp(one) > 0.0]
+    if not columns or len(second) < SPARE * len(columns):
+        return second
+    design = np.stack(columns, axis=1)
+    left = second - design @ np.linalg.lstsq(design, second, rcond=None)[0]
+    return np.asarray(left * np.sqrt(len(second) / (len(second) - len(columns))))
 
 
 def _chance(power: Array) -> float:
