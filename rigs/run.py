@@ -107,7 +107,7 @@ class Run:
             calls += 1
             if calls > most:
                 raise SimulationError(f"the integration makes no progress at {t:.6g} s; {most} rates were evaluated")
-            if not state @ state < ESCAPED**2:
+            if not (state.max() < ESCAPED and state.min() > -ESCAPED):
                 raise SimulationError(f"the motion grows without bound: its state escapes at {t:.6g} s")
             if not remembering:
                 return rate(t, state)
