@@ -117,10 +117,15 @@ def _of_channel(recording: Series, column: int) -> tuple[float, Array, float, So
     density = own.density(frequency) if own else np.ones(len(frequency))
     if stated is not None:
         return max(stated, least), density, STATED_ERROR, "stated"
-    if own is not None and own.variance > least**2:
+    if least > 0.0 and (own is None or own.variance < EXCEEDS**2 * least**2):  # the error of rounding, which is white
+        return (
+            max(least, float(np.sqrt(own.variance)) if own else 0.0),
+            np.ones(len(frequency)),
+            STATED_ERROR,
+            "resolution",
+        )
+    if own is not None:
         return float(np.sqrt(own.variance)), density, own.error, "highest frequencies"
-    if least > 0.0:
-        return least, np.ones(len(frequency)), STATED_ERROR, "resolution"
     raise UnknownNoiseError(_unknown(recording, column))
 
 
