@@ -19,7 +19,7 @@ import numpy as np
 from scipy.special import elliprg
 
 from wingfit.inference.noise.drift import Drift, drift_of, slow_basis
-from wingfit.inference.noise.mean_beat import fourier_basis, scatter_about
+from wingfit.inference.noise.mean_beat import fourier_basis, masks_of, scatter_about
 from wingfit.inference.noise.spectrum import density_at_harmonics, lag1_autocorrelation
 from wingfit.records import Recording
 from wingfit.records.array_types import Array, Bool, Float, Index, Int, Mask
@@ -271,13 +271,11 @@ def _inner(basis: Array, valid: Mask) -> tuple[Array, Mask]:
     samples, without long gaps in the beat.
     """
     inner, used = np.zeros((valid.shape[1], basis.shape[1], basis.shape[1])), np.zeros(valid.shape[1], bool)
-    masks, group = np.unique(valid, axis=1, return_inverse=True)
-    for k, mask in enumerate(masks.T):
+    for mask, same in masks_of(valid):
         gram = basis[mask].T @ basis[mask]
         if mask.sum() < SPARE * basis.shape[1] or np.linalg.cond(gram) > 1e8:
             continue
         found = np.linalg.inv(gram)
-        same = group.ravel() == k
         inner[same], used[same] = found, (np.diag(found) * np.diag(gram)).max() <= INFLATED
     return inner, used
 
