@@ -13,7 +13,7 @@ The mean of the beat is compared apart from the harmonics, because slow noise ri
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import stats
@@ -25,6 +25,7 @@ from wingfit.records.array_types import Array, Bool, Float, Index, Int, Mask
 
 HARMONICS = 3  # compared: those in which a wing moves most
 FEWEST_BEATS = 3  # with which lines remain that the change does not use up
+FEWEST_OF_MEAN = 4  # with which two lines above zero show how noise rises towards it
 CURVED = 4  # beats from which a curved change is found and removed, too
 NEAREST = 3  # spectral lines on either side of a harmonic: farther ones say less about the noise at the harmonic
 RISE = 1.5  # largest ratio of the density of noise at a harmonic to that around it that counts as usual
@@ -52,6 +53,11 @@ class Drift:
         """Power of the larger of the changes that were found to that of the noise near it; 0 if there is none."""
         return max((one.ratio for one in (self.beat, self.mean) if one.found), default=0.0)
 
+    def words(self, size: str) -> str:
+        """Describe the changes that were found, with their ``size`` as text with its unit."""
+        what = f"by {size}" if self.beat.found else f"its mean by {size}"
+        return f"{what}, {self.ratio:.2g} times the power of noise"
+
 
 def drift_of(
     scatter: Float[Array, "T C"],
@@ -60,12 +66,14 @@ def drift_of(
     apparent: Float[Array, " T"],
     harmonics: int,
     beats: int,
+    least: float = 0.0,
 ) -> Drift | None:
-    """Compare the slow change of the first harmonics with the noise around them.
+    """Compare the slow changes of the first harmonics, and of the mean, with the noise near them.
 
     ``scatter`` [T, C]: recorded values minus mean beat, zero where not ``valid``; ``psi`` [T]: phase (rad) of the beat,
     ``apparent`` [T]: time in apparent beats; ``harmonics``: of the mean beat; ``beats``: whole apparent beats. The
-    change is linear or, from CURVED beats on, curved. None with too few beats, or too few samples between gaps.
+    change is linear or, from CURVED beats on, curved. ``least`` (m or N): changes of smaller root mean square count as
+    none. None with too few beats, or too few samples between gaps.
     """
     if beats < FEWEST_BEATS:
         return None
@@ -81,16 +89,22 @@ def drift_of(
             lower = zip(*changes, strict=True) if changes else [()] * len(orders)
             new = [_slow(psi[mask], time[mask], k, degree) for k in orders]
             changes.append([orthonormal(one, periodic, *less) for one, less in zip(new, lower, strict=True)])
-        every = orthonormal(np.hstack([one for row in changes for one in row]))
+        of_zero = [_slow(psi[mask], time[mask], 0, degree) for degree in _degrees(beats)]
+        # The changes of the mean and of one harmonic are also in the lines near others.
+        every = orthonormal(np.hstack([*(one for row in changes for one in row), *of_zero]), periodic)
         lines = [orthonormal(_waves(apparent[mask], k, distances), periodic, every) for k in orders]
         values = scatter[np.ix_(mask, channels)]
-        parts.append(_Powers.of(values, values - every @ (every.T @ values), changes, lines))
-        slow = [_slow(psi[mask], time[mask], 0, degree) for degree in _degrees(beats)]
-        of_mean.append(MeanPowers.of(values, slow, _waves(apparent[mask], 0, mean_distances(beats)), periodic))
+        steady = values - every @ (every.T @ values)
+        parts.append(_Powers.of(values, steady, changes, lines))
+        if beats < FEWEST_OF_MEAN:
+            continue
+        waves = orthonormal(_waves(apparent[mask], 0, mean_distances(beats)), periodic, every)
+        of_mean.append(MeanPowers.of(values, steady, [orthonormal(one, periodic) for one in of_zero], waves))
     if not parts or min(float(one.freedom.min()) for one in parts) < 1.0:
         return None
     samples = int(valid.sum())
-    return Drift(_compared(parts, samples), change_of_mean(of_mean, samples))
+    changes_found = (_compared(parts, samples), change_of_mean(of_mean, samples) if of_mean else Change(0.0, 1.0, 0.0))
+    return Drift(*(one if one.size >= least else replace(one, probability=1.0) for one in changes_found))
 
 
 @dataclass(frozen=True)

@@ -13,17 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
-from wingfit.inference.noise.slow_change import Change, independent_sources, orthonormal
+from wingfit.inference.noise.slow_change import Change, independent_sources
 from wingfit.records.array_types import Array, Float
 
 MEAN_LINES = 12  # spectral lines above zero from which the noise is extrapolated, up to half the flap frequency
 CERTAIN_OF_MEAN = 1e-3  # probability of noise alone below which a change of the mean counts as found
-ALLOWED = 1.0  # of minus the log-likelihood: mixtures of white noise and random walk that the lines allow
-MIXTURES = np.concatenate([[0.0], np.logspace(-1.0, 4.0, 51)])  # random walk in line 1, over white noise
-# Mean power of a random walk of power 1 / k^2 at line k: in the slow changes of degree 1 and 2, and in line 1 without
-# changes of degree 1, or of both.
-OF_SLOW = np.array([3.31, 0.79])
-OF_FIRST_LINE = (0.62, 0.31)
+ALLOWED = 0.5  # of minus the log-likelihood: mixtures of white noise and random walk that the lines allow
+MIXTURES = np.concatenate([[0.0], np.logspace(-1.0, 4.0, 51)])  # largest power of a random walk in a line, over white noise
 
 
 @dataclass(frozen=True)
@@ -31,32 +27,34 @@ class MeanPowers:
     """Slow changes of the mean of D degrees, and noise at L lines above zero, in C channels that have the same gaps.
 
     ``slow`` [D, C]: squared coefficients of the changes; ``near`` [2 L, C]: coefficients of the noise, cosines first;
-    ``level`` [C]: mean square of the samples without the changes.
+    ``level`` [C]: mean square of the samples without the changes; ``walk`` [D + L]: mean square that a random walk has
+    in each change and in each line.
     """
 
     slow: Float[Array, "D C"]
     near: Float[Array, "L2 C"]
     level: Float[Array, " C"]
+    walk: Float[Array, " DL"]
 
     @classmethod
     def of(
         cls,
         values: Float[Array, "T C"],
+        steady: Float[Array, "T C"],
         changes: list[Float[Array, "T 1"]],
-        waves: Float[Array, "T L2"],
-        periodic: Float[Array, "T P"],
+        lines: Float[Array, "T L2"],
     ) -> MeanPowers:
-        """Project ``values`` [T, C] on slow ``changes`` of the mean and on the ``waves`` of L lines, cosines first.
+        """Project ``values`` [T, C] on slow ``changes`` of the mean, and ``steady`` [T, C], without slow changes, on lines.
 
-        All are made orthogonal to the ``periodic`` basis [T, P], which is orthonormal.
+        ``lines``: orthonormal cosines and sines of L lines above zero, cosines first, orthogonal to slow changes and
+        mean beat; the changes are orthonormal, too.
         """
-        every: list[Array] = []
-        for one in changes:
-            every.append(orthonormal(one, periodic, *every))
-        slow = np.array([((one.T @ values) ** 2).sum(axis=0) for one in every])
-        steady = values - sum(one @ (one.T @ values) for one in every)
-        near = orthonormal(waves, periodic, *every).T @ steady
-        return cls(slow, near, np.maximum((steady**2).mean(axis=0), 1e-300))
+        slow = np.array([((one.T @ values) ** 2).sum(axis=0) for one in changes])
+        # A random walk is a sum of independent steps; each step shifts all samples that follow it.
+        walk = [(np.cumsum(one, axis=0) ** 2).sum(axis=0) for one in (*changes, lines)]
+        of_lines = walk.pop().reshape(2, -1).mean(axis=0)
+        level = np.maximum((steady**2).mean(axis=0), 1e-300)
+        return cls(slow, lines.T @ steady, level, np.concatenate([*walk, of_lines]))
 
 
 def mean_distances(beats: int) -> Float[Array, " L"]:
@@ -75,7 +73,8 @@ def change_of_mean(parts: list[MeanPowers], samples: int) -> Change:
     near = np.concatenate([one.near for one in parts], axis=1) / np.sqrt(level)
     degrees, lines = len(slow), len(near) // 2
     power = (near[:lines] ** 2 + near[lines:] ** 2).mean(axis=1) / 2.0
-    expected = _expected(power, degrees)
+    walk = np.average([one.walk for one in parts], axis=0, weights=[len(one.level) for one in parts])
+    expected = _expected(power, walk[degrees:], walk[:degrees])
     sources = independent_sources(near[None], np.array([2.0 * lines]))
     found = []
     for count in range(1, degrees + 1):
@@ -87,13 +86,14 @@ def change_of_mean(parts: list[MeanPowers], samples: int) -> Change:
     return Change(-ratio, min(probability, 1.0), float(np.sqrt(max(beyond, 0.0) / samples)), CERTAIN_OF_MEAN)
 
 
-def _expected(power: Array, degrees: int) -> Array:
-    """Power [D] of noise in slow changes of each degree, the most that the ``power`` [L] of the lines allows."""
-    lines = np.arange(1, len(power) + 1)
-    walk = 1.0 / lines**2
-    walk[0] = OF_FIRST_LINE[degrees - 1]
-    shape = 1.0 + MIXTURES[:, None] * walk
+def _expected(power: Array, walk: Array, of_slow: Array) -> Array:
+    """Power [D] of noise in slow changes of each degree, the most that the ``power`` [L] of the lines allows.
+
+    ``walk`` [L] and ``of_slow`` [D]: power of a random walk in the lines and in the slow changes.
+    """
+    mixtures = MIXTURES[:, None] / walk.max()
+    shape = 1.0 + mixtures * walk
     scale = np.maximum((power / shape).mean(axis=1), 1e-300)
-    cost = np.log(shape).sum(axis=1) + len(lines) * np.log(scale)
-    most = scale[:, None] * (1.0 + MIXTURES[:, None] * OF_SLOW[:degrees])
+    cost = np.log(shape).sum(axis=1) + len(power) * np.log(scale)
+    most = scale[:, None] * (1.0 + mixtures * of_slow)
     return np.asarray(most[cost <= cost.min() + ALLOWED].max(axis=0))

@@ -118,7 +118,7 @@ def test_noise_with_long_gaps_is_no_drift(beats: int, lost: int, memory: float) 
         drift = harmonic_fit(recording(gappy)).drift
         assert drift is not None
         assert not drift.found
-        ratios += [drift.ratio]
+        ratios += [drift.beat.ratio]
     if memory == 0.0:
         assert np.median(ratios) == pytest.approx(1.0, abs=0.2)
 
