@@ -19,7 +19,7 @@ from wingfit.records.array_types import Array, Float
 MEAN_LINES = 12  # spectral lines above zero from which the noise is extrapolated, up to half the flap frequency
 CERTAIN_OF_MEAN = 1e-3  # probability of noise alone below which a change of the mean counts as found
 ALLOWED = 0.5  # of minus the log-likelihood: mixtures of white noise and random walk that the lines allow
-MIXTURES = np.concatenate([[0.0], np.logspace(-1.0, 4.0, 51)])  # largest power of a random walk in a line, over white noise
+MIXTURES = np.concatenate([[0.0], np.logspace(-1.0, 4.0, 51)])  # random walk over white noise, where it is largest
 
 
 @dataclass(frozen=True)
@@ -44,9 +44,9 @@ class MeanPowers:
         changes: list[Float[Array, "T 1"]],
         lines: Float[Array, "T L2"],
     ) -> MeanPowers:
-        """Project ``values`` [T, C] on slow ``changes`` of the mean, and ``steady`` [T, C], without slow changes, on lines.
+        """Project ``values`` [T, C] on slow ``changes`` of the mean, and ``steady`` [T, C] on spectral ``lines``.
 
-        ``lines``: orthonormal cosines and sines of L lines above zero, cosines first, orthogonal to slow changes and
+        ``steady``: the values without slow changes of mean and harmonics; ``lines``: orthonormal cosines and sines of L lines above zero, cosines first, orthogonal to slow changes and
         mean beat; the changes are orthonormal, too.
         """
         slow = np.array([((one.T @ values) ** 2).sum(axis=0) for one in changes])
