@@ -37,7 +37,9 @@ class Policy:
         0.25, "fraction", "weight of cross-validated against fitted residuals: the cross-validation is linearised"
     )
     drift_left: float = _threshold(
-        0.5, "slow change of the beat", "a hypothesis that leaves more does not explain a drift of the rig"
+        0.5,
+        "slow change of the beat, or excess",
+        "a hypothesis that leaves more does not explain a drift of the rig, nor, if hardly worth its genes, a misfit",
     )
     least_evidence: float = _threshold(2.0, "evidence", "no effect is searched for, or added to the model, for less")
     single: float = _threshold(0.85, "probability", "share of all effects from which one hypothesis is named")

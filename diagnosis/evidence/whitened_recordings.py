@@ -117,7 +117,7 @@ class WhitenedData:
 
     @cached_property
     def drift(self) -> Float[Array, " R"]:
-        """Slow change of the beat, its mean included, of each recording [R] that noise does not explain, divided by its noise of a sample.
+        """Slow change of each recording [R] that noise does not explain, divided by its noise of a sample.
 
         Both are root mean squares over the recording's used channels; zero where noise explains the change.
         """

@@ -71,6 +71,4 @@ def drift_sentence(data: WhitenedData) -> str:
 def _drifts(data: WhitenedData) -> list[tuple[str, Drift]]:
     """Name and drift of the recordings during which the beat changes slowly, by more than any model must explain."""
     fits = zip(data.recordings, data.beat_fits, strict=True)
-    return [
-        (one.name, fit.drift) for one, fit in fits if fit.drift and fit.drift.size > data.tolerance
-    ]
+    return [(one.name, fit.drift) for one, fit in fits if fit.drift and fit.drift.size > data.tolerance]

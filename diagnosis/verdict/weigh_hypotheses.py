@@ -67,8 +67,9 @@ def weigh(
     possible = np.array([not absent(data, one) for one in hypotheses])
     drift_alone = only_drifts(data, nominal, floor)
     if nominal_refuted(data, nominal.excess, floor) or (drifts(data) and not drift_alone):
-        # A hypothesis that leaves the misfit as it was explains nothing; nor does the nominal model.
-        possible &= evidence - evidence[0] > policy.least_evidence
+        # A hypothesis that leaves the misfit as it was explains nothing; nor does the nominal model. With few recordings,
+        # one that explains most of the misfit may have little evidence.
+        possible &= (evidence - evidence[0] > policy.least_evidence) | (excess < policy.drift_left * excess[0])
     if drift_alone:
         possible &= [_explains_drift(data, nominal, one) for one in hypotheses]
     weight = np.where(possible, evidence, -np.inf)
@@ -102,8 +103,9 @@ def only_drifts(data: WhitenedData, nominal: Refit, floor: float) -> bool:
 
     ``floor`` (m or N): discretisation error.
     """
-    excess = data.mean_beat_excess(nominal.fit.coefficients)
-    return drifts(data) and not nominal_refuted(data, excess, floor)
+    if not drifts(data):
+        return False
+    return not nominal_refuted(data, data.mean_beat_excess(nominal.fit.coefficients), floor)
 
 
 def absent(data: WhitenedData, refit: Refit) -> bool:
@@ -111,8 +113,10 @@ def absent(data: WhitenedData, refit: Refit) -> bool:
 
     The interval of such a gene contains zero, or is bounded on neither side.
     """
-    sizes = [gene.value for gene in gene_values(data, refit) if gene.off is not None] if refit.trials else []
-    return bool(sizes) and all((v.low is None or v.low <= 0.0) and (v.high is None or v.high >= 0.0) for v in sizes)
+    if not any(trial.suspect.size_genes for trial in refit.trials):
+        return False
+    sizes = [gene.value for gene in gene_values(data, refit) if gene.off is not None]
+    return all((v.low is None or v.low <= 0.0) and (v.high is None or v.high >= 0.0) for v in sizes)
 
 
 def _explains_drift(data: WhitenedData, nominal: Refit, refit: Refit) -> bool:

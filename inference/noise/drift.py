@@ -84,22 +84,29 @@ def drift_of(
         if not mask.any():
             continue
         periodic = orthonormal(fourier_basis(psi[mask], harmonics))
+        # The changes of the mean and of the harmonics are not orthogonal, and a large one must not appear in another.
+        of_zero = [_slow(psi[mask], time[mask], 0, degree) for degree in _degrees(beats)]
+        mean = orthonormal(np.hstack(of_zero), periodic)
         changes: list[list[Array]] = []
         for degree in _degrees(beats):
             lower = zip(*changes, strict=True) if changes else [()] * len(orders)
             new = [_slow(psi[mask], time[mask], k, degree) for k in orders]
-            changes.append([orthonormal(one, periodic, *less) for one, less in zip(new, lower, strict=True)])
-        of_zero = [_slow(psi[mask], time[mask], 0, degree) for degree in _degrees(beats)]
-        # The changes of the mean and of one harmonic are also in the lines near others.
-        every = orthonormal(np.hstack([*(one for row in changes for one in row), *of_zero]), periodic)
+            changes.append([orthonormal(one, periodic, mean, *less) for one, less in zip(new, lower, strict=True)])
+        beat = orthonormal(np.hstack([one for row in changes for one in row]))
+        every = np.hstack([mean, beat])
         lines = [orthonormal(_waves(apparent[mask], k, distances), periodic, every) for k in orders]
         values = scatter[np.ix_(mask, channels)]
         steady = values - every @ (every.T @ values)
         parts.append(_Powers.of(values, steady, changes, lines))
         if beats < FEWEST_OF_MEAN:
             continue
+        raw = [_slow(psi[mask], time[mask], k, degree) for k in orders for degree in _degrees(beats)]
+        own = orthonormal(np.hstack(raw), periodic)
+        slow: list[Array] = []
+        for one in of_zero:
+            slow.append(orthonormal(one, periodic, own, *slow))
         waves = orthonormal(_waves(apparent[mask], 0, mean_distances(beats)), periodic, every)
-        of_mean.append(MeanPowers.of(values, steady, [orthonormal(one, periodic) for one in of_zero], waves))
+        of_mean.append(MeanPowers.of(values, steady, slow, waves))
     if not parts or min(float(one.freedom.min()) for one in parts) < 1.0:
         return None
     samples = int(valid.sum())

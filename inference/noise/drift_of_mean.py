@@ -46,8 +46,8 @@ class MeanPowers:
     ) -> MeanPowers:
         """Project ``values`` [T, C] on slow ``changes`` of the mean, and ``steady`` [T, C] on spectral ``lines``.
 
-        ``steady``: the values without slow changes of mean and harmonics; ``lines``: orthonormal cosines and sines of L lines above zero, cosines first, orthogonal to slow changes and
-        mean beat; the changes are orthonormal, too.
+        ``steady``: the values without slow changes of mean and harmonics; ``lines``: orthonormal cosines and sines of L
+        lines above zero, cosines first, orthogonal to slow changes and mean beat. The changes are orthonormal, too.
         """
         slow = np.array([((one.T @ values) ** 2).sum(axis=0) for one in changes])
         # A random walk is a sum of independent steps; each step shifts all samples that follow it.
