@@ -123,8 +123,10 @@ def test_a_change_of_the_mean_counts_where_the_mean_drifts() -> None:
     ramp = 2e-3 * np.linspace(-1, 1, 496)[:, None]
     data = WhitenedData.of([replace(one, values=one.values + ramp) for one in steady])
     assert data.drift[0] > 1.0
-    of_ramp, of_beat = (data.coefficients_of([np.broadcast_to(one, (496, data.recordings[0].values.shape[1]))])
-        for one in (ramp, ramp * np.cos(2 * np.pi * 1.7 * data.recordings[0].times)[:, None]))
+    of_ramp, of_beat = (
+        data.coefficients_of([np.broadcast_to(one, (496, data.recordings[0].values.shape[1]))])
+        for one in (ramp, ramp * np.cos(2 * np.pi * 1.7 * data.recordings[0].times)[:, None])
+    )
     assert data.change_of_beat(of_ramp) > 0.5e-6
     assert data.change_of_beat(of_beat) < 0.1e-6
 

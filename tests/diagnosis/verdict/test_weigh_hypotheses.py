@@ -40,7 +40,8 @@ def refit(
     ``drift``: mean square of the slow change of the beat that it leaves.
     """
     trials = tuple(
-        SimpleNamespace(suspect=SimpleNamespace(name=n, family=family, genes=(), size_genes=()), freedom=genes) for n in names
+        SimpleNamespace(suspect=SimpleNamespace(name=n, family=family, genes=(), size_genes=()), freedom=genes)
+        for n in names
     )
     fit = SimpleNamespace(coefficients=drift)
     return Refit(cast("Any", trials), cast("Any", fit), left**2, (left if predicted is None else predicted) ** 2)
