@@ -67,8 +67,8 @@ def weigh(
     possible = np.array([not absent(data, one) for one in hypotheses])
     drift_alone = only_drifts(data, nominal, floor)
     if nominal_refuted(data, nominal.excess, floor) or (drifts(data) and not drift_alone):
-        # A hypothesis that leaves the misfit as it was explains nothing; nor does the nominal model. With few recordings,
-        # one that explains most of the misfit may have little evidence.
+        # A hypothesis that leaves the misfit as it was explains nothing; nor does the nominal model. With few
+        # recordings, one that explains most of the misfit may have little evidence.
         possible &= (evidence - evidence[0] > policy.least_evidence) | (excess < policy.drift_left * excess[0])
     if drift_alone:
         possible &= [_explains_drift(data, nominal, one) for one in hypotheses]
