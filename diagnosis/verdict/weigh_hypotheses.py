@@ -11,8 +11,8 @@ may have (:func:`tolerated_excess`), likewise divided; nu the effective number o
 (`Policy.gene_cost`). The prior probability of each effect is one over the number of suspects. Two hypotheses always
 compete with the effects: *no physics is missing*, and *physics outside the library*, which is assumed to explain all
 but a fraction of the residual (`Policy.unknown_residual`) at the cost of the genes of a new law. If noise does not
-explain the residual of the nominal model, only hypotheses that are worth their genes compete with the second. An effect
-whose sizes may all be zero is not possible.
+explain the residual of the nominal model, only hypotheses that are worth their genes compete with the second. Those
+that are hardly worth them are possible if they explain most of the residual and their sizes cannot all be zero.
 """
 
 from __future__ import annotations
@@ -64,12 +64,14 @@ def weigh(
         -0.5 * data.effective_samples * np.log(tau + policy.unknown_residual**2 * excess[0])
         - policy.gene_cost * policy.unknown_genes
     )
-    possible = np.array([not absent(data, one) for one in hypotheses])
+    possible = np.ones(len(hypotheses), bool)
     drift_alone = only_drifts(data, nominal, floor)
     if nominal_refuted(data, nominal.excess, floor) or (drifts(data) and not drift_alone):
         # A hypothesis that leaves the misfit as it was explains nothing; nor does the nominal model. With few
-        # recordings, one that explains most of the misfit may have little evidence.
-        possible &= (evidence - evidence[0] > policy.least_evidence) | (excess < policy.drift_left * excess[0])
+        # recordings, one that explains most of the misfit may have little evidence, if its size is not zero.
+        possible = evidence - evidence[0] > policy.least_evidence
+        for k in np.flatnonzero(~possible & (excess < policy.drift_left * excess[0])):
+            possible[k] = not absent(data, hypotheses[k])
     if drift_alone:
         possible &= [_explains_drift(data, nominal, one) for one in hypotheses]
     weight = np.where(possible, evidence, -np.inf)

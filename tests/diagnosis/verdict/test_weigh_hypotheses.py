@@ -118,9 +118,9 @@ def test_an_effect_whose_sizes_may_all_be_zero_is_not_named(
     values = [SimpleNamespace(value=Interval(0.05, *one), off=0.0) for one in ends]
     shape = SimpleNamespace(value=Interval(1.0, 0.5, 2.0), off=None)
     monkeypatch.setattr(weigh_hypotheses, "gene_values", lambda _data, _refit: (*values, shape))
-    fitted = refit(0.3, ("a",))
+    fitted = refit(0.1, ("a",), 4)
     fitted.trials[0].suspect.size_genes = ("a.size",)  # type: ignore[misc]
-    assert decide(weigh(data(), refit(2.0), [fitted], 0.0, 40)).verdict == expected
+    assert decide(weigh(data(2, 0.4), refit(2.1), [fitted], 0.0, 40)).verdict == expected
 
 
 def test_an_effect_that_explains_nearly_all_is_named() -> None:
