@@ -60,6 +60,7 @@ def prepare(spec: CalibrationSpec, dataset: Dataset) -> Prepared:
     """Choose model, stages and filters, without simulating; ValueError if ``spec`` does not fit ``dataset``."""
     spec = resolved(spec, dataset)
     model, coarse = model_for(dataset, spec), search_model(dataset, spec)
+    _refuse_repeated("gene", spec.genes)
     known = [gene.name for gene in model.genes]
     for name in (*spec.genes, *spec.fixed):
         if name not in known:
@@ -80,9 +81,7 @@ def prepare(spec: CalibrationSpec, dataset: Dataset) -> Prepared:
 
 def _fitted(spec: CalibrationSpec, dataset: Dataset) -> tuple[Recording, ...]:
     """Return the recordings to be fitted, unfiltered; ValueError if one is held out or repeated, or there is none."""
-    for name, times in Counter(spec.recordings).items():
-        if times > 1:
-            raise ValueError(f"recording {name!r} is named {times} times; name it once")
+    _refuse_repeated("recording", spec.recordings)
     recordings = dataset.select(spec.recordings) if spec.recordings else dataset.fitted
     if not recordings:
         raise ValueError("every recording of the dataset is held out, and nothing is left to fit; hold out fewer")
@@ -90,6 +89,12 @@ def _fitted(spec: CalibrationSpec, dataset: Dataset) -> tuple[Recording, ...]:
         if recording.name in dataset.held_out:
             raise ValueError(f"recording {recording.name!r} is held out; a calibration must not fit it")
     return recordings
+
+
+def _refuse_repeated(what: str, names: tuple[str, ...]) -> None:
+    for name, times in Counter(names).items():
+        if times > 1:
+            raise ValueError(f"{what} {name!r} is named {times} times; name it once")
 
 
 def _stages(mode: Mode | None, free: tuple[str, ...], recordings: tuple[Recording, ...]) -> tuple[Stage, ...]:

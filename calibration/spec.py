@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Literal, get_args
 
+from wingfit.calibration.limits import REAL, WHOLE, refuse_number
 from wingfit.records import Dataset
 from wingfit.sim.solver.numerics import ACCURACY, Numerics
 from wingfit.sim.vehicle.blade_element_wing import BladeElementWing
@@ -83,7 +84,10 @@ class SearchDivisionError(ValueError):
 
 
 def resolved(spec: CalibrationSpec, dataset: Dataset) -> CalibrationSpec:
-    """Return ``spec`` with mode and method chosen; ValueError if one does not exist or does not fit ``dataset``."""
+    """Return ``spec`` with mode and method chosen; ValueError if one does not exist or does not fit ``dataset``.
+
+    ValueError, too, for numbers beyond their limits (:mod:`wingfit.calibration.limits`).
+    """
     wing = dataset.kind == "tracks"
     mode, method = spec.mode or ("staged" if wing else "local"), spec.method or ("genetic" if wing else "gauss_newton")
     for what, value, known in (("mode", mode, get_args(Mode)), ("method", method, get_args(Method))):
@@ -98,6 +102,12 @@ def resolved(spec: CalibrationSpec, dataset: Dataset) -> CalibrationSpec:
         raise ValueError(
             "mode 'local' fits each recording by itself, and a wing has one genome for all of them; "
             "use 'staged' or 'joint', and name a single recording to fit that alone"
+        )
+    for name in (*WHOLE, *REAL):
+        refuse_number(name, getattr(spec, name))
+    if method == "auto" and spec.finish:
+        raise ValueError(
+            "finish means nothing for the method auto, which ends with Gauss-Newton in any case; leave it out"
         )
     _refuse_search_division(spec, method, wing=wing)
     return replace(spec, mode=mode, method=method)

@@ -15,6 +15,7 @@ from wingfit.cli.base.output import note
 from wingfit.cli.forces import free_flight, kinematics
 from wingfit.cli.forces import runs as force_runs
 from wingfit.client.client import WingfitError
+from wingfit.sim.asked_lanes import asked_lanes
 
 ERROR = 1
 
@@ -45,6 +46,11 @@ app.command()(backup.restore)
 
 def main() -> None:
     """Run the command line; print expected errors as a message without traceback, and exit with code 1."""
+    try:
+        asked_lanes()  # the kernels need it when a command imports them
+    except ValueError as error:
+        note(f"error: {error}")
+        sys.exit(ERROR)
     try:
         app()
     except WingfitError as error:

@@ -37,7 +37,9 @@ class Policy:
         0.25, "fraction", "weight of cross-validated against fitted residuals: the cross-validation is linearised"
     )
     drift_left: float = _threshold(
-        0.5, "slow change of the beat", "a hypothesis that leaves more does not explain a drift of the rig"
+        0.5,
+        "slow change of the beat, or excess",
+        "a hypothesis that leaves more does not explain a drift of the rig, nor, if hardly worth its genes, a misfit",
     )
     doubted_noise: float = _threshold(
         0.5, "probability", "most that a model is adequate where missing physics may hide in the assumed noise"

@@ -128,23 +128,26 @@ class WhitenedData:
 
     @cached_property
     def drift(self) -> Float[Array, " R"]:
-        """Slow change of the beat of each recording [R] that noise does not explain, divided by its noise of a sample.
+        """Slow change of each recording [R] that noise does not explain, divided by its noise of a sample.
 
         Both are root mean squares over the recording's used channels; zero where noise explains the change.
         """
         if self.kind == "series":
             return np.zeros(len(self.recordings))
-        found = np.array([fit.drift.size if fit.drift and fit.drift.found else 0.0 for fit in self.beat_fits])
+        found = np.array([fit.drift.size if fit.drift else 0.0 for fit in self.beat_fits])
         noise = [float(np.sqrt(np.mean(fit.noise[fit.used] ** 2))) for fit in self.beat_fits]
         return np.asarray(found / np.maximum(noise, self.tolerance))
 
     def change_of_beat(self, coefficients: Float[Array, " D"]) -> float:
-        """Return the mean square beyond noise (m^2 or N^2) of a residual's linear change of the first harmonic.
+        """Return the mean square beyond noise (m^2 or N^2) of a residual's linear change of mean and first harmonic.
 
-        Only recordings with a :attr:`drift` count. ``coefficients`` [D]: of the residual.
+        Of each recording, only those of the two count that drift. ``coefficients`` [D]: of the residual.
         """
-        first = np.concatenate([np.tile(v.trend & (v.order > 0), int(v.used.sum())) for v in self.beat_fits])
-        seen = first & np.repeat(self.drift > 0.0, [part.stop - part.start for part in self.recording_slices])
+        parts = []
+        for fit in self.beat_fits:
+            beat, mean = (fit.drift.beat.found, fit.drift.mean.found) if fit.drift else (False, False)
+            parts.append(np.tile(fit.trend & np.where(fit.order > 0, beat, mean), int(fit.used.sum())))
+        seen = np.concatenate(parts)
         return max(float(self.weight[seen] @ (coefficients[seen] ** 2 - self.variance[seen])), 0.0)
 
     def mean_beat_excess(self, coefficients: Float[Array, " D"]) -> float:

@@ -32,10 +32,7 @@ def noise_remarks(data: WhitenedData, unit: str) -> tuple[str, ...]:
 
 def _drift_remarks(data: WhitenedData, unit: str) -> tuple[str, ...]:
     """Return a remark on recordings during which the beat changes slowly; empty if there are none."""
-    found = [
-        f"{name} (by {amount(drift.size, unit)}, {drift.ratio:.2g} times the power of noise)"
-        for name, drift in _drifts(data)
-    ]
+    found = [f"{name} ({drift.words(amount(drift.size, unit))})" for name, drift in _drifts(data)]
     remark = (
         f"the beat changes slowly during {', '.join(found)}: something drifts (a stiffness, a motor, a clock, a "
         "camera), and a periodic model does not explain that unless a suspect drifts too; record when the rig has "
@@ -74,6 +71,4 @@ def drift_sentence(data: WhitenedData) -> str:
 def _drifts(data: WhitenedData) -> list[tuple[str, Drift]]:
     """Name and drift of the recordings during which the beat changes slowly, by more than any model must explain."""
     fits = zip(data.recordings, data.beat_fits, strict=True)
-    return [
-        (one.name, fit.drift) for one, fit in fits if fit.drift and fit.drift.found and fit.drift.size > data.tolerance
-    ]
+    return [(one.name, fit.drift) for one, fit in fits if fit.drift and fit.drift.size > data.tolerance]

@@ -10,7 +10,9 @@ E the excess divided by the noise variance, from the fit and cross-validated; ta
 may have (:func:`tolerated_excess`), likewise divided; nu the effective number of samples; c the cost of a gene
 (`Policy.gene_cost`). The prior probability of each effect is one over the number of suspects. Two hypotheses always
 compete with the effects: *no physics is missing*, and *physics outside the library*, which is assumed to explain all
-but a fraction of the residual (`Policy.unknown_residual`) at the cost of the genes of a new law.
+but a fraction of the residual (`Policy.unknown_residual`) at the cost of the genes of a new law. If noise does not
+explain the residual of the nominal model, only hypotheses that are worth their genes compete with the second. Those
+that are hardly worth them are possible if they explain most of the residual and their sizes cannot all be zero.
 """
 
 from __future__ import annotations
@@ -20,6 +22,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wingfit.diagnosis.evidence.intervals import gene_values
 from wingfit.diagnosis.evidence.refit import Refit
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.policy import POLICY, Policy
@@ -62,12 +65,19 @@ def weigh(
         -0.5 * data.effective_samples * np.log(tau + policy.unknown_residual**2 * excess[0])
         - data.gene_cost * policy.unknown_genes
     )
-    top = max(evidence.max(), unknown)
-    weight, other = np.exp(evidence - top), np.exp(unknown - top)
-    if nominal_refuted(data, nominal.excess, floor):
-        weight[0] = 0.0
-    elif drifts(data):
-        weight *= [_explains_drift(data, nominal, one) for one in hypotheses]
+    possible = np.ones(len(hypotheses), bool)
+    drift_alone = only_drifts(data, nominal, floor)
+    if nominal_refuted(data, nominal.excess, floor) or (drifts(data) and not drift_alone):
+        # A hypothesis that leaves the misfit as it was explains nothing; nor does the nominal model. With few
+        # recordings, one that explains most of the misfit may have little evidence, if its size is not zero.
+        possible = evidence - evidence[0] > policy.least_evidence
+        for k in np.flatnonzero(~possible & (excess < policy.drift_left * excess[0])):
+            possible[k] = not absent(data, hypotheses[k])
+    if drift_alone:
+        possible &= [_explains_drift(data, nominal, one) for one in hypotheses]
+    weight = np.where(possible, evidence, -np.inf)
+    top = max(weight.max(), unknown)
+    weight, other = np.exp(weight - top), np.exp(unknown - top)
     total = weight.sum() + other
     probabilities, unknown = weight / total, float(other / total)
     if noise_may_hide(data, nominal.fit):
@@ -98,8 +108,20 @@ def only_drifts(data: WhitenedData, nominal: Refit, floor: float) -> bool:
 
     ``floor`` (m or N): discretisation error.
     """
-    excess = data.mean_beat_excess(nominal.fit.coefficients)
-    return drifts(data) and not nominal_refuted(data, excess, floor)
+    if not drifts(data):
+        return False
+    return not nominal_refuted(data, data.mean_beat_excess(nominal.fit.coefficients), floor)
+
+
+def absent(data: WhitenedData, refit: Refit) -> bool:
+    """Return whether all size genes of the added effects are compatible with zero, so that the fit shows none of them.
+
+    The interval of such a gene contains zero, or is bounded on neither side.
+    """
+    if not any(trial.suspect.size_genes for trial in refit.trials):
+        return False
+    sizes = [gene.value for gene in gene_values(data, refit) if gene.off is not None]
+    return all((v.low is None or v.low <= 0.0) and (v.high is None or v.high >= 0.0) for v in sizes)
 
 
 def _explains_drift(data: WhitenedData, nominal: Refit, refit: Refit) -> bool:

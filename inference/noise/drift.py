@@ -6,43 +6,57 @@ same density at all frequencies near a harmonic, unless a resonance is narrower 
 lines. So the power of the slow change of a harmonic is compared with the power of the nearest spectral lines: their
 ratio, pooled over harmonics and channels, follows an F distribution for noise alone. Its degrees of freedom count
 harmonics and channels only as far as their noise near the harmonics is independent and of similar size.
+
+The mean of the beat is compared apart from the harmonics, because slow noise rises towards it
+(:mod:`wingfit.inference.noise.drift_of_mean`).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import stats
 
-from wingfit.inference.noise.mean_beat import fourier_basis
+from wingfit.inference.noise.drift_of_mean import MeanPowers, change_of_mean, mean_distances
+from wingfit.inference.noise.mean_beat import fourier_basis, masks_of
+from wingfit.inference.noise.slow_change import Change, independent_sources, orthonormal, rank
 from wingfit.records.array_types import Array, Bool, Float, Index, Int, Mask
 
 HARMONICS = 3  # compared: those in which a wing moves most
 FEWEST_BEATS = 3  # with which lines remain that the change does not use up
+FEWEST_OF_MEAN = 4  # with which two lines above zero show how noise rises towards it
 CURVED = 4  # beats from which a curved change is found and removed, too
 NEAREST = 3  # spectral lines on either side of a harmonic: farther ones say less about the noise at the harmonic
-CERTAIN = 1e-5  # probability of noise alone below which a change counts as found
 RISE = 1.5  # largest ratio of the density of noise at a harmonic to that around it that counts as usual
-_RANK = 1e-6
 
 
 @dataclass(frozen=True)
 class Drift:
-    """A slow change of the beat: ``ratio`` of its power to that of the noise around the harmonics.
+    """A slow change during a recording: of the first harmonics (``beat``), and of the ``mean`` of the beat."""
 
-    ``probability``: of such a ratio for noise alone that is RISE times as dense at a harmonic as around it.
-    ``size``: root mean square of the change beyond the noise, over all samples and channels, m or N.
-    """
-
-    ratio: float
-    probability: float
-    size: float
+    beat: Change
+    mean: Change
 
     @property
     def found(self) -> bool:
-        """Whether noise alone does not explain the change."""
-        return self.probability < CERTAIN
+        """Whether noise alone does not explain one of the changes."""
+        return self.beat.found or self.mean.found
+
+    @property
+    def size(self) -> float:
+        """Root mean square of the changes that were found, beyond the noise, over all samples and channels, m or N."""
+        return float(np.sqrt(sum(one.size**2 for one in (self.beat, self.mean) if one.found)))
+
+    @property
+    def ratio(self) -> float:
+        """Power of the larger of the changes that were found to that of the noise near it; 0 if there is none."""
+        return max((one.ratio for one in (self.beat, self.mean) if one.found), default=0.0)
+
+    def words(self, size: str) -> str:
+        """Describe the changes that were found, with their ``size`` as text with its unit."""
+        what = f"by {size}" if self.beat.found else f"its mean by {size}"
+        return f"{what}, {self.ratio:.2g} times the power of noise"
 
 
 def drift_of(
@@ -52,34 +66,52 @@ def drift_of(
     apparent: Float[Array, " T"],
     harmonics: int,
     beats: int,
+    least: float = 0.0,
 ) -> Drift | None:
-    """Compare the slow change of the first harmonics with the noise around them.
+    """Compare the slow changes of the first harmonics, and of the mean, with the noise near them.
 
     ``scatter`` [T, C]: recorded values minus mean beat, zero where not ``valid``; ``psi`` [T]: phase (rad) of the beat,
     ``apparent`` [T]: time in apparent beats; ``harmonics``: of the mean beat; ``beats``: whole apparent beats. The
-    change is linear or, from CURVED beats on, curved. None with too few beats, or too few samples between gaps.
+    change is linear or, from CURVED beats on, curved. ``least`` (m or N): changes of smaller root mean square count as
+    none. None with too few beats, or too few samples between gaps.
     """
     if beats < FEWEST_BEATS:
         return None
     orders, time = range(1, min(HARMONICS, harmonics) + 1), _time(apparent)
     distances = np.arange(1, min(beats // 2, NEAREST) + 1) / beats
-    parts = []
-    masks, group = np.unique(valid, axis=1, return_inverse=True)
-    for g, mask in enumerate(masks.T):
+    parts, of_mean = [], []
+    for mask, channels in masks_of(valid):
         if not mask.any():
             continue
-        periodic = _orthonormal(fourier_basis(psi[mask], harmonics))
+        periodic = orthonormal(fourier_basis(psi[mask], harmonics))
+        # The changes of the mean and of the harmonics are not orthogonal, and a large one must not appear in another.
+        of_zero = [_slow(psi[mask], time[mask], 0, degree) for degree in _degrees(beats)]
+        mean = orthonormal(np.hstack(of_zero), periodic)
         changes: list[list[Array]] = []
         for degree in _degrees(beats):
             lower = zip(*changes, strict=True) if changes else [()] * len(orders)
             new = [_slow(psi[mask], time[mask], k, degree) for k in orders]
-            changes.append([_orthonormal(one, periodic, *less) for one, less in zip(new, lower, strict=True)])
-        every = _orthonormal(np.hstack([one for row in changes for one in row]))
-        lines = [_orthonormal(_waves(apparent[mask], k, distances), periodic, every) for k in orders]
-        values = scatter[np.ix_(mask, group.ravel() == g)]
-        parts.append(_Powers.of(values, values - every @ (every.T @ values), changes, lines))
-    enough = parts and min(float(one.freedom.min()) for one in parts) >= 1.0
-    return _compared(parts, int(valid.sum())) if enough else None
+            changes.append([orthonormal(one, periodic, mean, *less) for one, less in zip(new, lower, strict=True)])
+        beat = orthonormal(np.hstack([one for row in changes for one in row]))
+        every = np.hstack([mean, beat])
+        lines = [orthonormal(_waves(apparent[mask], k, distances), periodic, every) for k in orders]
+        values = scatter[np.ix_(mask, channels)]
+        steady = values - every @ (every.T @ values)
+        parts.append(_Powers.of(values, steady, changes, lines))
+        if beats < FEWEST_OF_MEAN:
+            continue
+        raw = [_slow(psi[mask], time[mask], k, degree) for k in orders for degree in _degrees(beats)]
+        own = orthonormal(np.hstack(raw), periodic)
+        slow: list[Array] = []
+        for one in of_zero:
+            slow.append(orthonormal(one, periodic, own, *slow))
+        waves = orthonormal(_waves(apparent[mask], 0, mean_distances(beats)), periodic, every)
+        of_mean.append(MeanPowers.of(values, steady, slow, waves))
+    if not parts or min(float(one.freedom.min()) for one in parts) < 1.0:
+        return None
+    samples = int(valid.sum())
+    changes_found = (_compared(parts, samples), change_of_mean(of_mean, samples) if of_mean else Change(0.0, 1.0, 0.0))
+    return Drift(*(one if one.size >= least else replace(one, probability=1.0) for one in changes_found))
 
 
 @dataclass(frozen=True)
@@ -99,13 +131,13 @@ class _Powers:
     @classmethod
     def of(cls, values: Array, steady: Array, changes: list[list[Array]], lines: list[Array]) -> _Powers:
         """Project ``values`` [T, C], and ``steady`` [T, C] without slow changes, on bases [T, .] of each harmonic."""
-        freedom = np.array([[_rank(one) for one in row] for row in (*changes, lines)])
+        freedom = np.array([[rank(one) for one in row] for row in (*changes, lines)])
         slow = np.array([[((one.T @ values) ** 2).sum(axis=0) for one in row] for row in changes])
         near = np.array([one.T @ steady for one in lines])
         return cls(slow, near, freedom, np.maximum((steady**2).mean(axis=0), 1e-300))
 
 
-def _compared(parts: list[_Powers], samples: int) -> Drift:
+def _compared(parts: list[_Powers], samples: int) -> Change:
     """Compare the slow changes of all channels of the ``parts`` with their noise; ``samples``: number of values.
 
     Linear changes alone are compared, and linear and curved ones together; the less probable result counts.
@@ -118,7 +150,7 @@ def _compared(parts: list[_Powers], samples: int) -> Drift:
     noise = (near**2).sum(axis=1) / freedom[-1]
     # Each channel is divided by its size, so that a loud one does not decide alone.
     around, lines = float((noise / level).mean()), freedom[-1].mean(axis=-1)
-    sources = _sources(near / np.sqrt(level), lines)
+    sources = independent_sources(near / np.sqrt(level), lines)
     found = []
     for power, count in zip(slow, of_slow, strict=True):
         ratio = float((power / count / level).mean() / max(around, 1e-300))
@@ -126,20 +158,7 @@ def _compared(parts: list[_Powers], samples: int) -> Drift:
         found.append((len(slow) * chance, -ratio))
     probability, ratio = min(found)
     beyond = float((slow[-1] - of_slow[-1] * noise).sum())
-    return Drift(-ratio, min(probability, 1.0), float(np.sqrt(max(beyond, 0.0) / samples)))
-
-
-def _sources(near: Array, lines: Array) -> float:
-    """Number of independent sources of noise near K harmonics in C channels, of equal power: at most K C.
-
-    It is smaller where channels scatter together, or where some harmonics or channels have most of the noise.
-    ``near`` [K, L, C]: coefficients of the noise; ``lines`` [K]: how many of the L are independent. By chance, channels
-    correlate that are independent; the mean of that is subtracted.
-    """
-    total = (near**2).sum(axis=(1, 2))
-    square = ((near.transpose(0, 2, 1) @ near) ** 2).sum(axis=(1, 2))
-    square = np.maximum((square - total**2 / lines) / np.maximum(1.0 - 1.0 / lines, 0.5), total**2 / near.shape[2])
-    return float((total / lines).sum() ** 2 / max((square / lines**2).sum(), 1e-300)) or 1.0
+    return Change(-ratio, min(probability, 1.0), float(np.sqrt(max(beyond, 0.0) / samples)))
 
 
 def slow_basis(
@@ -172,23 +191,7 @@ def _slow(psi: Array, time: Array, k: int, degree: int) -> Array:
 
 
 def _waves(apparent: Array, k: int, distances: Array) -> Array:
-    """Cosines and sines [T, .] at ``distances`` (in flap frequencies) on either side of harmonic ``k``."""
-    angles = 2 * np.pi * apparent[:, None] * np.concatenate([k - distances, k + distances])
+    """Cosines and sines [T, .] at ``distances`` (in flap frequencies) on either side of harmonic ``k``; above 0."""
+    sides = np.concatenate([k - distances, k + distances]) if k else distances
+    angles = 2 * np.pi * apparent[:, None] * sides
     return np.hstack([np.cos(angles), np.sin(angles)])
-
-
-def _orthonormal(columns: Array, *others: Array) -> Array:
-    """Return the nearest orthonormal columns to the part of ``columns`` [T, .] that is orthogonal to the ``others``.
-
-    Where the columns depend on each other, so do those returned; :func:`_rank` is the number of independent ones.
-    """
-    for other in others:
-        columns = columns - other @ (other.T @ columns)
-    basis, sizes, turned = np.linalg.svd(columns, full_matrices=False)
-    kept = sizes > _RANK * sizes.max(initial=0.0)
-    return np.asarray(basis[:, kept] @ turned[kept])
-
-
-def _rank(basis: Array) -> float:
-    """Return the number of independent columns of an :func:`_orthonormal` basis."""
-    return float(np.round((basis**2).sum()))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wingfit.records.array_types import Array, Bool, Float, Mask
+from wingfit.records.array_types import Array, Bool, Float, Index, Mask
 
 
 def fourier_basis(psi: Float[Array, " T"], harmonics: int) -> Float[Array, "T P"]:
@@ -25,9 +25,18 @@ def scatter_about(
     round-off) for a channel with at most P valid samples, which the fit reproduces exactly.
     """
     out = np.zeros_like(values)
-    masks, group = np.unique(valid, axis=1, return_inverse=True)
-    for k, mask in enumerate(masks.T):
-        (columns,) = np.nonzero(group.ravel() == k)
+    for mask, columns in masks_of(valid):
         part, own = basis[mask], values[np.ix_(mask, columns)]
         out[np.ix_(mask, columns)] = own - part @ np.linalg.lstsq(part, own, rcond=None)[0]
     return out
+
+
+def masks_of(valid: Bool[Mask, "T C"]) -> list[tuple[Mask, Index]]:
+    """Return the different columns [T] of ``valid`` [T, C], each with the numbers of the channels that have it.
+
+    In the order of the columns' values, False first. (`numpy.unique` takes time that grows with the square of T.)
+    """
+    found: dict[bytes, list[int]] = {}
+    for channel, column in enumerate(valid.T):
+        found.setdefault(column.tobytes(), []).append(channel)
+    return [(valid[:, channels[0]], np.array(channels)) for _, channels in sorted(found.items())]

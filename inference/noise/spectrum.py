@@ -9,13 +9,15 @@ from __future__ import annotations
 import numpy as np
 import scipy
 
-from wingfit.records.array_types import Array, Bool, Float, Index, Int, Mask
+from wingfit.records.array_types import Array, Bool, Complex, Float, Index, Int, Mask
 
 POOLED = 10.0  # weight, in lines, of the mean scale of all channels in the scale of one channel
 LOCAL = 0.6  # multiples of the flap frequency to either side of a harmonic over which lines are averaged
 LOWEST = 3  # lines to which the power law of slow noise is fitted
 STEEPEST = -2.0  # exponent of the power law: a random walk
 MEAN_LINE = 0.35  # effective frequency, in spectral lines, at which 1/f noise enters the estimate of the mean
+MOST_LINES = 63  # between neighbouring harmonics: of longer recordings, as many are used, evenly spread
+BLOCK = 4_000_000  # products of sample and line that are in memory at a time
 FLAT = 0.002  # smallest density, relative to the largest
 
 
@@ -32,17 +34,16 @@ def density_at_harmonics(
     The density is common to all channels; that of one channel is the product with its scale. ``scatter`` [T, C]: part
     of the recording that differs from beat to beat, zero where not ``valid``. ``advance``: apparent advance of the beat
     per sample, beats. ``number`` [T]: index of each sample in the regular sequence of samples. ``harmonics``: H.
-    ``beats``: whole (apparent) beats recorded.
+    ``beats``: whole (apparent) beats recorded. Time grows with T H, memory with T.
     """
     if beats >= 2:
-        parts = np.arange(1, beats) / beats
+        count = min(beats - 1, MOST_LINES)
+        parts = np.round(np.linspace(1, beats - 1, count)) / beats
         lines = (np.arange(harmonics + 1)[:, None] + parts).ravel()
         lines = lines[lines * advance < 0.5]
     else:
         lines = np.arange(harmonics + 1, max(int(0.5 / advance), harmonics + 1) + 1).astype(float)
-    turn = np.exp(-2j * np.pi * advance * number[:, None] * lines)
-    count = np.maximum(valid.sum(axis=0), 1)
-    power = np.abs(turn.T @ scatter) ** 2 / count  # [lines, C]
+    power = np.abs(_transform(scatter, advance, number, lines)) ** 2 / np.maximum(valid.sum(axis=0), 1)  # [lines, C]
     used = valid.any(axis=0)
     mean = power[:, used].mean(axis=1)
     scale = np.ones(scatter.shape[1])
@@ -64,13 +65,23 @@ def density_at_harmonics(
     return np.maximum(density, FLAT * density.max()), scale
 
 
+def _transform(scatter: Array, advance: float, number: Index, lines: Array) -> Complex:
+    """Fourier transform [L, C] of ``scatter`` [T, C] at ``lines`` [L]; the rest as in :func:`density_at_harmonics`."""
+    step = max(BLOCK // len(lines), 1)
+    total = np.zeros((len(lines), scatter.shape[1]), complex)
+    for start in range(0, len(scatter), step):
+        part = slice(start, start + step)
+        total += np.exp(-2j * np.pi * advance * number[part, None] * lines).T @ scatter[part]
+    return total
+
+
 def _at_rest(lines: Array, mean: Array, beats: int) -> float:
     """Density of the noise in the mean of a recording, extrapolated from the lowest lines by a power law.
 
     Most of the power of noise such as 1/f lies below the lowest line between harmonics, where it shifts the mean.
     ``lines`` [L] in multiples of the flap frequency, ``mean`` [L]: density at each, averaged over the channels.
     """
-    low = np.argsort(lines)[: max(LOWEST, beats - 1)]
+    low = np.argsort(lines)[: max(LOWEST, min(beats - 1, MOST_LINES))]
     slope = np.polyfit(np.log(lines[low]), np.log(np.maximum(mean[low], 1e-300)), 1)[0]
     middle = float(np.exp(np.mean(np.log(lines[low]))))
     level = float(np.exp(np.mean(np.log(np.maximum(mean[low], 1e-300)))))

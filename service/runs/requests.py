@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import re
-from typing import Annotated, Literal, TypeVar
+from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StrictBool
 from pydantic_core import PydanticCustomError
+
+from wingfit.calibration.limits import REAL, WHOLE
 
 Mode = Literal["staged", "joint", "local"]
 Method = Literal["genetic", "cma_es", "gauss_newton", "auto"]
@@ -15,7 +17,6 @@ ForceAxis = Literal["x", "z"]
 AnyName = TypeVar("AnyName", bound=str)
 
 DATASET_ID = "ds_0f3c9a7be1d24568"
-LARGEST_SEED = 2**53 - 1
 DIVISION = r"^[1-9][0-9]?(x[1-9][0-9]?|(,[1-9][0-9]?){0,63})$"
 LONGEST_DIVISION = 200
 DIVISION_FORMS = "preset 4, 11, 24; strips x bodies of each: 6x4; or bodies of each strip, root first: 3,3,3,2"
@@ -89,6 +90,12 @@ def once(names: list[AnyName]) -> list[AnyName]:
     return names
 
 
+def within(name: str, description: str | None = None) -> Any:
+    """Return the field of setting ``name`` with the limits that a calibration has."""
+    least, most = (WHOLE | REAL)[name]
+    return Field(ge=least, le=most, description=description)
+
+
 Axes = Annotated[
     list[ForceAxis],
     AfterValidator(once),
@@ -124,8 +131,8 @@ class JobSettings(VehicleModel):
     """Settings that runs and diagnoses share; see `wingfit.calibration.spec.CalibrationSpec`."""
 
     division: Division = "11"
-    seed: Annotated[Whole, Field(ge=0, le=LARGEST_SEED)] = 1
-    bounds_factor: Annotated[Number, Field(ge=1.01, le=100)] = 5.0
+    seed: Annotated[Whole, within("seed")] = 1
+    bounds_factor: Annotated[Number, within("bounds_factor")] = 5.0
     accuracy_mm: Accuracy = 0.1
     recordings: Annotated[list[Name], Field(max_length=1000, description="empty: all that are not held out")] = []
     effects: Effects = []
@@ -143,10 +150,10 @@ class RunIn(JobSettings):
     name: Title | None = None
     mode: Annotated[Mode | None, Field(description="null: staged for a wing, local for a vehicle")] = None
     method: Annotated[Method | None, Field(description="null: genetic for a wing, gauss_newton for a vehicle")] = None
-    population: Annotated[Whole, Field(ge=4, le=1000)] = 50
-    stall: Annotated[Whole, Field(ge=1, le=1000)] = 10
-    tolerance: Annotated[Number, Field(ge=0, le=1)] = 1e-3
-    max_generations: Annotated[Whole, Field(ge=1, le=10_000, description="per stage")] = 200
+    population: Annotated[Whole, within("population")] = 50
+    stall: Annotated[Whole, within("stall")] = 10
+    tolerance: Annotated[Number, within("tolerance")] = 1e-3
+    max_generations: Annotated[Whole, within("max_generations", "per stage")] = 200
     genes: Annotated[
         list[Name], Field(max_length=1000, description="empty: all of a wing; lift, rotation and fling of a vehicle")
     ] = []

@@ -2,26 +2,21 @@
 
 from __future__ import annotations
 
-import os
-
 import numba
 from numba.core.codegen import get_host_cpu_features
 
-VARIABLE = "WINGFIT_LANES"  # sets the number, for tests: results do not depend on it
-POSSIBLE = (2, 4, 8)
+from wingfit.sim.asked_lanes import asked_lanes
 
 
 def lanes() -> int:
     """Return how many individuals to compute at a time, as many as fit the processor's vector registers.
 
     AVX-512 has 32 registers of eight floats: eight. AVX2 has 16 of four floats, NEON 32 of two: four, since with more
-    the values of a body do not stay in registers. ValueError if the environment asks for another number than POSSIBLE.
+    the values of a body do not stay in registers. ValueError if the environment asks for a number that is not possible.
     """
-    asked = os.environ.get(VARIABLE, "").strip()
-    if asked:
-        if asked not in map(str, POSSIBLE):
-            raise ValueError(f"{VARIABLE} is {asked!r}; it must be one of {', '.join(map(str, POSSIBLE))}, or unset")
-        return int(asked)
+    asked = asked_lanes()
+    if asked is not None:
+        return asked
     given = numba.config.CPU_FEATURES  # for which numba compiles; None: for this processor
     # numba's function leaves AVX out if NUMBA_ENABLE_AVX is 0, and returns "" where LLVM does not know the processor.
     features = get_host_cpu_features() if given is None else given

@@ -16,10 +16,12 @@ from wingfit.diagnosis.policy import POLICY
 from wingfit.diagnosis.verdict.noise_remarks import drift_sentence, noise_remarks
 from wingfit.diagnosis.verdict.weigh_hypotheses import drifts
 from wingfit.inference.noise.drift import Drift
+from wingfit.inference.noise.slow_change import Change
 from wingfit.records import Recording
 from wingfit.workers.in_process import InProcessEvaluator
 
 FALLING, DIPPING = (0.5, 0.25, 0.0, -0.25, -0.5), (0.0, -0.7, -1.0, -0.7, 0.0)
+NONE = Change(0.0, 1.0, 0.0)
 FREQUENCIES = (1.2, 1.7, 2.7, 3.4)
 
 
@@ -100,12 +102,41 @@ def test_an_effect_explains_a_drift_although_noise_remains() -> None:
     assert left < 0.1 * before
 
 
+def test_a_mean_that_drifts_is_not_adequate() -> None:
+    def moved(frequencies: tuple[float, ...], seed: int) -> list[Recording]:
+        steady = recorded({}, seed=seed, frequencies=frequencies, frames=496)
+        return [replace(one, values=one.values + 2e-3 * np.linspace(-1, 1, 496)[:, None]) for one in steady]
+
+    *_, last = diagnose_subject(
+        PendulumRig(), "drifting", moved(FREQUENCIES, 1), moved((1.5,), 2), DiagnosisSpec(), InProcessEvaluator()
+    )
+    finding = last.finding
+    assert finding is not None
+    assert finding.verdict != "adequate"
+    (remark,) = [remark for remark in finding.remarks if "drifts" in remark]
+    assert "its mean by 1.1" in remark
+
+
+def test_a_change_of_the_mean_counts_where_the_mean_drifts() -> None:
+    """And that of the first harmonic where the beat does."""
+    steady = recorded({}, seed=1, frequencies=(1.7,), frames=496)
+    ramp = 2e-3 * np.linspace(-1, 1, 496)[:, None]
+    data = WhitenedData.of([replace(one, values=one.values + ramp) for one in steady])
+    assert data.drift[0] > 1.0
+    of_ramp, of_beat = (
+        data.coefficients_of([np.broadcast_to(one, (496, data.recordings[0].values.shape[1]))])
+        for one in (ramp, ramp * np.cos(2 * np.pi * 1.7 * data.recordings[0].times)[:, None])
+    )
+    assert data.change_of_beat(of_ramp) > 0.5e-6
+    assert data.change_of_beat(of_beat) < 0.1e-6
+
+
 @pytest.mark.parametrize(
     ("size", "says"), [(1.0, "which may be the cause"), (0.2, "by too little to matter"), (0.0, "")]
 )
 def test_the_sentence_fits_the_verdict(size: float, says: str) -> None:
     """Size of the drift of one recording, in its noise."""
-    drift = Drift(9.0, 1e-9, 1e-3 * size) if size else None
+    drift = Drift(Change(9.0, 1e-9, 1e-3 * size), NONE) if size else None
     fits = [SimpleNamespace(drift=one) for one in (drift, None)]
     recordings = [SimpleNamespace(name=name) for name in ("a", "b")]
     every = np.array([size, 0.0])

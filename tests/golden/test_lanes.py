@@ -8,6 +8,7 @@ import pytest
 from llvmlite.binding import FeatureMap
 
 from tests.golden.numbers import CASES, entry
+from wingfit.sim.asked_lanes import VARIABLE
 from wingfit.sim.kernels import processor
 
 
@@ -29,7 +30,7 @@ def test_numbers_are_the_same_bits_with_another_number_of_lanes(other_lanes: dic
 def test_as_many_as_fit_the_registers_for_which_numba_compiles(
     monkeypatch: pytest.MonkeyPatch, host: dict[str, bool], asked: str | None, lanes: int
 ) -> None:
-    monkeypatch.delenv(processor.VARIABLE, raising=False)
+    monkeypatch.delenv(VARIABLE, raising=False)
     monkeypatch.setattr(llvm, "get_host_cpu_features", lambda: FeatureMap(host))
     monkeypatch.setattr(numba.config, "ENABLE_AVX", True)
     monkeypatch.setattr(numba.config, "CPU_FEATURES", asked)
@@ -37,7 +38,7 @@ def test_as_many_as_fit_the_registers_for_which_numba_compiles(
 
 
 def test_without_avx_in_numba_or_a_known_processor_there_are_four(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delenv(processor.VARIABLE, raising=False)
+    monkeypatch.delenv(VARIABLE, raising=False)
     monkeypatch.setattr(numba.config, "CPU_FEATURES", None)
     monkeypatch.setattr(llvm, "get_host_cpu_features", lambda: FeatureMap(avx2=True, avx512f=True))
     monkeypatch.setattr(numba.config, "ENABLE_AVX", False)
@@ -53,6 +54,6 @@ def test_without_avx_in_numba_or_a_known_processor_there_are_four(monkeypatch: p
 
 @pytest.mark.parametrize("value", ["0", "3", "16", "eight", "-4", "4.0"])
 def test_another_number_is_refused(monkeypatch: pytest.MonkeyPatch, value: str) -> None:
-    monkeypatch.setenv(processor.VARIABLE, value)
+    monkeypatch.setenv(VARIABLE, value)
     with pytest.raises(ValueError, match=f"WINGFIT_LANES is '{value}'; it must be one of 2, 4, 8, or unset"):
         processor.lanes()

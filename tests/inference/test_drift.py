@@ -118,7 +118,7 @@ def test_noise_with_long_gaps_is_no_drift(beats: int, lost: int, memory: float) 
         drift = harmonic_fit(recording(gappy)).drift
         assert drift is not None
         assert not drift.found
-        ratios += [drift.ratio]
+        ratios += [drift.beat.ratio]
     if memory == 0.0:
         assert np.median(ratios) == pytest.approx(1.0, abs=0.2)
 
@@ -191,3 +191,69 @@ def test_a_recording_without_noise_has_no_drift(still: int) -> None:
     drift = harmonic_fit(recording(quiet)).drift
     assert drift is not None
     assert drift.size < 1e-12
+
+
+def moving(move: Callable[[Array], Array], seed: int, *, beats: int = 28, channels: int = 2) -> Recording:
+    """Steady waves with white noise, whose mean moves by ``move`` of the time -1 to 1, in SIGMA."""
+    steady = waving(beats, 0.0, seed, memory=0.0, channels=channels).values[:, :channels]
+    return recording(steady + SIGMA * move(np.linspace(-1.0, 1.0, len(steady)))[:, None])
+
+
+def walk(frames: int, memory: float, seed: int) -> Array:
+    """Slow noise [T, 3] of unit variance; with ``memory`` 1 a random walk."""
+    white = np.random.default_rng(seed).standard_normal((frames + 500, 3))
+    found = lfilter([1.0], [1.0, -memory], white, axis=0)[500:]
+    return np.asarray(found / found.std(axis=0))
+
+
+@pytest.mark.parametrize("beats", [8, 28])
+def test_a_mean_that_moves_is_found_and_not_taken_for_noise(beats: int) -> None:
+    one = harmonic_fit(moving(lambda time: 4.0 * time, 1, beats=beats, channels=3))
+    drift, steady = one.drift, harmonic_fit(moving(np.zeros_like, 1, beats=beats, channels=3))
+    assert drift is not None
+    assert drift.mean.found
+    assert not drift.beat.found
+    assert drift.size == pytest.approx(4.0 * SIGMA / np.sqrt(3.0), rel=0.1)
+    assert one.noise == pytest.approx(steady.noise, rel=0.1)
+
+
+def test_a_mean_that_goes_and_comes_back_is_found() -> None:
+    drift = harmonic_fit(moving(lambda time: 8.0 * time**2, 1, channels=3)).drift
+    assert drift is not None
+    assert drift.mean.found
+
+
+@pytest.mark.parametrize("memory", [0.95, 0.998, 1.0])
+@pytest.mark.parametrize("beats", [4, 8])
+def test_slow_noise_is_no_change_of_the_mean(beats: int, memory: float) -> None:
+    waves = [waving(beats, 0.0, seed, channels=3).values for seed in range(60)]
+    slow = (10.0 * SIGMA * walk(31 * beats, memory, seed) for seed in range(60))
+    assert sum(found(one + noise) for one, noise in zip(waves, slow, strict=True)) <= 1
+
+
+def test_changes_of_mean_and_beat_do_not_hide_each_other() -> None:
+    """Nor does one of them appear in the other."""
+    growing = waving(8, 0.3, 1, memory=0.0, channels=3).values
+    ramp = 40.0 * SIGMA * np.linspace(-1.0, 1.0, len(growing))[:, None]
+    both, beat, mean = (
+        harmonic_fit(recording(values)).drift
+        for values in (growing + ramp, growing, waving(8, 0.0, 1, memory=0.0, channels=3).values + ramp)
+    )
+    assert both is not None
+    assert beat is not None
+    assert mean is not None
+    assert [(one.beat.found, one.mean.found) for one in (both, beat, mean)] == [
+        (True, True),
+        (True, False),
+        (False, True),
+    ]
+    assert both.beat.ratio == pytest.approx(beat.beat.ratio, rel=1e-6)
+
+
+def test_a_change_within_interpolation_errors_is_none() -> None:
+    """Amplitudes that change by a thousandth count as steady, however small the noise."""
+    steady = waving(8, 0.0, 1, channels=3).values - SIGMA * noise(248, 0.6, 1, 3)
+    time = np.linspace(-1.0, 1.0, 248)[:, None]
+    tiny = 1e-7 * noise(248, 0.0, 1, 3)
+    assert not found(steady * (1.0 + 5e-4 * time) + tiny)
+    assert found(steady * (1.0 + 1e-2 * time) + tiny)

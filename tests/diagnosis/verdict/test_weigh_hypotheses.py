@@ -15,6 +15,7 @@ from wingfit.diagnosis.finding import Interval
 from wingfit.diagnosis.location.differences import _variables, cause_location
 from wingfit.diagnosis.policy import POLICY
 from wingfit.diagnosis.search import _unconverged
+from wingfit.diagnosis.verdict import weigh_hypotheses
 from wingfit.diagnosis.verdict.verdict import _explained_fraction, decide, summary
 from wingfit.diagnosis.verdict.weigh_hypotheses import (
     HypothesisWeights,
@@ -39,13 +40,16 @@ def refit(
     ``drift``: mean square of the slow change of the beat that it leaves.
     """
     trials = tuple(
-        SimpleNamespace(suspect=SimpleNamespace(name=n, family=family, genes=()), freedom=genes) for n in names
+        SimpleNamespace(suspect=SimpleNamespace(name=n, family=family, genes=(), size_genes=()), freedom=genes)
+        for n in names
     )
     fit = SimpleNamespace(coefficients=drift)
     return Refit(cast("Any", trials), cast("Any", fit), left**2, (left if predicted is None else predicted) ** 2)
 
 
-def data(recordings: int = 6, excess_standard_error: float = 0.0, drift: float = 0.0) -> WhitenedData:
+def data(
+    recordings: int = 6, excess_standard_error: float = 0.0, drift: float = 0.0, mean: float = 0.0
+) -> WhitenedData:
     return cast(
         "WhitenedData",
         SimpleNamespace(
@@ -58,6 +62,7 @@ def data(recordings: int = 6, excess_standard_error: float = 0.0, drift: float =
             policy=POLICY,
             drift=drift,
             change_of_beat=float,
+            mean_beat_excess=lambda _: mean,
         ),
     )
 
@@ -87,6 +92,38 @@ def test_an_effect_that_explains_the_drift_is_possible() -> None:
     assert weights.probabilities[0] == 0.0
     assert weights.probabilities[1] > 0.0
     assert weights.probabilities[2] == 0.0
+
+
+def test_a_hypothesis_that_leaves_the_misfit_as_it_was_is_not_named() -> None:
+    """Neither where a drift alone speaks against the nominal model, nor where the mean beat does as well."""
+    useless = [refit(2.0, ("a",)), refit(1.99, ("b",))]
+    for drift, mean in ((0.0, 4.0), (0.5, 4.0), (0.5, 0.0)):
+        found = decide(weigh(data(1, drift=drift, mean=mean), refit(2.0), useless, 0.0, 3))
+        assert (found.verdict, found.named, found.alternatives) == ("unnamed", (), ())
+        assert found.probabilities["unnamed"] == pytest.approx(1.0)
+    beside = decide(weigh(data(drift=0.5, mean=4.0), refit(2.0), [refit(0.3, ("a",)), *useless], 0.0, 40))
+    assert (beside.verdict, beside.named) == ("named", ("a",)), "what explains the mean beat, beside the drift"
+
+
+@pytest.mark.parametrize(
+    ("ends", "expected"),
+    [
+        ([(-0.1, 0.2)], "unnamed"),
+        ([(None, None)], "unnamed"),
+        ([(None, 0.1), (0.0, None)], "unnamed"),
+        ([(0.1, 0.2)], "named"),
+        ([(-0.2, 0.1), (None, -0.1)], "named"),
+    ],
+)
+def test_an_effect_whose_sizes_may_all_be_zero_is_not_named(
+    ends: list[tuple[float | None, float | None]], expected: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    values = [SimpleNamespace(value=Interval(0.05, *one), off=0.0) for one in ends]
+    shape = SimpleNamespace(value=Interval(1.0, 0.5, 2.0), off=None)
+    monkeypatch.setattr(weigh_hypotheses, "gene_values", lambda _data, _refit: (*values, shape))
+    fitted = refit(0.1, ("a",), 4)
+    fitted.trials[0].suspect.size_genes = ("a.size",)  # type: ignore[misc]
+    assert decide(weigh(data(2, 0.4), refit(2.1), [fitted], 0.0, 40)).verdict == expected
 
 
 def test_an_effect_that_explains_nearly_all_is_named() -> None:
@@ -267,6 +304,7 @@ def test_no_verdict_depends_on_the_unit_of_length(unit: float, nominal: float, e
                 policy=POLICY,
                 drift=0.5,
                 change_of_beat=lambda power: power * unit**2,
+                mean_beat_excess=lambda _: 4.0 * unit**2,
             ),
         )
         before, *others = (
