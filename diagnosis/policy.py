@@ -42,7 +42,7 @@ class Policy:
         "a hypothesis that leaves more does not explain a drift of the rig, nor, if hardly worth its genes, a misfit",
     )
     doubted_noise: float = _threshold(
-        0.5, "probability", "most that a model is adequate where missing physics may hide in the assumed noise"
+        0.6, "probability", "most that a model is adequate where missing physics may hide in the assumed noise"
     )
     least_evidence: float = _threshold(2.0, "evidence", "no effect is searched for, or added to the model, for less")
     single: float = _threshold(0.85, "probability", "share of all effects from which one hypothesis is named")

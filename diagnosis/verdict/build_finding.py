@@ -133,16 +133,16 @@ def _finding(
         remarks=(
             *state.fitted_nominal.remarks,
             *_refinement_remarks(state.fitted_nominal),
-            *_noise_remarks(data, nominal, unit),
+            *_noise_remarks(data, nominal, unit, decision),
             *_unidentified_sizes(genes, best),
             *_worsened(rows, best, unit),
         ),
     )
 
 
-def _noise_remarks(data: WhitenedData, nominal: Refit, unit: str) -> tuple[str, ...]:
+def _noise_remarks(data: WhitenedData, nominal: Refit, unit: str, decision: Decision) -> tuple[str, ...]:
     if data.kind == "series":
-        return series_remarks(data, nominal.fit)
+        return series_remarks(data, nominal.fit, adequate=decision.verdict == "adequate")
     return noise_remarks(data, unit)
 
 

@@ -38,6 +38,11 @@ def overstated(data: WhitenedData, fit: Fit) -> bool:
 
 def uncertain(data: WhitenedData, fit: Fit) -> bool:
     """Return whether the residual clearly exceeds the visible noise, and only slow noise could explain that."""
-    sure = MEASURED_ERROR * data.noise**2 + data.excess_standard_error_of_samples
     beyond = data.excess(fit.coefficients) - (data.policy.negligible * data.noise) ** 2 - data.accepted**2
-    return data.policy.refuting_excess * sure < beyond <= data.policy.refuting_excess * data.excess_standard_error
+    least, most = sure_error(data), data.excess_standard_error
+    return data.policy.refuting_excess * least < beyond <= data.policy.refuting_excess * most
+
+
+def sure_error(data: WhitenedData) -> float:
+    """Return the standard error of the mean square of the noise of series if none of it was invisible."""
+    return MEASURED_ERROR * data.noise**2 + data.excess_standard_error_of_samples

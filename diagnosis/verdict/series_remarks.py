@@ -22,9 +22,10 @@ SOURCES = {
 }
 
 
-def series_remarks(data: WhitenedData, nominal: Fit) -> tuple[str, ...]:
-    """Return remarks on the noise; ``nominal``: fit of the nominal model."""
-    return (*_sources(data), *_uneven(data), *_contradicted(data), *_overstated(data, nominal))
+def series_remarks(data: WhitenedData, nominal: Fit, *, adequate: bool) -> tuple[str, ...]:
+    """Return remarks on the noise; ``nominal``: fit of the nominal model; ``adequate``: whether it is called so."""
+    doubts = _doubts(data, nominal) if adequate else ()
+    return (*_sources(data), *_uneven(data), *_contradicted(data), *doubts)
 
 
 def _sources(data: WhitenedData) -> Iterator[str]:
@@ -70,7 +71,7 @@ def _contradicted(data: WhitenedData) -> Iterator[str]:
             )
 
 
-def _overstated(data: WhitenedData, nominal: Fit) -> Iterator[str]:
+def _doubts(data: WhitenedData, nominal: Fit) -> Iterator[str]:
     ratio = residual_to_noise(data, nominal)
     if uncertain(data, nominal):
         yield (

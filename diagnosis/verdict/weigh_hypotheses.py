@@ -26,7 +26,7 @@ from wingfit.diagnosis.evidence.intervals import gene_values
 from wingfit.diagnosis.evidence.refit import Refit
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.policy import POLICY, Policy
-from wingfit.diagnosis.verdict.noise_doubt import noise_may_hide
+from wingfit.diagnosis.verdict.noise_doubt import noise_may_hide, sure_error
 from wingfit.records.array_types import Array, Float
 
 
@@ -56,7 +56,8 @@ def weigh(
     policy = data.policy
     hypotheses = (nominal, *refits)
     noise_variance = data.noise**2
-    tau = tolerated_excess(data, nominal.excess, floor) / noise_variance
+    error = noise_error(data, hypotheses)
+    tau = tolerated_excess(data, nominal.excess, floor, error) / noise_variance
     excess = np.array([_misfit(data, one, tau * noise_variance) / noise_variance for one in hypotheses])
     genes = np.array([one.freedom for one in hypotheses], float)
     effects = np.array([len(one.trials) for one in hypotheses], float)
@@ -67,7 +68,7 @@ def weigh(
     )
     possible = np.ones(len(hypotheses), bool)
     drift_alone = only_drifts(data, nominal, floor)
-    if nominal_refuted(data, nominal.excess, floor) or (drifts(data) and not drift_alone):
+    if nominal_refuted(data, nominal.excess, floor, error) or (drifts(data) and not drift_alone):
         # A hypothesis that leaves the misfit as it was explains nothing; nor does the nominal model. With few
         # recordings, one that explains most of the misfit may have little evidence, if its size is not zero.
         possible = evidence - evidence[0] > policy.least_evidence
@@ -80,19 +81,34 @@ def weigh(
     weight, other = np.exp(weight - top), np.exp(unknown - top)
     total = weight.sum() + other
     probabilities, unknown = weight / total, float(other / total)
-    if noise_may_hide(data, nominal.fit):
+    if noise_may_hide(data, nominal.fit):  # as far as no hypothesis has shown how large the noise is
         doubted = max(probabilities[0] - policy.doubted_noise, 0.0)
         probabilities[0], unknown = probabilities[0] - doubted, unknown + doubted
     return HypothesisWeights(hypotheses, evidence - evidence[0], probabilities, unknown, excess, data.policy)
 
 
-def nominal_refuted(data: WhitenedData, excess: float, floor: float) -> bool:
+def noise_error(data: WhitenedData, hypotheses: Sequence[Refit]) -> float:
+    """Return the standard error (m^2 or N^2; of series: in scales) of the mean square of the noise.
+
+    The noise of a series may be known badly, because slow noise is not visible. But it is not larger than the residual
+    of any hypothesis, cross-validated: slow noise in one recording does not follow from the others.
+    """
+    error = data.excess_standard_error
+    if data.kind != "series":
+        return error
+    least = min(max(one.excess, one.excess if one.predicted is None else one.predicted, 0.0) for one in hypotheses)
+    single = any(one.predicted is None for one in hypotheses)
+    return error if single else min(error, sure_error(data) + least)
+
+
+def nominal_refuted(data: WhitenedData, excess: float, floor: float, error: float | None = None) -> bool:
     """Return whether the nominal ``excess`` is too large for noise and discretisation error (``floor``, m or N) alone.
 
     Then physics is missing, even if it is not known which. The criterion does not depend on the number of samples.
+    ``error``: standard error of the noise (:func:`noise_error`); None: without a hypothesis.
     """
     explainable = (data.policy.negligible * data.noise) ** 2 + floor**2 + data.accepted**2
-    return excess - explainable > data.policy.refuting_excess * data.excess_standard_error
+    return excess - explainable > data.policy.refuting_excess * (data.excess_standard_error if error is None else error)
 
 
 def drifts(data: WhitenedData) -> bool:
@@ -138,7 +154,7 @@ def _evidence(data: WhitenedData, excess: Array, genes: Array, effects: Array, s
 
 def nominal_suffices(data: WhitenedData, nominal: Refit, suspects: int) -> bool:
     """Return whether the nominal excess is too small for any effect to be worth its genes, even a perfect one."""
-    if nominal_refuted(data, nominal.excess, 0.0) or drifts(data):
+    if nominal_refuted(data, nominal.excess, 0.0) or drifts(data) or noise_may_hide(data, nominal.fit):
         return False
     tau = tolerated_excess(data, nominal.excess, 0.0)
     excess = _misfit(data, nominal, tau)
@@ -146,7 +162,7 @@ def nominal_suffices(data: WhitenedData, nominal: Refit, suspects: int) -> bool:
     return bool(ends[1] < ends[0] - data.policy.least_evidence)
 
 
-def tolerated_excess(data: WhitenedData, excess: float, floor: float) -> float:
+def tolerated_excess(data: WhitenedData, excess: float, floor: float, error: float | None = None) -> float:
     """Return the mean square (m^2 or N^2) beyond the noise that a right hypothesis may have.
 
     ``excess``: of the nominal model; ``floor`` (m or N): discretisation error.
@@ -157,7 +173,7 @@ def tolerated_excess(data: WhitenedData, excess: float, floor: float) -> float:
         + floor**2
         + data.accepted**2
         + policy.form**2 * max(excess, 0.0)
-        + policy.allowance * data.excess_standard_error
+        + policy.allowance * (data.excess_standard_error if error is None else error)
     )
 
 

@@ -38,6 +38,7 @@ MOST_RISE = 4.0  # times the density where noise becomes invisible: more is not 
 CORRELATIONS = np.array([0.0, *np.linspace(0.1, 0.9, 17), 0.93, 0.95, 0.97, 0.98, 0.99])
 SHARES = np.linspace(0.0, 1.0, 11)  # of the coloured noise in the variance
 ERROR = 0.05  # least relative error of the variance
+MOST_ERROR = 2.0  # largest: slow noise of more than three times the visible noise is taken for misfit
 
 
 class VisibleNoise(NamedTuple):
@@ -144,4 +145,5 @@ def _fit(frequency: Array, power: Array, start: float, stated: float | None) -> 
     found = variance * (1.0 - share), variance * share, float(CORRELATIONS[best[0]])
     own = float(VisibleNoise(*found, start, 0.0).density(np.zeros(1))[0])
     rise = max(float(levels[moderate].max(initial=own)) / own, 1.0)
-    return VisibleNoise(*found, start, float(np.hypot(ERROR + (rise - 1.0) / 2.0, np.sqrt(SPREAD / max(count, 1)))))
+    error = float(np.hypot(ERROR + (rise - 1.0) / 2.0, np.sqrt(SPREAD / max(count, 1))))
+    return VisibleNoise(*found, start, min(error, MOST_ERROR))
