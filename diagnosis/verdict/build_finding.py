@@ -93,7 +93,7 @@ def _finding(
     subject, data, weights = state.subject, state.data, state.final_weights
     nominal, discretisation, unit = state.fitted_nominal.refit, _discretisation_error(state), state.data.unit
     rows = recording_misfits(fitted, held_out=False, floor=discretisation)
-    proved = None
+    first, proved = decision, None
     if validation is not None:
         rows += recording_misfits(validation, held_out=True, floor=discretisation)
         proved = proof(validation, discretisation, unit, effects_added=bool(best.names))
@@ -110,7 +110,7 @@ def _finding(
         + ("" if data.kind == "series" else drift_sentence(data))
         + remaining_sentence(data, decision, best, discretisation)
         + noise_sentence(data, decision, nominal)
-        + held_out_sentence(decision, proved, data),
+        + held_out_sentence(first, proved, data),
         probabilities=decision.probabilities,
         named=decision.named,
         added_effects=best.names,

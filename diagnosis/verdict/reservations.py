@@ -8,11 +8,13 @@ import numpy as np
 
 from wingfit.diagnosis.evidence.refit import Refit
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
-from wingfit.diagnosis.finding import Proof, amount
+from wingfit.diagnosis.finding import Proof, Verdict, amount
 from wingfit.diagnosis.verdict.noise_doubt import noise_may_hide
 from wingfit.diagnosis.verdict.verdict import Decision
 from wingfit.diagnosis.verdict.weigh_hypotheses import nominal_refuted
 
+NAMING: tuple[Verdict, ...] = ("named", "ambiguous", "measurement fault")
+NO_GAIN = 0.1  # of the held-out misfit: effects that remove less of it are not named
 NOT_PREDICTED = 2.0  # times the floor: the lower end of a held-out misfit from which a model does not predict
 
 
@@ -37,23 +39,38 @@ def noise_sentence(data: WhitenedData, decision: Decision, nominal: Refit) -> st
 
 
 def doubted_by_held_out(decision: Decision, proved: Proof | None, data: WhitenedData) -> Decision:
-    """Return ``decision`` with less certainty if a model is called adequate that does not predict held-out series."""
-    if not _unpredicted(decision, proved, data):
-        return decision
+    """Return ``decision`` with less certainty where held-out series contradict it.
+
+    A model that does not predict them is adequate with a limited probability (`Policy.doubted_noise`). Effects with
+    which they are predicted no better are not named.
+    """
     found = dict(decision.probabilities)
-    moved = max(found["adequate"] - data.policy.doubted_noise, 0.0)
-    found["adequate"], found["unnamed"] = found["adequate"] - moved, found["unnamed"] + moved
-    return replace(decision, probabilities=found)
+    if _unpredicted(decision, proved, data):
+        moved = max(found["adequate"] - data.policy.doubted_noise, 0.0)
+        found["adequate"], found["unnamed"] = found["adequate"] - moved, found["unnamed"] + moved
+        return replace(decision, probabilities=found)
+    if _useless(decision, proved, data):
+        given = sum(found[name] for name in NAMING)
+        found |= dict.fromkeys(NAMING, 0.0) | {"unnamed": found["unnamed"] + given}
+        return replace(decision, verdict="unnamed", probabilities=found, named=(), alternatives=())
+    return decision
 
 
-def held_out_sentence(decision: Decision, proved: Proof | None, data: WhitenedData) -> str:
-    """Return a sentence on held-out series that a model, called adequate, does not predict; empty if there are none."""
-    if not _unpredicted(decision, proved, data) or proved is None:
+def held_out_sentence(before: Decision, proved: Proof | None, data: WhitenedData) -> str:
+    """Return a sentence on held-out series that contradict the decision ``before`` they were considered; else empty."""
+    if proved is None:
         return ""
-    return (
-        f" But it does not predict the held-out recordings: their misfit is {proved.before.value:.3g} times the floor. "
-        "Something is missing there, or the fitted recordings do not determine the genes."
-    )
+    if _unpredicted(before, proved, data):
+        return (
+            f" But it does not predict the held-out recordings: their misfit is {proved.before.value:.3g} times the "
+            "floor. Something is missing there, or the fitted recordings do not determine the genes."
+        )
+    if _useless(before, proved, data):
+        return (
+            " It is not named, because with it the held-out recordings are predicted no better: their misfit is "
+            f"{proved.before.value:.3g} times the floor before, and {proved.after.value:.3g} after."
+        )
+    return ""
 
 
 def _unpredicted(decision: Decision, proved: Proof | None, data: WhitenedData) -> bool:
@@ -61,3 +78,10 @@ def _unpredicted(decision: Decision, proved: Proof | None, data: WhitenedData) -
         return False
     low = proved.before.low
     return (proved.before.value if low is None else low) > NOT_PREDICTED
+
+
+def _useless(decision: Decision, proved: Proof | None, data: WhitenedData) -> bool:
+    if data.kind != "series" or decision.verdict not in NAMING or proved is None:
+        return False
+    missed = proved.before.value > 1.0 + NO_GAIN  # else there is nothing to gain
+    return missed and not proved.improved and proved.after.value > (1.0 - NO_GAIN) * proved.before.value
