@@ -51,7 +51,7 @@ def doubted_by_held_out(decision: Decision, proved: Proof | None, data: Whitened
         return replace(decision, probabilities=found)
     if _useless(decision, proved, data):
         given = sum(found[name] for name in NAMING)
-        found.update({name: 0.0 for name in NAMING}, unnamed=found["unnamed"] + given)
+        found.update(dict.fromkeys(NAMING, 0.0), unnamed=found["unnamed"] + given)
         return replace(decision, verdict="unnamed", probabilities=found, named=(), alternatives=())
     return decision
 
