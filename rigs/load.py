@@ -6,10 +6,12 @@ import hashlib
 import importlib
 import importlib.util
 import sys
+from collections.abc import Mapping
 from dataclasses import replace
 from importlib.metadata import entry_points
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 from wingfit.rigs.rig import Rig
 
@@ -52,6 +54,11 @@ def load_rig(reference: str) -> Rig:
         held = "nothing" if found is None else f"a {type(found).__name__}"
         raise RigError(f"{reference} holds {held} called {what!r}; define there: {what} = wingfit.Rig(...)")
     return replace(found, reference=reference)
+
+
+def reload_rig(values: Mapping[str, Any]) -> Rig:
+    """Return the rig with the fields ``values`` by name, and the function of the rig that its reference names."""
+    return replace(load_rig(values["reference"]), **values)
 
 
 def _module_of(path: Path) -> ModuleType:

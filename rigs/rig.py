@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 
 from wingfit.records import Gene
 from wingfit.records.array_types import Array
@@ -52,12 +52,12 @@ class Rig:
     reference: str = ""
 
     def __reduce__(self) -> str | tuple[object, ...]:
-        """Pickle a rig that was loaded as its reference: its functions may not be importable elsewhere."""
+        """Pickle a rig that was loaded without its function, which may not be importable elsewhere."""
         if not self.reference:
             return super().__reduce__()
-        from wingfit.rigs.load import load_rig  # it imports this module
+        from wingfit.rigs.load import reload_rig  # it imports this module
 
-        return load_rig, (self.reference,)
+        return reload_rig, ({one.name: getattr(self, one.name) for one in fields(self) if one.name != "simulate"},)
 
     def __post_init__(self) -> None:
         for name in ("genes", "suspects", "recording_genes", "ports"):

@@ -96,13 +96,39 @@ class Run:
         ``method`` with the relative tolerance ``rtol`` and the absolute one ``atol`` (None: ATOL of the largest value
         in ``start``). SimulationError where it fails.
         """
-        first = np.atleast_1d(np.asarray(start, float))
-        remembering = [law for own in self.laws.values() for law in own if law.slip is not None]
-        self._memory, self._slip = [0.0] * len(remembering), [0.0] * len(remembering)
-        size, times = len(first), np.asarray(self.times, float)
-        most, calls = max(MOST_RATES, RATES_PER_SAMPLE * len(times)), 0
+        first, times = np.atleast_1d(np.asarray(start, float)), np.asarray(self.times, float)
+        self._memory = [0.0] * len(self._remembering)
+        self._slip = [0.0] * len(self._remembering)
+        if len(times) < 2:
+            return first[:, None] + np.zeros(len(times))
+        whole, guarded = np.concatenate([first, self._memory]), self._guarded(rate, len(first))
+        self._integrates = True
+        try:
+            if steps > 0:
+                return runge_kutta(guarded, whole, times, steps)[: len(first)]
+            tolerance = max(ATOL * float(np.abs(first).max()), ATOL_LEAST) if atol is None else atol
+            spacing = float(np.median(np.diff(self.input_times))) if self.inputs else np.inf
+            found = scipy.integrate.solve_ivp(
+                guarded,
+                (times[0], times[-1]),
+                whole,
+                method,
+                times,
+                rtol=rtol,
+                atol=tolerance,
+                max_step=SAMPLES_PER_STEP * spacing,
+            )
+        finally:
+            self._integrates = False
+        if not found.success:
+            raise SimulationError(f"the integration fails: {found.message}")
+        return np.asarray(found.y[: len(first)])
 
-        def derivative(t: float, state: Array) -> ArrayLike:
+    def _guarded(self, rate: Callable[[float, Array], ArrayLike], size: int) -> Callable[[float, Array], ArrayLike]:
+        """Return the rate of ``size`` states and of the laws' memories; it ends integrations that would never end."""
+        most, calls, remembering = max(MOST_RATES, RATES_PER_SAMPLE * len(self.times)), 0, bool(self._remembering)
+
+        def guarded(t: float, state: Array) -> ArrayLike:
             nonlocal calls
             calls += 1
             if calls > most:
@@ -114,37 +140,15 @@ class Run:
             self._memory = state[size:].tolist()
             return np.concatenate([np.asarray(rate(t, state[:size]), float).ravel(), self._slip])
 
-        whole = np.concatenate([first, np.zeros(len(remembering))])
-        if len(times) < 2:
-            return first[:, None] + np.zeros(len(times))
-        if steps > 0:
-            self._integrates = True
-            try:
-                return runge_kutta(derivative, whole, times, steps)[:size]
-            finally:
-                self._integrates = False
-        spacing = float(np.median(np.diff(self.input_times))) if self.inputs else np.inf
-        self._integrates = True
-        try:
-            found = scipy.integrate.solve_ivp(
-                derivative,
-                (times[0], times[-1]),
-                whole,
-                method,
-                times,
-                rtol=rtol,
-                atol=max(ATOL * float(np.abs(first).max()), ATOL_LEAST) if atol is None else atol,
-                max_step=SAMPLES_PER_STEP * spacing,
-            )
-        finally:
-            self._integrates = False
-        if not found.success:
-            raise SimulationError(f"the integration fails: {found.message}")
-        return np.asarray(found.y[:size])
+        return guarded
+
+    @property
+    def _remembering(self) -> list[Law]:
+        """The laws with a memory, in the order of their states."""
+        return [law for own in self.laws.values() for law in own if law.slip is not None]
 
     def _place(self, law: Law) -> int:
-        remembering = [one for own in self.laws.values() for one in own if one.slip is not None]
-        return next(k for k, one in enumerate(remembering) if one is law)
+        return next(k for k, one in enumerate(self._remembering) if one is law)
 
 
 def runge_kutta(

@@ -1,4 +1,4 @@
-"""An integration ends with a reason where the motion escapes to infinity or the solver makes no progress."""
+"""Integrations: Runge-Kutta steps converge, and an integration that would never end fails with a reason."""
 
 from __future__ import annotations
 
@@ -23,3 +23,21 @@ def test_solver_without_progress_fails_with_a_reason(monkeypatch: pytest.MonkeyP
     run = Run("swing", TIMES, {}, {}, TIMES)
     with pytest.raises(SimulationError, match="no progress"):
         run.integrate(lambda _, y: [y[1], -400.0 * y[0]], [1.0, 0.0])
+
+
+def test_runge_kutta_steps_converge_with_the_fourth_power() -> None:
+    def error(steps: int) -> float:
+        run = Run("swing", TIMES, {}, {}, TIMES)
+        found = run.integrate(lambda _, y: [y[1], -25.0 * y[0]], [1.0, 0.0], steps=steps)
+        return float(np.abs(found[0] - np.cos(5.0 * TIMES)).max())
+
+    assert error(1) / error(2) == pytest.approx(16.0, rel=0.2)
+    assert error(8) < 1e-6
+
+
+def test_runge_kutta_follows_the_kinks_of_an_input() -> None:
+    push = np.where(np.arange(11) % 2, 1.0, -1.0)
+    run = Run("push", TIMES, {}, {"push": push}, TIMES)
+    found = run.integrate(lambda t, _: [float(run.input("push", t))], [0.0], steps=1)
+    exact = np.concatenate([[0.0], np.cumsum((push[1:] + push[:-1]) / 2.0 * 0.1)])
+    np.testing.assert_allclose(found[0], exact, atol=1e-12)

@@ -107,3 +107,12 @@ def test_what_is_no_rig_is_refused(tmp_path: Path, text: str | None, reference: 
         path.write_text(text)
     with pytest.raises(RigError, match=message):
         load_rig(reference.format(path=path))
+
+
+def test_a_loaded_rig_keeps_its_changes_in_other_processes(tmp_path: Path) -> None:
+    path = tmp_path / "my_rig.py"
+    path.write_text(FILE)
+    changed = replace(load_rig(str(path)), faults=False, description="changed")
+    again = pickle.loads(pickle.dumps(changed))  # noqa: S301
+    assert (again.faults, again.description) == (False, "changed")
+    assert callable(again.simulate)

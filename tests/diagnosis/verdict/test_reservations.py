@@ -1,0 +1,87 @@
+"""What held-out series and a misfit that remains do to a verdict."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any, cast
+
+import pytest
+
+from wingfit.diagnosis.finding import VERDICTS, Interval, Proof, Verdict
+from wingfit.diagnosis.policy import POLICY
+from wingfit.diagnosis.verdict.reservations import doubted_by_held_out, held_out_sentence, remaining_sentence
+from wingfit.diagnosis.verdict.verdict import Decision
+
+
+def decision(verdict: Verdict) -> Decision:
+    probabilities: dict[str, float] = {**dict.fromkeys(map(str, VERDICTS), 0.0), verdict: 0.97, "unnamed": 0.03}
+    names = ("drag",) if verdict in ("named", "measurement fault") else ()
+    return Decision(verdict, probabilities, names, (), cast("Any", SimpleNamespace(names=("drag",), excess=25.0)))
+
+
+def proof(before: float, after: float, *, improved: bool) -> Proof:
+    def around(value: float) -> Interval:
+        return Interval(value, 0.9 * value, 1.1 * value)
+
+    return Proof(around(before), around(after), 1.0, improved, "")
+
+
+def data(kind: str = "series") -> Any:
+    return SimpleNamespace(
+        kind=kind, unit="noise", noise=1.0, accepted=0.0, policy=POLICY, excess_standard_error=0.05, drift=0.0
+    )
+
+
+@pytest.mark.parametrize("verdict", ["named", "ambiguous", "measurement fault"])
+def test_effects_that_predict_no_better_are_not_named(verdict: Verdict) -> None:
+    before, useless = decision(verdict), proof(2.1, 2.1, improved=False)
+    after = doubted_by_held_out(before, useless, data())
+    assert (after.verdict, after.named) == ("unnamed", ())
+    assert after.probabilities["unnamed"] == pytest.approx(1.0)
+    assert "It is not named, because" in held_out_sentence(before, useless, data())
+
+
+@pytest.mark.parametrize(("before", "after", "improved"), [(2.1, 1.0, True), (2.1, 1.5, False), (1.02, 1.02, False)])
+def test_effects_that_predict_better_or_where_nothing_was_missed_stay(
+    before: float, after: float, improved: bool
+) -> None:
+    found, proved = decision("named"), proof(before, after, improved=improved)
+    assert doubted_by_held_out(found, proved, data()) == found
+    assert held_out_sentence(found, proved, data()) == ""
+
+
+def test_a_model_that_does_not_predict_is_adequate_with_little_certainty() -> None:
+    before, wrong = decision("adequate"), proof(4.6, 4.6, improved=False)
+    after = doubted_by_held_out(before, wrong, data())
+    assert after.verdict == "adequate"
+    assert after.probabilities["adequate"] == POLICY.doubted_noise
+    assert sum(after.probabilities.values()) == pytest.approx(1.0)
+    assert "does not predict the held-out recordings: their misfit is 4.6 times" in held_out_sentence(
+        before, wrong, data()
+    )
+    assert doubted_by_held_out(before, proof(1.1, 1.1, improved=False), data()) == before
+
+
+@pytest.mark.parametrize("verdict", VERDICTS)
+def test_recordings_with_a_beat_keep_their_verdict(verdict: Verdict) -> None:
+    found = decision(verdict)
+    assert doubted_by_held_out(found, proof(4.0, 4.0, improved=False), data("tracks")) == found
+
+
+def test_without_held_out_recordings_nothing_changes() -> None:
+    assert doubted_by_held_out(decision("named"), None, data()) == decision("named")
+
+
+def test_a_misfit_that_remains_is_stated() -> None:
+    found = decision("named")
+    assert "A misfit of 5 times the noise beyond the noise remains" in remaining_sentence(
+        data(), found, found.best, 0.0
+    )
+    assert remaining_sentence(data(), decision("adequate"), found.best, 0.0) == ""
+    exact = replace_excess(found, 0.01)
+    assert remaining_sentence(data(), exact, exact.best, 0.0) == ""
+
+
+def replace_excess(found: Decision, excess: float) -> Decision:
+    best = cast("Any", SimpleNamespace(names=found.best.names, excess=excess))
+    return Decision(found.verdict, found.probabilities, found.named, found.alternatives, best)
