@@ -13,6 +13,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from benchmarks.common.machine import commit, cpu
 from benchmarks.real import balls, flutter, pendulum
 from benchmarks.real.fetch import fetch
 from benchmarks.real.trial import DATA_VARIABLE, SIBLING, Trial, data_folder, run
@@ -48,7 +49,8 @@ def main() -> None:
         (controls if trial.control else rows).append(row)
         print(_line(row), flush=True)
     if options.json:
-        print(json.dumps({"rigs": rows, **_counts(rows), "controls": controls, "skipped": absent}))
+        about = {"commit": commit(), "cpu": cpu()}
+        print(json.dumps({"rigs": rows, **_counts(rows), "controls": controls, "skipped": absent, **about}))
 
 
 def _line(row: dict[str, Any]) -> str:

@@ -21,6 +21,7 @@ from wingfit.workers import make_evaluator
 
 Judgement = Literal["abstained"] | bool
 DATA_VARIABLE = "WINGFIT_REAL_DATA"
+CERTAIN = 0.75  # least probability of a verdict that a model is adequate
 SIBLING = Path(__file__).resolve().parents[3] / "shared" / "data"
 
 
@@ -52,12 +53,13 @@ class Trial:
         """Return whether ``finding`` is right; "abstained" where it names nothing, or the right name among others.
 
         A name is wanted where :attr:`right` is not empty; else "adequate", or "unnamed" if :attr:`adequate` is False.
-        An ambiguous verdict is right if all its alternatives are.
+        An ambiguous verdict is right if all its alternatives are; an adequate one with a probability below CERTAIN says
+        that missing physics may hide in the noise, and abstains.
         """
         named = frozenset(finding.named)
         possible = [frozenset(one) for one in finding.indistinguishable] or [named]
         if finding.verdict == "adequate":
-            return self.adequate
+            return self.adequate if finding.probabilities["adequate"] >= CERTAIN else "abstained"
         if finding.verdict == "unnamed":
             return "abstained" if self.right or self.claims else not self.adequate
         if self.right:
