@@ -2,7 +2,7 @@
 
 ``python -m benchmarks.real [--json] [--only NAME ...] [--data DIR] [--fetch DIR]``; with ``--json`` the last line is
 one JSON object. ``--only`` takes beginnings of names. The recordings are not part of the project: they are read from
-``--data``, the folder that WINGFIT_REAL_DATA names, or ``../shared/data``; ``--fetch`` downloads them.
+``--data``, or ``../shared/data``; ``--fetch`` downloads them.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import Any
 from benchmarks.common.machine import commit, cpu
 from benchmarks.real import balls, flutter, pendulum
 from benchmarks.real.fetch import fetch
-from benchmarks.real.trial import DATA_VARIABLE, SIBLING, Trial, data_folder, run
+from benchmarks.real.trial import SIBLING, Trial, data_folder, run
 
 TRIALS: tuple[Trial, ...] = (*balls.TRIALS, *pendulum.TRIALS, *flutter.TRIALS)
 
@@ -33,7 +33,7 @@ def main() -> None:
         sys.exit(0 if fetch(Path(options.fetch), print) else 1)
     folder = data_folder(options.data)
     if folder is None:
-        print(f"skipped: no folder {options.data or SIBLING}; give --data or set {DATA_VARIABLE}, or --fetch DIR")
+        print(f"skipped: no folder {options.data or SIBLING}; give --data, or --fetch DIR")
         return
     chosen = [one for one in TRIALS if not options.only or any(one.name.startswith(name) for name in options.only)]
     if not chosen:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
@@ -20,7 +19,6 @@ from wingfit.rigs.rig_model import RigModel
 from wingfit.workers import make_evaluator
 
 Judgement = Literal["abstained"] | bool
-DATA_VARIABLE = "WINGFIT_REAL_DATA"
 CERTAIN = 0.75  # least probability of a verdict that a model is adequate
 SIBLING = Path(__file__).resolve().parents[3] / "shared" / "data"
 
@@ -71,8 +69,8 @@ class Trial:
 
 
 def data_folder(given: str | None) -> Path | None:
-    """Return the folder of the recordings: as ``given``, of the environment, or beside the project; None if absent."""
-    folder = Path(given or os.environ.get(DATA_VARIABLE, "") or SIBLING)
+    """Return the folder of the recordings: as ``given``, or beside the project; None if absent."""
+    folder = Path(given or SIBLING)
     return folder if folder.is_dir() else None
 
 

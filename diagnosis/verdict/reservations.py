@@ -26,9 +26,7 @@ def remaining_sentence(data: WhitenedData, decision: Decision, best: Refit, floo
     if decision.verdict in ("adequate", "unnamed") or not nominal_refuted(data, best.excess, floor):
         return ""
     rest = amount(float(np.sqrt(best.excess)), data.unit)
-    return (
-        f" A misfit of {rest} beyond the noise remains that this does not explain: something else is missing as well."
-    )
+    return f" A misfit of {rest} beyond the noise remains: the law has another form, or something else is missing too."
 
 
 def noise_sentence(data: WhitenedData, decision: Decision, nominal: Refit) -> str:

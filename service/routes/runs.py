@@ -96,6 +96,7 @@ def _planned(service: Service, body: RunIn) -> tuple[Dataset, CalibrationSpec]:
     spec_views.refuse_effects(body.effects, dataset, body)
     spec = spec_views.calibration_spec(body)
     refuse_unknown(spec, dataset, gene_names(service.engine, spec, dataset))
+    spec_views.refuse_idle(body, spec.method)
     try:
         spec = service.engine.check(spec, dataset)
     except SearchDivisionError as error:
