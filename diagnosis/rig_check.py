@@ -59,6 +59,7 @@ class _Checks:
     def __init__(self, model: RigModel, recording: Series) -> None:
         self.model, self.recording = model, recording
         self.nominal = np.array([gene.nominal for gene in model.genes])
+        self.before = (recording.times.copy(), {name: u.copy() for name, u in recording.inputs.items()})
         began = time.perf_counter()
         model.observe(self.nominal, recording)
         self.milliseconds = 1e3 * (time.perf_counter() - began)
@@ -83,8 +84,7 @@ class _Checks:
 
     def leaves_arguments(self) -> Iterator[CheckResult]:
         """The simulation does not change the recording."""
-        before = (self.recording.times.copy(), {name: u.copy() for name, u in self.recording.inputs.items()})
-        self.simulated(self.nominal)
+        before = self.before
         same = np.array_equal(before[0], self.recording.times) and all(
             np.array_equal(u, self.recording.inputs[name]) for name, u in before[1].items()
         )

@@ -45,6 +45,13 @@ class Channel:
     description: str = ""
     accepted_error: float | None = None
 
+    def __post_init__(self) -> None:
+        for name in ("standard_deviation", "accepted_error"):
+            value = getattr(self, name)
+            if value is not None and not 0.0 < value < np.inf:
+                unit = "" if self.unit == "1" else f" {self.unit}"
+                raise ValueError(f"channel {self.name!r}: {name} is {value:g}{unit}; give a positive number or None")
+
 
 @dataclass(frozen=True, eq=False)
 class Series:

@@ -32,24 +32,30 @@ Channels = dict[str, Array]
 
 @dataclass(frozen=True)
 class Scales:
-    """What the bounds of faults follow from: range and largest value of each channel or input, and the interval (s)."""
+    """What the bounds of faults follow from: range and largest value of each channel or input, and the interval (s).
+
+    The range of one that never changes is its largest value.
+    """
 
     span: Mapping[str, float]
+    largest: Mapping[str, float]
     units: Mapping[str, str]
     interval: float
 
     @classmethod
     def of(cls, recordings: Sequence[Series], units: Mapping[str, str]) -> Scales:
         """Return the scales of ``recordings``; ``units`` of channels and inputs by name."""
-        span = dict.fromkeys(units, FILL)
+        span, largest = dict.fromkeys(units, 0.0), dict.fromkeys(units, 0.0)
         for one in recordings:
             columns = dict(zip(one.channels, one.values.T, strict=True)) | dict(one.inputs)
             for name, values in columns.items():
                 known = values[np.isfinite(values)]
                 if name in span and len(known):
                     span[name] = max(span[name], float(np.ptp(known)))
+                    largest[name] = max(largest[name], float(np.abs(known).max()))
+        span = {name: value or largest[name] or 1.0 for name, value in span.items()}
         steps = np.concatenate([np.diff(one.times) for one in recordings if len(one.times) > 1] or [np.ones(1)])
-        return cls(span, units, float(np.median(steps)))
+        return cls(span, largest, units, float(np.median(steps)))
 
 
 class Fault(NamedTuple):
@@ -116,11 +122,14 @@ def _low_pass(values: Array, times: Array, constant: float) -> Array:
     return found
 
 
-def _saturation(values: Array, _: Array, part: float) -> Array:
-    if part == 0.0:
-        return values
-    limit = (1.0 - part) * float(np.abs(values).max())
-    return np.asarray(np.clip(values, -limit, limit))
+def _saturation(largest: float) -> Change:
+    """Return a limit of the recorder: the part of ``largest``, the largest value recorded, by which it is less."""
+
+    def change(values: Array, _: Array, part: float) -> Array:
+        limit = (1.0 - part) * largest
+        return values if part == 0.0 else np.asarray(np.clip(values, -limit, limit))
+
+    return change
 
 
 def _suspect(name: str, title: str, family: Family, gene: tuple[str, str, float, float], typical: float) -> Suspect:
@@ -137,7 +146,7 @@ def _of_channel(name: str, scales: Scales) -> Iterator[Fault]:
         ("drift", "drift", ("size", unit, -span, span), 0.1 * span, _drift),
         ("delay", "delay", ("time", "s", -slow, slow), 0.1 * slow, _delay),
         ("low_pass", "low-pass filter", ("constant", "s", 0.0, slow), 0.1 * slow, _low_pass),
-        ("saturation", "saturation", ("part", "1", 0.0, 0.9), 0.1, _saturation),
+        ("saturation", "saturation", ("part", "1", 0.0, 0.9), 0.1, _saturation(scales.largest[name])),
     )
     for kind, title, gene, typical, change in rows:
         suspect = _suspect(f"{kind}.{name}", f"{title} of {name}", "measurement", gene, typical)

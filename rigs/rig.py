@@ -53,10 +53,10 @@ class Rig:
 
     def __reduce__(self) -> str | tuple[object, ...]:
         """Pickle a rig that was loaded without its function, which may not be importable elsewhere."""
-        if not self.reference:
-            return super().__reduce__()
-        from wingfit.rigs.load import reload_rig  # it imports this module
+        from wingfit.rigs.load import load_rig, reload_rig  # it imports this module
 
+        if not self.reference or load_rig(self.reference).simulate is not self.simulate:
+            return super().__reduce__()
         return reload_rig, ({one.name: getattr(self, one.name) for one in fields(self) if one.name != "simulate"},)
 
     def __post_init__(self) -> None:

@@ -18,7 +18,7 @@ ATOL_LEAST = 1e-12
 ESCAPED = 1e100  # in any unit: a state that large has escaped to infinity, which a solver never reaches
 MOST_RATES = 200_000  # evaluations of the rate in one integration, and
 RATES_PER_SAMPLE = 1_000  # more for a long recording: a solver that needs more makes no progress
-SAMPLES_PER_STEP = 10.0  # of an input: longest step of an integration, so that no change of an input is missed
+BADLY_SCALED = 1e-6  # of the largest value of a state: if the absolute tolerance is more, it is set for each state
 
 
 class SimulationError(ValueError):
@@ -107,22 +107,27 @@ class Run:
             if steps > 0:
                 return runge_kutta(guarded, whole, times, steps)[: len(first)]
             tolerance = max(ATOL * float(np.abs(first).max()), ATOL_LEAST) if atol is None else atol
-            spacing = float(np.median(np.diff(self.input_times))) if self.inputs else np.inf
-            found = scipy.integrate.solve_ivp(
-                guarded,
-                (times[0], times[-1]),
-                whole,
-                method,
-                times,
-                rtol=rtol,
-                atol=tolerance,
-                max_step=SAMPLES_PER_STEP * spacing,
-            )
+            found = self._solved(guarded, whole, method, rtol, np.full(len(whole), tolerance))
+            largest = np.abs(found).max(axis=1)
+            if atol is None and (tolerance > BADLY_SCALED * largest[largest > 0.0]).any():  # states of different size
+                each = np.where(largest > 0.0, ATOL * largest, tolerance)
+                found = self._solved(self._guarded(rate, len(first)), whole, method, rtol, np.minimum(each, tolerance))
         finally:
             self._integrates = False
+        return found[: len(first)]
+
+    def _solved(
+        self, rate: Callable[[float, Array], ArrayLike], start: Array, method: str, rtol: float, atol: Array
+    ) -> Array:
+        """Integrate with an error control, in steps no longer than the interval of an input, so that none is missed."""
+        times = np.asarray(self.times, float)
+        spacing = float(np.min(np.diff(self.input_times))) if self.inputs else np.inf
+        found = scipy.integrate.solve_ivp(
+            rate, (times[0], times[-1]), start, method, times, rtol=rtol, atol=atol, max_step=spacing
+        )
         if not found.success:
             raise SimulationError(f"the integration fails: {found.message}")
-        return np.asarray(found.y[: len(first)])
+        return np.asarray(found.y)
 
     def _guarded(self, rate: Callable[[float, Array], ArrayLike], size: int) -> Callable[[float, Array], ArrayLike]:
         """Return the rate of ``size`` states and of the laws' memories; it ends integrations that would never end."""

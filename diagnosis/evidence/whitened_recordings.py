@@ -118,13 +118,13 @@ class WhitenedData:
     @cached_property
     def accepted(self) -> float:
         """Root mean square (of series: in scales) by which the user lets any model differ from the truth; 0 if none."""
-        squares = [
-            np.square([channel.accepted_error or 0.0 for channel in one.quantities])[fit.used]
-            / fit.scale[fit.used] ** 2
-            for one, fit in zip(self.recordings, self.reduced, strict=True)
-            if isinstance(one, Series) and isinstance(fit, SeriesFit)
-        ]
-        return float(np.sqrt(np.mean(np.concatenate(squares)))) if squares else 0.0
+        squares = [np.zeros(1)]
+        for one, fit in zip(self.recordings, self.reduced, strict=True):
+            if isinstance(one, Series) and isinstance(fit, SeriesFit):
+                errors = np.array([channel.accepted_error or 0.0 for channel in one.quantities])[fit.used]
+                whole = len(one.times) / len(fit.weight)  # a model's error lies in the coefficients, fewer than samples
+                squares.append(whole * (errors / fit.scale[fit.used]) ** 2)
+        return float(np.sqrt(np.mean(np.concatenate(squares[1:] or squares))))
 
     @cached_property
     def drift(self) -> Float[Array, " R"]:
@@ -191,8 +191,12 @@ class WhitenedData:
     def effective_samples(self) -> float:
         """Number of independent samples of a model's error: a few for each recording, however long it is."""
         most = self.policy.effective_samples
-        every = [min(fit.features, most) if isinstance(fit, SeriesFit) else most for fit in self.reduced]
-        return min(sum(every), self.policy.max_effective_samples)
+        every: dict[str, float] = {}  # repeats of one experiment repeat the same error of the model
+        for one, fit in zip(self.recordings, self.reduced, strict=True):
+            own = min(fit.features, most) if isinstance(fit, SeriesFit) else most
+            experiment = f"repeats {one.repeats}" if isinstance(one, Series) and one.repeats else one.name
+            every[experiment] = max(own, every.get(experiment, 0.0))
+        return min(sum(every.values()), self.policy.max_effective_samples)
 
     @cached_property
     def gene_cost(self) -> float:

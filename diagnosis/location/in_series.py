@@ -95,12 +95,12 @@ def _series(data: WhitenedData) -> tuple[list[Series], list[SeriesFit]]:
 
 
 def _by_channel(data: WhitenedData, coefficients: Array) -> Array:
-    """Return the mean square [C] of each channel beyond the noise, in squares of its scale."""
+    """Return the mean square [C] over the samples of each channel beyond the noise, in squares of its scale."""
     total = np.zeros(len(data.reduced[0].used))
     count = np.zeros(len(total))
-    for fit, part in zip(data.reduced, data.recording_slices, strict=True):
+    for one, fit, part in zip(data.recordings, data.reduced, data.recording_slices, strict=True):
         own = coefficients[part].reshape(-1, len(fit.weight))
-        total[fit.used] += (own**2 - fit.variance[fit.used]) @ fit.weight
+        total[fit.used] += (own**2 - fit.variance[fit.used]).sum(axis=1) / len(one.times)
         count += fit.used
     return np.asarray(total / np.maximum(count, 1))
 

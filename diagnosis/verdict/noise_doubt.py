@@ -9,12 +9,24 @@ from wingfit.diagnosis.evidence.fit import Fit
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.inference.noise.series import EXCEEDS, MEASURED_ERROR
 
+LOUD = 3.0  # times the visible noise; first-order noise with a correlation of 0.8 has as much
 BY_CHANCE = 1e-3  # probability that noise as assumed is so much smaller than its standard deviation
 
 
 def noise_may_hide(data: WhitenedData, nominal: Fit) -> bool:
     """Return whether missing physics may hide in the noise of series; ``nominal``: fit of the nominal model."""
-    return data.kind == "series" and (overstated(data, nominal) or uncertain(data, nominal))
+    return data.kind == "series" and (overstated(data, nominal) or uncertain(data, nominal) or loud(data))
+
+
+def loud(data: WhitenedData) -> bool:
+    """Return whether the noise, from repeats, periods or as stated, is several times what the highest frequencies show.
+
+    It may be slow noise, or what differs between repeats, such as their start, or a motion that is not periodic.
+    """
+    noises = data.series.noises if data.series else {}
+    ratios = [noises[one.name].standard_deviation / noises[one.name].visible for one in data.recordings]
+    known = [one[np.isfinite(one)] for one in ratios]
+    return bool(len(np.concatenate(known)) and np.median(np.concatenate(known)) > LOUD)
 
 
 def residual_to_noise(data: WhitenedData, fit: Fit) -> float:

@@ -59,15 +59,15 @@ def _contradicted(data: WhitenedData) -> Iterator[str]:
         ratios = [
             noises[one.name].visible[c] / noises[one.name].standard_deviation[c]
             for one in data.recordings
-            if noises[one.name].source == "stated" and np.isfinite(noises[one.name].visible[c])
+            if noises[one.name].source in ("stated", "repeats", "period") and np.isfinite(noises[one.name].visible[c])
         ]
         if not ratios:
             continue
         ratio = float(np.median(ratios))
         if ratio > EXCEEDS or ratio < 1.0 / EXCEEDS:
             yield (
-                f"the highest frequencies of {channel} have {ratio:.2g} times the stated standard deviation: check it; "
-                "a noise that is stated too large hides missing physics, one too small imitates it"
+                f"the highest frequencies of {channel} have {ratio:.2g} times the assumed standard deviation: check it "
+                "and that repeats start alike; too large a noise hides missing physics, too small a one imitates it"
             )
 
 

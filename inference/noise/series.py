@@ -28,6 +28,7 @@ from wingfit.records.series import Series
 Source = Literal["repeats", "period", "stated", "highest frequencies", "resolution", "other recordings"]
 SOURCES: tuple[Source, ...] = ("highest frequencies", "resolution", "stated", "period", "repeats")  # least sure first
 
+EVEN = 0.02  # of an interval: largest deviation of one that counts as even
 LEAST_PERIODS = 3.0
 BANDS_PER_OCTAVE = 2.0
 LEAST_PER_BAND = 6  # coefficients
@@ -99,7 +100,7 @@ def _alone(recording: Series) -> SeriesNoise:
     density = np.stack([own for _, own, _, _ in channels])
     sources = {source for *_, source in channels}
     return SeriesNoise(
-        np.maximum([deviation for deviation, *_ in channels], FLOOR * _largest(recording)),
+        np.maximum(np.array([deviation for deviation, *_ in channels]), FLOOR * _largest(recording)),
         density / np.maximum(density.mean(axis=1, keepdims=True), 1e-300),
         max(error for _, _, error, _ in channels),
         min(sources, key=SOURCES.index),
@@ -110,10 +111,12 @@ def _alone(recording: Series) -> SeriesNoise:
 def _of_channel(recording: Series, column: int) -> tuple[float, Array, float, Source]:
     """Return standard deviation, density [T], relative error and source of the noise of one channel."""
     values = recording.values[recording.valid[:, column], column]
+    if not len(values):  # the channel is not used in this recording
+        return float("nan"), np.ones(len(recording.times)), MEASURED_ERROR, "repeats"
     stated, least = recording.quantities[column].standard_deviation, quantum(values) / np.sqrt(12.0)
     frequency = np.arange(len(recording.times)) / (2.0 * len(recording.times))
-    seen = recording.valid[:, column]
-    own = visible_noise(values, stated, [one[seen] for one in recording.inputs.values()])
+    run = _even_run(recording, column)
+    own = visible_noise(recording.values[run, column], stated, [one[run] for one in recording.inputs.values()])
     density = own.density(frequency) if own else np.ones(len(frequency))
     if stated is not None:
         return max(stated, least), density, STATED_ERROR, "stated"
@@ -129,13 +132,27 @@ def _of_channel(recording: Series, column: int) -> tuple[float, Array, float, So
     raise UnknownNoiseError(_unknown(recording, column))
 
 
+def _even_run(recording: Series, column: int) -> slice:
+    """Return the longest run of samples of a channel that are complete and evenly spaced."""
+    steps = np.diff(recording.times)
+    usual = float(np.median(steps)) if len(steps) else 0.0
+    seen = recording.valid[:, column]
+    joined = seen[1:] & seen[:-1] & (np.abs(steps - usual) <= EVEN * usual)
+    best, begin = slice(0, 0), 0
+    for end in [*(np.flatnonzero(~joined) + 1).tolist(), len(seen)]:
+        if end - begin > best.stop - best.start:
+            best = slice(begin, end)
+        begin = end
+    return best
+
+
 def _visible(recording: Series) -> Array:
     """Return the standard deviation [C] of the noise that the highest frequencies show; NaN if they show none."""
-    inputs = list(recording.inputs.values())
-    found = [
-        visible_noise(own[seen], None, [one[seen] for one in inputs])
-        for own, seen in zip(recording.values.T, recording.valid.T, strict=True)
-    ]
+    found = []
+    for k in range(len(recording.quantities)):
+        run = _even_run(recording, k)
+        inputs = [one[run] for one in recording.inputs.values()]
+        found.append(visible_noise(recording.values[run, k], None, inputs))
     return np.array([np.nan if one is None else np.sqrt(one.variance) for one in found])
 
 
@@ -170,8 +187,9 @@ def _from_repeats(recordings: Sequence[Series]) -> Iterator[tuple[str, SeriesNoi
         power = (cosine_transform(apart) ** 2).sum(axis=0).T / (len(group) - 1.0)  # [C, T]
         seen = np.isfinite(values).all(axis=0).mean(axis=0)
         power = power / np.maximum(seen, 1.0 / len(first.times))[:, None]
-        variance = np.maximum(power.mean(axis=1), _floor(first) ** 2)
+        variance = np.where(seen > 0.0, np.maximum(power.mean(axis=1), _floor(first) ** 2), np.nan)
         density = np.stack([smoothed(own) for own in power]) / variance[:, None]
+        density = np.where(np.isfinite(density), density, 1.0)
         error = float(np.hypot(MEASURED_ERROR, np.sqrt(2.0 / ((len(group) - 1.0) * len(first.times)))))
         for one in group:
             yield one.name, SeriesNoise(np.sqrt(variance), density, error, "repeats", _visible(one))

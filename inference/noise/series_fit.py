@@ -71,8 +71,10 @@ class SeriesReduction:
         The scale of a channel is its noise in the recordings ``fitted``; none: in all.
         """
         noises = noise_of(recordings)
-        inside = [_in_band(one, noises[one.name]) for one in fitted or recordings]
-        return cls(noises, np.sqrt(np.mean(inside, axis=0)))
+        inside = np.array([_in_band(one, noises[one.name]) for one in fitted or recordings])
+        with np.errstate(invalid="ignore"):
+            means = np.where(np.isfinite(inside), inside, 0.0).sum(axis=0) / np.isfinite(inside).sum(axis=0)
+        return cls(noises, np.sqrt(np.where(np.isfinite(means), means, 1.0)))
 
     def __call__(self, recording: Series) -> SeriesFit:
         """Reduce ``recording``; ValueError if no channel has enough samples."""
@@ -83,11 +85,12 @@ class SeriesReduction:
                 f"diagnosis needs {LEAST_SAMPLES}: record more, or leave the recording out"
             )
         width = band(recording, noise)
-        variance = (noise.standard_deviation / self.scale)[:, None] ** 2 * noise.density[:, :width]
+        deviation = np.where(np.isfinite(noise.standard_deviation), noise.standard_deviation, self.scale)
+        variance = (deviation / self.scale)[:, None] ** 2 * _density(noise, width)
         turns = np.cos(np.pi * np.arange(noise.density.shape[1]) / noise.density.shape[1])
         return SeriesFit(
             self.scale,
-            np.asarray(count >= LEAST_SAMPLES),
+            np.asarray((count >= LEAST_SAMPLES) & np.isfinite(noise.standard_deviation)),
             np.maximum(recording.valid.mean(axis=0), 1.0 / len(recording.times)),
             np.full(width, 1.0 / width),
             variance,
@@ -100,7 +103,16 @@ class SeriesReduction:
 
 
 def _in_band(recording: Series, noise: SeriesNoise) -> Array:
-    return np.asarray(noise.standard_deviation**2 * noise.density[:, : band(recording, noise)].mean(axis=1))
+    return np.asarray(noise.standard_deviation**2 * _density(noise, band(recording, noise)).mean(axis=1))
+
+
+def _density(noise: SeriesNoise, width: int) -> Array:
+    """Return the density [C, width] of the lowest frequencies.
+
+    The error of rounding a slow motion lies there with all of its power.
+    """
+    whole = noise.density.shape[1] / width if noise.source == "resolution" else 1.0
+    return np.asarray(whole * noise.density[:, :width])
 
 
 def band(recording: Series, noise: SeriesNoise) -> int:

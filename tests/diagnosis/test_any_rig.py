@@ -10,7 +10,10 @@ import pytest
 import scipy
 
 from wingfit import DiagnosisSpec, Finding, Series, SeriesDataset, diagnose, html, load_dataset
+from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.rig_check import check_rig
+from wingfit.diagnosis.verdict.weigh_hypotheses import nominal_refuted
+from wingfit.inference.noise.series_fit import SeriesReduction
 from wingfit.records import Channel, Quantity
 from wingfit.records.array_types import Array
 from wingfit.rigs.load import load_rig
@@ -159,3 +162,26 @@ def test_an_estimate_of_an_unknown_gene_is_named(rig: Rig, recorded: SeriesDatas
 def test_a_rig_is_needed_for_series(recorded: SeriesDataset) -> None:
     with pytest.raises(ValueError, match="series of rig 'pendulum'; give its simulation as rig"):
         diagnose(recorded)
+
+
+@pytest.mark.parametrize("count", [100, 1600])
+def test_an_accepted_error_does_not_depend_on_the_sampling(count: int) -> None:
+    """A residual of 2 mm counts as none where 3 mm are accepted, and as misfit where 1 mm is."""
+    times: Array = np.linspace(0.0, 5.0, count)
+    residual = np.sqrt(2.0) * 2e-3 * np.sin(6.0 * times)
+    for accepted, small in ((3e-3, True), (1e-3, False)):
+        channel = Channel("angle", "rad", 1e-4, accepted_error=accepted)
+        recording = Series("one", times, (channel,), np.cos(5.0 * times)[:, None])
+        data = WhitenedData.of([recording], series=SeriesReduction.of([recording]))
+        excess = data.excess(data.coefficients_of([residual[:, None]]))
+        assert nominal_refuted(data, excess, 0.0) is not small
+
+
+def test_repeats_are_one_sample_of_a_models_error() -> None:
+    alone = [replace(one, quantities=(Channel("angle", "rad", 0.004),)) for one in swings(9).recordings]
+    together = [replace(alone[0], name=f"r{k}", repeats="a") for k in range(4)]
+    samples = [WhitenedData.of(one, series=SeriesReduction.of(alone)).effective_samples for one in (alone[:1], alone)]
+    noises = {one.name: SeriesReduction.of(alone).noises[alone[0].name] for one in together}
+    repeated = WhitenedData.of(together, series=SeriesReduction(noises, SeriesReduction.of(alone).scale))
+    assert repeated.effective_samples == pytest.approx(samples[0])
+    assert samples[1] > 2.0 * samples[0]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -153,3 +155,47 @@ def test_coefficients_keep_the_mean_square_and_leave_out_gaps() -> None:
     gaps = slow.copy()
     gaps[100:300] = np.nan
     assert np.isfinite(fit.of(gaps)).all()
+
+
+@pytest.mark.parametrize("lost", [0.02, 0.05])
+def test_gaps_do_not_look_like_noise(lost: float) -> None:
+    values = MOTIONS["decay"] + coloured(7, 0.0)
+    kept = np.random.default_rng(1).random(COUNT) > lost
+    recording = series(np.where(kept, values, np.nan))
+    noise = noise_of([recording])["one"]
+    assert noise.standard_deviation[0] == pytest.approx(SIGMA, rel=0.4)
+
+
+def test_uneven_times_are_refused_or_stated() -> None:
+    times = np.sort(np.random.default_rng(2).uniform(0.0, 8.0, COUNT))
+    values = (np.exp(-0.3 * times) * np.cos(5.5 * times) + coloured(8, 0.0))[:, None]
+    with pytest.raises(UnknownNoiseError, match="not known"):
+        noise_of([Series("one", times, (Channel("y", "m"),), values)])
+    stated = noise_of([Series("one", times, (Channel("y", "m", SIGMA),), values)])["one"]
+    assert stated.standard_deviation[0] == SIGMA
+    np.testing.assert_array_equal(stated.density, np.ones((1, COUNT)))
+
+
+@pytest.mark.parametrize("repeats", ["", "a"])
+def test_a_channel_that_one_recording_lacks_is_not_used_there(repeats: str) -> None:
+    def two(seed: int, name: str, *, lacks: bool) -> Series:
+        values = np.stack([MOTIONS["decay"] + coloured(seed, 0.0), MOTIONS["chirp"] + coloured(seed + 9, 0.0)], axis=1)
+        if lacks:
+            values[:, 1] = np.nan
+        channels = (Channel("y", "m"), Channel("z", "m"))
+        return Series(name, TIMES, channels, values, repeats=repeats)
+
+    recordings = [two(1, "a", lacks=False), two(2, "b", lacks=True)]
+    reduction = SeriesReduction.of(recordings)
+    whole, part = (reduction(one) for one in recordings)
+    assert part.used.tolist() == [True, False]
+    assert whole.noise[0] == pytest.approx(1.0, rel=0.3)
+    assert np.isfinite(part.variance).all()
+    assert np.isfinite(part.of(np.full((COUNT, 2), 0.01))).all()
+
+
+@pytest.mark.parametrize("name", ["standard_deviation", "accepted_error"])
+@pytest.mark.parametrize("value", [0.0, -1.0, float("nan"), float("inf")])
+def test_deviations_are_positive(name: str, value: float) -> None:
+    with pytest.raises(ValueError, match=f"channel 'y': {name} is .* m; give a positive number or None"):
+        replace(Channel("y", "m"), **{name: value})  # type: ignore[arg-type]

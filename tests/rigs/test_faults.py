@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -119,6 +117,23 @@ def test_families_tell_faults_from_physics() -> None:
 
 def test_many_channels_have_no_crosstalk_for_every_pair() -> None:
     units = {f"c{k}": "m" for k in range(6)}
-    found = channel_faults(list(units), replace(scales(), units=units, span=dict.fromkeys(units, 1.0)))
+    ones = dict.fromkeys(units, 1.0)
+    found = channel_faults(list(units), Scales(ones, ones, units, 0.01))
     assert not any(name.startswith("crosstalk") for name in found)
     assert all(isinstance(one, Fault) for one in found.values())
+
+
+def test_the_limit_of_a_recorder_is_the_same_in_every_recording() -> None:
+    fault, run = CHANNEL["saturation.position"], run_of(blank())
+    assert fault.after is not None
+    limits = []
+    for size in (1.0, 3.0):
+        seen_ = fault.after({"position": size * SMOOTH, "speed": OTHER}, run, {"saturation.position.part": 0.4})
+        limits.append(float(np.abs(seen_["position"]).max()))
+    assert limits[0] == pytest.approx(limits[1]) == pytest.approx(0.6 * np.abs(SMOOTH).max())
+
+
+def test_an_input_that_never_changes_may_have_an_offset() -> None:
+    recorded = blank(values=np.stack([SMOOTH, OTHER], axis=1), inputs={"push": np.full(len(TIMES), 12.0)})
+    offset = input_faults(["push"], Scales.of([recorded], UNITS))["offset.push"].suspect.genes[0]
+    assert offset.upper == pytest.approx(12.0)

@@ -41,3 +41,26 @@ def test_runge_kutta_follows_the_kinks_of_an_input() -> None:
     found = run.integrate(lambda t, _: [float(run.input("push", t))], [0.0], steps=1)
     exact = np.concatenate([[0.0], np.cumsum((push[1:] + push[:-1]) / 2.0 * 0.1)])
     np.testing.assert_allclose(found[0], exact, atol=1e-12)
+
+
+@pytest.mark.parametrize("at", range(2, 60, 7))
+def test_a_short_pulse_of_an_input_is_not_missed(at: int) -> None:
+    times = np.linspace(0.0, 6.0, 61)
+    push = np.where(np.arange(61) == at, 1.0, 0.0)
+    run = Run("hammer", times, {}, {"push": push}, times)
+    speed = run.integrate(lambda t, _: [float(run.input("push", t))], [0.0])[0]
+    assert speed[-1] == pytest.approx(0.1, rel=1e-4)  # the triangle of one sample
+
+
+def test_states_of_different_size_are_all_exact() -> None:
+    """A displacement of 1e-4 m beside a pressure of 1e5 Pa."""
+    run = Run("both", TIMES, {}, {}, TIMES)
+    found = run.integrate(lambda _, y: [y[1], -400.0 * y[0], -0.5 * y[2]], [1e-4, 0.0, 1e5])
+    np.testing.assert_allclose(found[0], 1e-4 * np.cos(20.0 * TIMES), atol=1e-9)
+    np.testing.assert_allclose(found[2], 1e5 * np.exp(-0.5 * TIMES), rtol=1e-6)
+
+
+def test_a_single_small_state_is_exact() -> None:
+    run = Run("charge", TIMES, {}, {}, TIMES)
+    found = run.integrate(lambda _, y: [-3.0 * y[0]], [1e-11])
+    np.testing.assert_allclose(found[0], 1e-11 * np.exp(-3.0 * TIMES), rtol=1e-5)

@@ -116,3 +116,10 @@ def test_a_loaded_rig_keeps_its_changes_in_other_processes(tmp_path: Path) -> No
     again = pickle.loads(pickle.dumps(changed))  # noqa: S301
     assert (again.faults, again.description) == (False, "changed")
     assert callable(again.simulate)
+
+
+def test_a_replaced_simulation_is_the_one_that_other_processes_run(tmp_path: Path) -> None:
+    path = tmp_path / "my_rig.py"
+    path.write_text(FILE)
+    changed = replace(load_rig(str(path)), simulate=simulate)
+    assert pickle.loads(pickle.dumps(changed)).simulate is simulate  # noqa: S301
