@@ -15,7 +15,7 @@ from wingfit.cli.base.output import note
 from wingfit.cli.forces import free_flight, kinematics
 from wingfit.cli.forces import runs as force_runs
 from wingfit.client.client import WingfitError
-from wingfit.sim.asked_lanes import asked_lanes
+from wingfit.sim.requested_lanes import requested_lanes
 
 ERROR = 1
 
@@ -47,7 +47,7 @@ app.command()(backup.restore)
 def main() -> None:
     """Run the command line; print expected errors as a message without traceback, and exit with code 1."""
     try:
-        asked_lanes()  # the kernels need it when a command imports them
+        requested_lanes()  # the kernels need it when a command imports them
     except ValueError as error:
         note(f"error: {error}")
         sys.exit(ERROR)

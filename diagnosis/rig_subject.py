@@ -69,7 +69,7 @@ def check_fits(rig: Rig, dataset: SeriesDataset) -> None:
                 )
         missing = [name for name in wanted if name not in stated]
         if missing and what != "channel":
-            raise ValueError(f"rig {rig.name!r} needs the {what} {missing[0]!r}, which dataset {dataset.name!r} lacks")
+            raise ValueError(f"rig {rig.name!r} needs the {what} {missing[0]!r}, but dataset {dataset.name!r} has none")
     own = [gene.name for gene in rig.recording_genes]
     for one in dataset.recordings:
         for name in one.estimates:

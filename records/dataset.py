@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
@@ -10,6 +9,7 @@ from typing import Literal
 import numpy as np
 
 from wingfit.records.array_types import Array, Bool, Float, Mask
+from wingfit.records.recorded import Recorded
 from wingfit.records.series import Series, SeriesDataset
 from wingfit.records.vehicle import Vehicle, WingMotion
 from wingfit.records.wing import Wing
@@ -102,7 +102,7 @@ class Recording:
 
 
 @dataclass(frozen=True)
-class Dataset:
+class Dataset(Recorded[Recording]):
     """A wing with recordings of tracks, or a vehicle with recordings of forces; ``rig`` describes the wing or vehicle.
 
     Recordings named in ``held_out`` are used for validation only, never for fitting.
@@ -132,24 +132,6 @@ class Dataset:
         if not isinstance(self.rig, Vehicle):
             raise ValueError(f"dataset {self.name!r} describes a wing with tracks; this needs a vehicle with forces")
         return self.rig
-
-    def recording(self, name: str) -> Recording:
-        """Return the recording called ``name``; ValueError if there is none."""
-        for recording in self.recordings:
-            if recording.name == name:
-                return recording
-        raise ValueError(
-            f"no recording {name!r} in dataset {self.name!r}; it has {', '.join(r.name for r in self.recordings)}"
-        )
-
-    def select(self, names: Iterable[str]) -> tuple[Recording, ...]:
-        """Return the recordings called ``names``, in the order of ``names``; ValueError for an unknown name."""
-        return tuple(self.recording(name) for name in names)
-
-    @property
-    def fitted(self) -> tuple[Recording, ...]:
-        """Return the recordings that a calibration may fit: all that are not held out."""
-        return tuple(r for r in self.recordings if r.name not in self.held_out)
 
 
 AnyRecording = Recording | Series

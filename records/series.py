@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal
@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 
 from wingfit.records.array_types import Array, Bool, Float, Mask
+from wingfit.records.recorded import Recorded
 
 SAME_TIMES = 1e-6  # of the duration: largest difference of the times of repeats
 SAME_INPUTS = 1e-3  # largest relative difference of their inputs
@@ -125,7 +126,7 @@ def belongs_to(gene: str, recording: str) -> bool:
 
 
 @dataclass(frozen=True)
-class SeriesDataset:
+class SeriesDataset(Recorded[Series]):
     """Recordings of one rig that the user simulates.
 
     Attributes:
@@ -150,21 +151,3 @@ class SeriesDataset:
     def kind(self) -> Literal["series"]:
         """Return "series"."""
         return "series"
-
-    def recording(self, name: str) -> Series:
-        """Return the recording called ``name``; ValueError if there is none."""
-        for recording in self.recordings:
-            if recording.name == name:
-                return recording
-        raise ValueError(
-            f"no recording {name!r} in dataset {self.name!r}; it has {', '.join(r.name for r in self.recordings)}"
-        )
-
-    def select(self, names: Iterable[str]) -> tuple[Series, ...]:
-        """Return the recordings called ``names``, in the order of ``names``; ValueError for an unknown name."""
-        return tuple(self.recording(name) for name in names)
-
-    @property
-    def fitted(self) -> tuple[Series, ...]:
-        """Return the recordings that may be fitted: all that are not held out."""
-        return tuple(r for r in self.recordings if r.name not in self.held_out)

@@ -1,4 +1,4 @@
-"""What the simulation of a rig is asked to compute: one recording, with the laws that act at its ports."""
+"""What the simulation of a rig computes: one recording, with the laws that act at its ports."""
 
 from __future__ import annotations
 

@@ -24,17 +24,12 @@ VISIBLE = 1.6  # strength from which a hidden thing counts, as in benchmarks.con
 
 @dataclass(frozen=True)
 class Mark:
-    """What a diagnosis said: verdict, names, the most probable effects, coverage of its intervals, misfits, seconds.
-
-    ``covered``: (parameters within their 90 % intervals, parameters with one), of null and rightly named trials;
-    ``overhead_ms``: time of the diagnosis beside the simulations, per simulated recording.
-    """
+    """What a diagnosis said: verdict, names, most probable effects, held-out misfits before and after, and seconds."""
 
     verdict: str
     names: tuple[str, ...]
     first: tuple[str, ...]
     probability: float
-    covered: tuple[int, int]
     before: float | None
     after: float | None
     seconds: float
@@ -52,7 +47,7 @@ def record(trial: Trial, folder: Path) -> str:
 
 
 def run(trial: Trial, folder: Path) -> Mark:
-    """Diagnose the dataset of ``trial`` in ``folder``; the answer is not read but for the coverage of intervals."""
+    """Diagnose the dataset of ``trial`` in ``folder``; the answer is not read."""
     dataset: SeriesDataset = pickle.loads((folder / f"{trial.name}.pickle").read_bytes())  # noqa: S301 - ours
     began = time.monotonic()
     finding = diagnose(dataset, rig=RIGS[trial.rig])
@@ -68,7 +63,6 @@ def mark(finding: Finding, seconds: float) -> Mark:
         finding.named,
         first.effects if first else (),
         finding.probabilities[finding.verdict],
-        (0, 0),
         proof.before.value if proof else None,
         proof.after.value if proof else None,
         seconds,

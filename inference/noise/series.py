@@ -21,9 +21,9 @@ import numpy as np
 import scipy
 
 from wingfit.inference.noise.mean_beat import fourier_basis
-from wingfit.inference.noise.visible_noise import LEAST_SAMPLES, visible_noise
+from wingfit.inference.noise.visible_noise import LEAST_SAMPLES, VisibleNoise, visible_noise
 from wingfit.records.array_types import Array, Float
-from wingfit.records.series import Series
+from wingfit.records.series import Series, difference_of_repeats
 
 Source = Literal["repeats", "period", "stated", "highest frequencies", "resolution", "other recordings"]
 SOURCES: tuple[Source, ...] = ("highest frequencies", "resolution", "stated", "period", "repeats")  # least sure first
@@ -38,7 +38,6 @@ MEASURED_ERROR = 0.05  # the least for one that is estimated: noise is not exact
 FLOOR = 1e-6  # of the largest value: smallest standard deviation
 QUANTUM = 1e-6  # relative distance from a multiple of the smallest step within which values are quantised
 EXCEEDS = 2.0  # times: a stated and an estimated standard deviation that differ by more get a remark
-SAME = 1e-6  # relative distance of times and settings of repeats
 
 
 @dataclass(frozen=True)
@@ -86,17 +85,17 @@ def noise_of(recordings: Sequence[Series]) -> dict[str, SeriesNoise]:
 
 def _as_others(recording: Series, known: Sequence[SeriesNoise]) -> SeriesNoise:
     """Return the largest of the ``known`` noises of each channel, for a recording that does not show its own."""
-    deviations = np.max([one.standard_deviation for one in known], axis=0)
+    deviations = np.nanmax([one.standard_deviation for one in known], axis=0)
     white, error = np.ones(recording.values.T.shape), max(BORROWED_ERROR, *(one.relative_error for one in known))
     return SeriesNoise(deviations, white, error, "other recordings", np.full(len(deviations), np.nan))
 
 
 def _alone(recording: Series) -> SeriesNoise:
     """Noise of a recording that was not repeated."""
-    visible = _visible(recording)
+    shown = [_shown(recording, k) for k in range(len(recording.quantities))]
     if recording.period is not None and np.ptp(recording.times) >= LEAST_PERIODS * recording.period:
-        return _from_period(recording, visible)
-    channels = [_of_channel(recording, k) for k in range(len(recording.quantities))]
+        return _from_period(recording, _deviations(shown))
+    channels = [_of_channel(recording, k, own) for k, own in enumerate(shown)]
     density = np.stack([own for _, own, _, _ in channels])
     sources = {source for *_, source in channels}
     return SeriesNoise(
@@ -104,19 +103,18 @@ def _alone(recording: Series) -> SeriesNoise:
         density / np.maximum(density.mean(axis=1, keepdims=True), 1e-300),
         max(error for _, _, error, _ in channels),
         min(sources, key=SOURCES.index),
-        visible,
+        _deviations(shown),
     )
 
 
-def _of_channel(recording: Series, column: int) -> tuple[float, Array, float, Source]:
-    """Return standard deviation, density [T], relative error and source of the noise of one channel."""
+def _of_channel(recording: Series, column: int, own: VisibleNoise | None) -> tuple[float, Array, float, Source]:
+    """Return standard deviation, density [T], relative error and source of the noise of a channel; ``own``: what it shows."""
     values = recording.values[recording.valid[:, column], column]
     if not len(values):  # the channel is not used in this recording
         return float("nan"), np.ones(len(recording.times)), MEASURED_ERROR, "repeats"
     stated, least = recording.quantities[column].standard_deviation, quantum(values) / np.sqrt(12.0)
     frequency = np.arange(len(recording.times)) / (2.0 * len(recording.times))
-    run = _even_run(recording, column)
-    own = visible_noise(recording.values[run, column], stated, [one[run] for one in recording.inputs.values()])
+    own = own if stated is None else _shown(recording, column, stated)
     density = own.density(frequency) if own else np.ones(len(frequency))
     if stated is not None:
         return max(stated, least), density, STATED_ERROR, "stated"
@@ -146,14 +144,15 @@ def _even_run(recording: Series, column: int) -> slice:
     return best
 
 
-def _visible(recording: Series) -> Array:
-    """Return the standard deviation [C] of the noise that the highest frequencies show; NaN if they show none."""
-    found = []
-    for k in range(len(recording.quantities)):
-        run = _even_run(recording, k)
-        inputs = [one[run] for one in recording.inputs.values()]
-        found.append(visible_noise(recording.values[run, k], None, inputs))
-    return np.array([np.nan if one is None else np.sqrt(one.variance) for one in found])
+def _shown(recording: Series, column: int, stated: float | None = None) -> VisibleNoise | None:
+    """Return the noise that the highest frequencies of a channel show, of the ``stated`` deviation if it is known."""
+    run = _even_run(recording, column)
+    return visible_noise(recording.values[run, column], stated, [one[run] for one in recording.inputs.values()])
+
+
+def _deviations(shown: Sequence[VisibleNoise | None]) -> Array:
+    """Return the standard deviations [C] of visible noises; NaN where a channel shows none."""
+    return np.array([np.nan if one is None else np.sqrt(one.variance) for one in shown])
 
 
 def _unknown(recording: Series, column: int) -> str:
@@ -192,22 +191,18 @@ def _from_repeats(recordings: Sequence[Series]) -> Iterator[tuple[str, SeriesNoi
         density = np.where(np.isfinite(density), density, 1.0)
         error = float(np.hypot(MEASURED_ERROR, np.sqrt(2.0 / ((len(group) - 1.0) * len(first.times)))))
         for one in group:
-            yield one.name, SeriesNoise(np.sqrt(variance), density, error, "repeats", _visible(one))
+            shown = [_shown(one, k) for k in range(len(one.quantities))]
+            yield one.name, SeriesNoise(np.sqrt(variance), density, error, "repeats", _deviations(shown))
 
 
 def _check_repeat(first: Series, other: Series) -> None:
     """ValueError if ``other`` does not repeat the experiment of ``first``."""
-    same = len(first.times) == len(other.times) and np.allclose(
-        first.times, other.times, rtol=0.0, atol=SAME * max(float(np.ptp(first.times)), 1e-300)
-    )
-    settings = dict(first.settings) == dict(other.settings)
-    inputs = same and all(np.allclose(u, other.inputs[name], rtol=1e-3) for name, u in first.inputs.items())
-    for fine, what in ((same, "sample times"), (settings, "settings"), (inputs, "inputs")):
-        if not fine:
-            raise ValueError(
-                f"recordings {first.name!r} and {other.name!r} repeat {first.repeats!r}, but have different {what}; "
-                "resample them to the same, or remove 'repeats'"
-            )
+    what = difference_of_repeats(first, other)
+    if what:
+        raise ValueError(
+            f"recordings {first.name!r} and {other.name!r} repeat {first.repeats!r}, but have different {what}; "
+            "resample them to the same, or remove 'repeats'"
+        )
 
 
 def _from_period(recording: Series, visible: Array) -> SeriesNoise:

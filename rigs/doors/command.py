@@ -109,8 +109,8 @@ class Command:
     def _answered(self, genes: Mapping[str, float], run: Run) -> str:
         with self._own.lock:
             program = self._own.taken() or self._started()
-            program.asked += 1
-            request = _request(genes, run, self.channels, program.asked) + "\n"
+            program.requests += 1
+            request = _request(genes, run, self.channels, program.requests) + "\n"
             try:
                 text = program.ask(request, self.timeout, self.persistent)
             except Late as late:
@@ -124,13 +124,13 @@ class Command:
                 raise SimulationError(f"{self._name} ended with {end}") from end
             finally:
                 self._own.keep(program)
-                if not (self.persistent and program.answered == program.asked):
+                if not (self.persistent and program.answered == program.requests):
                     self._own.end()
-            if self.persistent and program.asked != (found := _identity(text)):
+            if self.persistent and program.requests != (found := _identity(text)):
                 self._own.end()
                 raise DoorError(
-                    f'{self._name} answered request {program.asked} with "id": {found}; write one line for each line '
-                    'that is read, and repeat its "id"'
+                    f'{self._name} answered request {program.requests} with "id": {found}; write one line for each '
+                    'line that is read, and repeat its "id"'
                 )
             return text
 

@@ -1,4 +1,4 @@
-"""A running program that is asked over its standard input and answers on its standard output, within a time."""
+"""A running program that gets requests on its standard input and answers on its standard output, within a time."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Program:
     """A program that was started; the process group that it leads is killed with it."""
 
     def __init__(self, words: Sequence[str], folder: str | None, environment: Mapping[str, str]) -> None:
-        self.asked, self.answered = 0, 0
+        self.requests, self.answered = 0, 0
         # A file and no pipe: whatever the program writes, it never waits for a reader.
         self._errors = tempfile.TemporaryFile()  # noqa: SIM115  closed by kill
         fcntl.fcntl(self._errors, fcntl.F_SETFL, fcntl.fcntl(self._errors, fcntl.F_GETFL) | os.O_APPEND)
@@ -81,7 +81,7 @@ class Program:
             self._waited(deadline)
             if self._process.returncode or one_line:
                 raise Ended(self._process.returncode, self._said())
-        self.answered = self.asked
+        self.answered = self.requests
         try:
             return answer.decode()
         except UnicodeDecodeError as error:

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from wingfit.sim.asked_lanes import VARIABLE
 from wingfit.sim.kernels import LANES
+from wingfit.sim.requested_lanes import VARIABLE
 
 OTHER = 4 if LANES == 8 else 8
 NAMES = ("motion of the wing with effects", "forces of the vehicle with effects", "Gauss-Newton on the wing")

@@ -8,8 +8,8 @@ import pytest
 from llvmlite.binding import FeatureMap
 
 from tests.golden.numbers import CASES, entry
-from wingfit.sim.asked_lanes import VARIABLE
 from wingfit.sim.kernels import processor
+from wingfit.sim.requested_lanes import VARIABLE
 
 
 def test_numbers_are_the_same_bits_with_another_number_of_lanes(other_lanes: dict[str, str]) -> None:

@@ -7,7 +7,7 @@ import sys
 import pytest
 
 from wingfit.cli import main as cli
-from wingfit.sim.asked_lanes import VARIABLE, asked_lanes
+from wingfit.sim.requested_lanes import VARIABLE, requested_lanes
 
 
 @pytest.mark.parametrize("words", [("effects",), ("diagnose", "nowhere", "--local"), ("serve", "--help")])
@@ -25,4 +25,4 @@ def test_a_wrong_number_is_an_error_with_code_1(
 @pytest.mark.parametrize(("value", "lanes"), [("", None), (" 2 ", 2), ("8", 8)])
 def test_a_possible_number_is_returned(value: str, lanes: int | None, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(VARIABLE, value)
-    assert asked_lanes() == lanes
+    assert requested_lanes() == lanes
