@@ -108,7 +108,7 @@ def _alone(recording: Series) -> SeriesNoise:
 
 
 def _of_channel(recording: Series, column: int, own: VisibleNoise | None) -> tuple[float, Array, float, Source]:
-    """Return standard deviation, density [T], relative error and source of the noise of a channel; ``own``: what it shows."""
+    """Return deviation, density [T], relative error and source of a channel's noise; ``own``: the visible noise."""
     values = recording.values[recording.valid[:, column], column]
     if not len(values):  # the channel is not used in this recording
         return float("nan"), np.ones(len(recording.times)), MEASURED_ERROR, "repeats"
