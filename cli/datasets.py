@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -141,7 +142,10 @@ def _list(datasets: list[a.Dataset]) -> None:
 
 def _uploaded(dataset: a.Dataset) -> None:
     say(f"dataset {dataset['id']} '{dataset['name']}' with {len(dataset['recordings'])} recordings")
-    say(f"next: wingfit runs submit {dataset['id']} --watch")
+    if dataset["kind"] == "series":
+        say(f"next: wingfit diagnose {dataset['id']} --rig my_rig.py")
+    else:
+        say(f"next: wingfit runs submit {dataset['id']} --watch")
 
 
 def _show(dataset: a.Dataset) -> None:
@@ -149,6 +153,9 @@ def _show(dataset: a.Dataset) -> None:
     say(f"{size(dataset['size_bytes'])}, uploaded {moment(dataset['created_at'])}")
     if dataset["description"]:
         say(dataset["description"])
+    if dataset["rig"]:
+        _show_series(dataset, dataset["rig"])
+        return
     angle = "lag" if dataset["kind"] == "tracks" else "body pitch"
     columns: Columns[a.RecordingInfo] = {
         "recording": "name",
@@ -162,6 +169,30 @@ def _show(dataset: a.Dataset) -> None:
         ">airspeed": lambda r: number(r["airspeed_m_s"], unit="m/s"),
     }
     records(dataset["recordings"], columns)
+
+
+def _show_series(dataset: a.Dataset, rig: a.RigInfo) -> None:
+    say(f"rig {rig['name']}")
+    for what, quantities in (("channels", rig["channels"]), ("inputs", rig["inputs"]), ("settings", rig["settings"])):
+        if quantities:
+            say(f"{what}: {', '.join(_with_unit(one['name'], one['unit']) for one in quantities)}")
+    columns: Columns[a.RecordingInfo] = {
+        "recording": "name",
+        "use": lambda r: _use(held_out=r["held_out"]),
+        ">samples": "frames",
+        ">duration": lambda r: number(r["duration_s"], unit="s"),
+        ">missing": lambda r: f"{r['missing_percent']:.1f} %",
+    }
+    settings = {f">{one['name']}": _setting(one["name"], one["unit"]) for one in rig["settings"]}
+    records(dataset["recordings"], {**columns, **settings})
+
+
+def _setting(name: str, unit: str) -> Callable[[a.RecordingInfo], str]:
+    return lambda recording: number(recording["settings"].get(name), unit="" if unit == "1" else unit)
+
+
+def _with_unit(name: str, unit: str) -> str:
+    return name if unit == "1" else f"{name} ({unit})"
 
 
 def _use(*, held_out: bool) -> str:

@@ -10,6 +10,7 @@ import typer
 from wingfit.cli.base import options as o
 from wingfit.cli.base.files import new_file, write_text
 from wingfit.cli.base.output import emit, note, progress
+from wingfit.cli.driving import drive_job, rig_here, rig_setting
 from wingfit.cli.findings import print_finding
 from wingfit.cli.jobs import INTERRUPTED, JobKind, check_ended_well, commands, dataset_id, follow
 from wingfit.client.client import DEFAULT_URL, Client, WingfitError
@@ -79,13 +80,12 @@ def diagnose(
     report: ReportFile = None,
     as_json: FindingJson = False,
     local: Annotated[bool, typer.Option("--local", help="Compute here, without a server; DATASET is a path.")] = False,
-    rig: Annotated[
-        str | None,
-        typer.Option(metavar="RIG", help="With --local: your own simulation, as for 'wingfit rig check'. It is run."),
-    ] = None,
+    rig: o.Rig = None,
     workers: Annotated[
         int | None,
-        typer.Option(min=1, max=MOST_WORKERS, help="With --local: number of processes; default: one per processor."),
+        typer.Option(
+            min=1, max=MOST_WORKERS, help="Processes that simulate here; default: one per processor, 1 with --rig."
+        ),
     ] = None,
     url: o.Url = DEFAULT_URL,
 ) -> None:
@@ -99,15 +99,17 @@ def diagnose(
     if local:
         _diagnose_here(dataset, settings, workers, report, rig, as_json=as_json)
         return
-    if rig is not None:
-        raise typer.BadParameter("your simulation runs on your machine; give it with --local", param_hint="--rig")
-    if workers is not None:
-        raise typer.BadParameter("the server has its own; give it with --local", param_hint="--workers")
+    own = rig_here(rig)
+    if workers is not None and own is None:
+        raise typer.BadParameter("the server has its own; give it with --local or your --rig", param_hint="--workers")
     if dataset is None and run_id is None:
         raise typer.BadParameter("name a dataset, or a run with --run", param_hint="DATASET")
     with Client(url) as client:
+        settings |= rig_setting(rig, own)
         submitted = client.submit_diagnosis(dataset and dataset_id(client, dataset), **settings)
         note(f"diagnosis {submitted['id']}")
+        if own is not None and rig is not None:
+            drive_job(client, submitted["id"], own, rig, workers or 1, "diagnosing")
         _print_when_done(client, submitted["id"], report, as_json=as_json)
 
 

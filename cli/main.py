@@ -10,7 +10,7 @@ import sys
 
 import typer
 
-from wingfit.cli import backup, campaigns, datasets, diagnose, effects, keys, rigs, runs, serve, simulate
+from wingfit.cli import backup, campaigns, datasets, diagnose, driving, effects, keys, rigs, runs, serve, simulate
 from wingfit.cli.base.output import note
 from wingfit.cli.forces import free_flight, kinematics
 from wingfit.cli.forces import runs as force_runs
@@ -35,6 +35,7 @@ app.add_typer(datasets.app, name="datasets")
 app.add_typer(runs.app, name="runs")
 app.command()(diagnose.diagnose)
 app.add_typer(diagnose.app, name="diagnoses")
+app.command()(driving.drive)
 app.command()(simulate.simulate)
 app.command()(force_runs.models)
 app.command()(effects.effects)

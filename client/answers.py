@@ -14,7 +14,7 @@ from typing_extensions import TypedDict
 from wingfit.client.load_answers import Outputs
 
 State = Literal["QUEUED", "RUNNING", "PAUSED", "SUCCEEDED", "FAILED", "CANCELLED"]
-Kind = Literal["tracks", "forces"]
+Kind = Literal["tracks", "forces", "series"]
 FINAL: frozenset[str] = frozenset({"SUCCEEDED", "FAILED", "CANCELLED"})
 Point = Annotated[list[float | None], Len(3, 3)]
 Item = TypeVar("Item")
@@ -81,7 +81,9 @@ class RecordingInfo(TypedDict):
 
     ``markers`` counts the tracked markers (0 for forces); ``channels`` names the recorded forces, "force_x", "force_z"
     (empty for tracks). ``missing_percent`` is the percentage of samples without a value. ``phase_lag_deg`` is the lag
-    of the wing's rear driving rod; ``angle_of_attack_deg`` is that of the wing, or the body pitch of a vehicle.
+    of the wing's rear driving rod; ``angle_of_attack_deg`` is that of the wing, or the body pitch of a vehicle. Of a
+    rig of the user's own, ``channels`` names the recorded channels, ``frames`` counts samples, ``settings`` has the
+    values that were set, in the dataset's units, and the fields of a flapping rig's condition are null.
     """
 
     name: str
@@ -91,16 +93,38 @@ class RecordingInfo(TypedDict):
     markers: int
     channels: list[str]
     missing_percent: float
-    flap_frequency_hz: float
-    phase_lag_deg: float
-    pressure_mbar: float
-    temperature_c: float
-    airspeed_m_s: float
-    angle_of_attack_deg: float
+    settings: dict[str, float]
+    duration_s: float | None
+    flap_frequency_hz: float | None
+    phase_lag_deg: float | None
+    pressure_mbar: float | None
+    temperature_c: float | None
+    airspeed_m_s: float | None
+    angle_of_attack_deg: float | None
+
+
+class QuantityInfo(TypedDict):
+    """A channel, input or setting of a rig of the user's own; ``unit`` is "1" if it has none."""
+
+    name: str
+    unit: str
+    description: str
+
+
+class RigInfo(TypedDict):
+    """What the recordings of a rig of the user's own hold."""
+
+    name: str
+    channels: list[QuantityInfo]
+    inputs: list[QuantityInfo]
+    settings: list[QuantityInfo]
 
 
 class Dataset(TypedDict):
-    """An uploaded dataset: marker tracks of a wing, or forces of a vehicle; ``sha256`` is that of the uploaded file."""
+    """An uploaded dataset: marker tracks of a wing, forces of a vehicle, or series of a rig of the user's own.
+
+    ``sha256`` is that of the uploaded file; ``rig`` describes the rig of series, and is null for others.
+    """
 
     id: str
     name: str
@@ -110,6 +134,7 @@ class Dataset(TypedDict):
     sha256: str
     size_bytes: int
     markers: int
+    rig: RigInfo | None
     recordings: list[RecordingInfo]
 
 
@@ -158,7 +183,8 @@ class Job(TypedDict):
 
     ``stage`` names the present step, null before the first; ``progress`` lies in [0, 1]; ``eta_seconds`` estimates the
     remaining time; ``evaluations`` counts evaluated individuals (of equal ones each counts, and one is simulated);
-    ``error`` says why the job failed, else null.
+    ``error`` says why the job failed, else null. Of a job on series, ``rig`` names the simulation, and ``driven`` says
+    whether its user simulates it ('wingfit drive'); such a job is QUEUED while no driver serves it.
     """
 
     id: str
@@ -174,13 +200,16 @@ class Job(TypedDict):
     finished_at: str | None
     evaluations: int
     error: str | None
+    rig: str | None
+    driven: bool
 
 
 class Run(Job):
     """A calibration; ``pending_action`` is a requested pause or cancellation that has not taken effect yet, else null.
 
-    The misfit of the best genome so far is in ``best_mm`` for tracks (mean distance per marker), with ``best_mn`` null,
-    and in ``best_mn`` for forces (RMS difference of the fitted axes), with ``best_mm`` null.
+    The misfit of the best genome so far is in ``best_mm`` for tracks (mean distance per marker), in ``best_mn`` for
+    forces (RMS difference of the fitted axes), and in ``best_percent`` for series (RMS difference, relative to the
+    range of each channel); the other two are null.
     """
 
     spec: RunSpec
@@ -188,6 +217,7 @@ class Run(Job):
     generations: int
     best_mm: float | None
     best_mn: float | None
+    best_percent: float | None
 
 
 class HistoryItem(TypedDict):
@@ -211,6 +241,7 @@ class HistoryItem(TypedDict):
     diversity: float | None
     best_mm: float | None
     best_mn: float | None
+    best_percent: float | None
     evaluations: int
     failed: int
     reasons: list[str]

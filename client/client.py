@@ -23,6 +23,7 @@ import httpx
 from wingfit.client import answers as a
 from wingfit.client import force_answers as f
 from wingfit.client.diagnosis_client import DiagnosisCalls
+from wingfit.client.drive_client import DriveCalls
 from wingfit.client.effect_answers import Effect
 from wingfit.client.export_answers import Format
 from wingfit.client.key_client import KeyCalls
@@ -43,7 +44,7 @@ __all__ = ["DEFAULT_URL", "Client", "ServerAwayError", "WingfitError"]
 OnRun = Callable[[a.Run], None]
 
 
-class Client(DiagnosisCalls, KeyCalls):
+class Client(DiagnosisCalls, DriveCalls, KeyCalls):
     """Sends requests to one server and returns the answers; a context manager, at whose end the connections close."""
 
     def health(self) -> a.Health:
@@ -111,7 +112,8 @@ class Client(DiagnosisCalls, KeyCalls):
 
         ``spec``: method, mode, finish, population, stall, tolerance, max_generations, seed, recordings, genes, effects,
         name; for a wing also division, search_division, bounds_factor, accuracy_mm; for a vehicle also preset, without,
-        axes, low_pass_hz, peel_width_beats. Omitted settings have the server's defaults.
+        axes, low_pass_hz, peel_width_beats; for series also rig, as in :meth:`submit_diagnosis`. Omitted settings have
+        the server's defaults.
         """
         body = given(dataset_id=dataset_id, **spec)
         return cast(a.Run, self._json("POST", "/v1/runs", json=body, key=str(uuid.uuid4())))

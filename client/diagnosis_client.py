@@ -24,7 +24,9 @@ class DiagnosisCalls(Watching):
 
         ``spec``: seed, recordings, genes, fixed, effects, suspects, refine, refits, name; for a wing also division,
         bounds_factor, accuracy_mm; for a vehicle also preset, without, axes, low_pass_hz, peel_width_beats. Omitted
-        settings are those of the run, or have the server's defaults.
+        settings are those of the run, or have the server's defaults. For series also rig: the name of one that is
+        installed on the server, or what :func:`wingfit.declaration` returns of yours, which :func:`wingfit.drive`
+        then simulates.
         """
         body = given(dataset_id=dataset_id, run_id=run_id, **spec)
         return cast(Diagnosis, self._json("POST", "/v1/diagnoses", json=body, key=str(uuid.uuid4())))

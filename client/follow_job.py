@@ -14,7 +14,7 @@ JobT = TypeVar("JobT", a.Run, Diagnosis)
 
 # Event that reports a finished step: the field of a job that counts such steps.
 COUNTS = {"generation": "generations", "step": "steps"}
-UPDATED = ("stage", "progress", "eta_seconds", "best_mm", "best_mn", "evaluations")
+UPDATED = ("stage", "progress", "eta_seconds", "best_mm", "best_mn", "best_percent", "evaluations")
 
 
 class Watching(Transport):

@@ -22,7 +22,7 @@ from wingfit.diagnosis.spec import DiagnosisSpec, Progress
 from wingfit.diagnosis.subject import Subject
 from wingfit.diagnosis.verdict.build_finding import build_finding
 from wingfit.inference.noise.series_fit import SeriesReduction
-from wingfit.records import AnyRecording, Dataset, Recording, SeriesDataset
+from wingfit.records import AnyRecording, Dataset, Recording, Series, SeriesDataset
 from wingfit.records.blas_threads import one_blas_thread
 from wingfit.rigs.rig import Rig
 
@@ -58,15 +58,24 @@ def diagnose_rig(rig: Rig, dataset: SeriesDataset, spec: DiagnosisSpec, evaluato
 
     Of ``spec.calibration``, the genes, fixed values and recordings count; the rest describes wings and vehicles.
     """
-    subject = RigSubject.of(rig, dataset)
-    wanted, chosen = spec.calibration.genes or subject.model.searched, spec.calibration.recordings
-    fitted = tuple(one for one in dataset.fitted if not chosen or one.name in chosen)
-    elsewhere = {gene.name for one in dataset.recordings if one not in fitted for gene in subject.model.genes_of(one)}
-    fixed = {*spec.calibration.fixed, *elsewhere}
-    free = tuple(name for name in subject.model.searched if name in wanted and name not in fixed)
-    held_out = dataset.select(dataset.held_out)
+    subject, fitted, held_out, free = _prepare_rig(rig, dataset, spec)
     series = SeriesReduction.of(dataset.recordings, fitted)
     yield from diagnose_subject(subject, dataset.name, fitted, held_out, spec, evaluator, free=free, series=series)
+
+
+@one_blas_thread
+def check_diagnosis_of_rig(rig: Rig, dataset: SeriesDataset, spec: DiagnosisSpec) -> None:
+    """Raise ValueError where ``spec`` does not fit ``rig`` and ``dataset``; simulates nothing."""
+    subject, fitted, _, free = _prepare_rig(rig, dataset, spec)
+    known = [gene.name for gene in subject.model.genes]
+    for name in (*spec.calibration.genes, *spec.calibration.fixed):
+        if name not in known:
+            raise ValueError(f"unknown gene {name!r}; there are {', '.join(known)}")
+    if not free:
+        raise ValueError("nothing to fit: every gene is fixed")
+    WhitenedData.of(fitted, (), spec.policy, SeriesReduction.of(dataset.recordings, fitted))
+    select_suspects(subject, spec)
+    base_genome(subject.model, {**spec.start, **spec.calibration.fixed})
 
 
 @one_blas_thread
@@ -138,6 +147,20 @@ def _prepare(
     ready = prepare(calibration, dataset)
     (stage,) = ready.stages
     return subject_of(dataset, calibration), stage.recordings, ready.held_out, stage.free
+
+
+def _prepare_rig(
+    rig: Rig, dataset: SeriesDataset, spec: DiagnosisSpec
+) -> tuple[RigSubject, tuple[Series, ...], tuple[Series, ...], tuple[str, ...]]:
+    """Return the rig, the recordings to fit and those held out, and the free genes; as :func:`_prepare`."""
+    subject, chosen = RigSubject.of(rig, dataset), spec.calibration.recordings
+    dataset.select(chosen)
+    fitted = tuple(one for one in dataset.fitted if not chosen or one.name in chosen)
+    wanted = spec.calibration.genes or subject.model.searched
+    elsewhere = {gene.name for one in dataset.recordings if one not in fitted for gene in subject.model.genes_of(one)}
+    fixed = {*spec.calibration.fixed, *elsewhere}
+    free = tuple(name for name in subject.model.searched if name in wanted and name not in fixed)
+    return subject, fitted, dataset.select(dataset.held_out), free
 
 
 def _axes(dataset: Dataset, spec: DiagnosisSpec) -> tuple[str, ...]:

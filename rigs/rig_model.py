@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,6 +18,13 @@ from wingfit.rigs.rig import Rig
 from wingfit.rigs.run import Run
 from wingfit.rigs.suspect import Suspect
 from wingfit.sim.model import Observation, genome_batch
+
+
+class Simulated(NamedTuple):
+    """One simulated individual: ``channels`` [T, C] in the units of the recording, NaN if it failed, and why."""
+
+    channels: Float[Array, "T C"]
+    reason: str | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,9 +96,15 @@ class RigModel:
         return replace(self, effects=(*self.effects, *names))
 
     def observe(self, genomes: ArrayLike, recording: Series) -> Observation:
-        """Simulate ``genomes`` [B, G] for ``recording``: channels [B, T, C] in the units of the recording.
+        """Simulate ``genomes`` [B, G] for ``recording``: channels [B, T, C] in the units of the recording."""
+        calls, place = self.calls(genomes, recording)
+        return observation([self.simulated(values, recording) for values in calls], place)
 
-        Individuals that differ only in genes of other recordings are simulated once.
+    def calls(self, genomes: ArrayLike, recording: Series) -> tuple[list[Values], list[int]]:
+        """Return the values by name of the individuals to simulate for ``genomes`` [B, G], and which of them each is.
+
+        Individuals that differ only in genes of other recordings are simulated once. Genes of ``recording`` alone have
+        the names that they have in the rig.
         """
         batch = genome_batch(self.genes, genomes)
         names = [gene.name for gene in self.genes]
@@ -97,15 +112,13 @@ class RigModel:
         of_others = {gene.name for one in self.all_recordings for gene in self.genes_of(one)} - set(own)
         columns = [k for k, name in enumerate(names) if name not in of_others]
         labels = [own.get(names[k], names[k]) for k in columns]
-        done: dict[bytes, tuple[Array, str | None]] = {}
-        for row in batch[:, columns]:
-            if row.tobytes() not in done:
-                done[row.tobytes()] = self._simulated(dict(zip(labels, row.tolist(), strict=True)), recording)
-        results = [done[row.tobytes()] for row in batch[:, columns]]
-        return Observation(np.stack([one for one, _ in results]), tuple(reason for _, reason in results))
+        first: dict[bytes, int] = {}
+        place = [first.setdefault(row.tobytes(), len(first)) for row in batch[:, columns]]
+        rows = [batch[place.index(k), columns].tolist() for k in range(len(first))]
+        return [dict(zip(labels, row, strict=True)) for row in rows], place
 
-    def _simulated(self, values: Values, recording: Series) -> tuple[Float[Array, "T C"], str | None]:
-        """Return the channels [T, C] of one individual, and why it failed, or None; NaN if it did."""
+    def simulated(self, values: Values, recording: Series) -> Simulated:
+        """Simulate one individual with ``values`` by name, as :meth:`calls` gives them, for ``recording``."""
         failed = np.full(recording.values.shape, np.nan)
         off = {gene.name: gene.nominal for suspect in self.rig.suspects for gene in suspect.genes}
         faults = [self._faults[name] for name in self.effects if name in self._faults]
@@ -117,13 +130,13 @@ class RigModel:
                 name: np.asarray(one, float) for name, one in self.rig.simulate({**off, **values}, run).items()
             }
         except (ValueError, ArithmeticError, np.linalg.LinAlgError) as error:
-            return failed, f"the simulation fails: {error}"
+            return Simulated(failed, f"the simulation fails: {error}")
         problem = _unusable(channels, recording)
         if problem:
-            return failed, problem
+            return Simulated(failed, problem)
         for fault in faults:
             channels = fault.after(channels, run, values) if fault.after else channels
-        return np.stack([channels[name] for name in recording.channels], axis=1), None
+        return Simulated(np.stack([channels[name] for name in recording.channels], axis=1), None)
 
     def _run(self, values: Values, recording: Series) -> Run:
         at_ports: dict[str, list[Law]] = {}
@@ -134,6 +147,11 @@ class RigModel:
                     at_ports.setdefault(port, []).append(law)
         times = recording.times
         return Run(recording.name, times, recording.settings, dict(recording.inputs), times, values, at_ports)
+
+
+def observation(done: Sequence[Simulated], place: Sequence[int]) -> Observation:
+    """Return the observation of individuals; the result of each is that of ``done`` at its ``place``."""
+    return Observation(np.stack([done[k].channels for k in place]), tuple(done[k].reason for k in place))
 
 
 def _unusable(channels: Channels, recording: Series) -> str | None:

@@ -37,7 +37,19 @@ from wingfit.service.http.openapi_additions import extend_openapi
 from wingfit.service.http.request_limits import RequestLimits
 from wingfit.service.operations.metrics_and_log import METRICS, Metrics, MetricsAndLog
 from wingfit.service.operations.shutdown import StopLimits
-from wingfit.service.routes import backup, datasets, diagnoses, effects, exports, forces, keys, outcomes, runs, system
+from wingfit.service.routes import (
+    backup,
+    datasets,
+    diagnoses,
+    drive,
+    effects,
+    exports,
+    forces,
+    keys,
+    outcomes,
+    runs,
+    system,
+)
 from wingfit.service.settings import Settings
 from wingfit.service.storage.database import Database
 from wingfit.service.version import wingfit_version
@@ -52,6 +64,7 @@ ROUTERS = (
     datasets.router,
     forces.router,
     diagnoses.router,
+    drive.router,
     exports.router,
     effects.router,
     keys.router,

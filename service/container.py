@@ -26,6 +26,7 @@ from wingfit.service.jobs.wakeups import Changes
 from wingfit.service.operations.health import Health
 from wingfit.service.operations.metrics_and_log import Metrics
 from wingfit.service.operations.shutdown import StopLimits
+from wingfit.service.rigs.driving import Driving
 from wingfit.service.runs.calibrating import Calibrating
 from wingfit.service.runs.engine import Engine
 from wingfit.service.settings import Settings
@@ -72,9 +73,9 @@ class Service:
         self.calibrating = Calibrating(database, self.engine, self.datasets)
         self.diagnosing = Diagnosing(database, self.diagnoser, self.datasets)
         kinds = (self.calibrating, self.diagnosing)
-        self.runner = Runner(
-            database, self.changes, kinds, settings.max_runs, settings.max_runs_per_owner, settings.max_starts
-        )
+        self.driving = Driving(database)
+        limits = (settings.max_runs, settings.max_runs_per_owner, settings.max_starts)
+        self.runner = Runner(database, self.changes, kinds, *limits, driving=self.driving)
         self._housekeeping = Housekeeping(database, settings.keep_days, self.changes.publish)
         make = parts.get("make_evaluator")
         prepare = None if make or settings.ray_address else _compile  # the nodes of a cluster compile for themselves
@@ -101,6 +102,7 @@ class Service:
         self.runner.begin_stop()
         self._housekeeping.stop()
         self.changes.close()
+        self.driving.board.changes.close()
 
     def stop(self, limits: StopLimits | None = None) -> bool:
         """Stop within ``limits``; return whether all threads ended.

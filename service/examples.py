@@ -23,6 +23,8 @@ _RECORDING: RecordingInfo = {
     "markers": 40,
     "channels": [],
     "missing_percent": 4.2,
+    "settings": {},
+    "duration_s": 0.989,
     "flap_frequency_hz": 3.0,
     "phase_lag_deg": 0.0,
     "pressure_mbar": 10.0,
@@ -39,6 +41,7 @@ _DATASET: Dataset = {
     "sha256": "9f86d081884c7d659a2feaa0c55ad015a3bf4f1b2b0b822cd15d6c15b0f00a08",
     "size_bytes": 1482003,
     "markers": 49,
+    "rig": None,
     "recordings": [_RECORDING],
 }
 _JOB: Job = {
@@ -55,6 +58,8 @@ _JOB: Job = {
     "finished_at": None,
     "evaluations": 600,
     "error": None,
+    "rig": None,
+    "driven": False,
 }
 _RUN: Run = {
     **_JOB,
@@ -63,6 +68,7 @@ _RUN: Run = {
     "generations": 12,
     "best_mm": 1.84,
     "best_mn": None,
+    "best_percent": None,
 }
 _DIAGNOSIS: Diagnosis = {
     **_JOB,

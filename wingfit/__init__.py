@@ -7,6 +7,7 @@ The names below are public and documented; everything else in the package may ch
 raises :class:`DatasetError`, which lists what is wrong.
 - :func:`calibrate` estimates the genes of a model in this process, without a server; :func:`diagnose` reports which
 physics the model is missing.
+- :func:`drive` simulates a rig of the user's own for a job on a server, which knows only its :func:`declaration`.
 - :class:`Rig` is a rig with a simulation of the user's own; :class:`Suspect` an effect that it may be missing,
 :class:`Port` a place where laws may act, :class:`Run` what its simulation computes.
 
@@ -19,6 +20,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from wingfit._drive import drive
     from wingfit._local import calibrate, diagnose
     from wingfit.calibration.forces.result import ForceResult
     from wingfit.calibration.result import GeneResult, RecordingResult, Result
@@ -42,6 +44,7 @@ if TYPE_CHECKING:
         save_dataset,
     )
     from wingfit.report import finding_json, html
+    from wingfit.rigs.declaration import declaration
     from wingfit.rigs.ports import Port
     from wingfit.rigs.rig import Rig
     from wingfit.rigs.run import Run, SimulationError
@@ -74,7 +77,9 @@ __all__ = [
     "Suspect",
     "WingfitError",
     "calibrate",
+    "declaration",
     "diagnose",
+    "drive",
     "finding_json",
     "html",
     "load_dataset",
@@ -82,6 +87,7 @@ __all__ = [
 ]
 
 _MODULES = {
+    "wingfit._drive": ("drive",),
     "wingfit._local": ("calibrate", "diagnose"),
     "wingfit.calibration.forces.result": ("ForceResult",),
     "wingfit.calibration.result": ("GeneResult", "RecordingResult", "Result"),
@@ -105,6 +111,7 @@ _MODULES = {
         "save_dataset",
     ),
     "wingfit.report": ("finding_json", "html"),
+    "wingfit.rigs.declaration": ("declaration",),
     "wingfit.rigs.ports": ("Port",),
     "wingfit.rigs.rig": ("Rig",),
     "wingfit.rigs.run": ("Run", "SimulationError"),

@@ -8,6 +8,7 @@ cannot be withdrawn.
 
     None --submit--> QUEUED --start--> RUNNING --finish--> SUCCEEDED
                       ^  |              |   |----fail----> FAILED <--- restart, the third without progress
+                      |  |              |   |----wait----> QUEUED
                       |  +---pause---+  |   |
                       |              v  |   +--wish CANCEL, then generation, finish, fail or restart
                       +--resume--- PAUSED                          |
@@ -114,6 +115,11 @@ class Fail:
 
 
 @dataclass(frozen=True)
+class Wait:
+    """The job cannot go on for now, because its simulator is away; it waits in the queue."""
+
+
+@dataclass(frozen=True)
 class Leave:
     """The server shuts down in an orderly way while the job runs; the job continues when the server starts again."""
 
@@ -129,7 +135,7 @@ class Restart:
     most_starts: int = MOST_STARTS
 
 
-Event = Submit | Start | Generation | Pause | Resume | Cancel | Finish | Fail | Leave | Restart
+Event = Submit | Start | Generation | Pause | Resume | Cancel | Finish | Fail | Wait | Leave | Restart
 
 
 @dataclass(frozen=True)
@@ -183,7 +189,7 @@ def step(job: Job | None, event: Event) -> Outcome:
 
 
 _ONE_OF_EACH: tuple[Event, ...] = (
-    Submit(), Start(), Generation(0.0), Pause(), Resume(), Cancel(), Finish(), Fail(""), Leave(), Restart(),
+    Submit(), Start(), Generation(0.0), Pause(), Resume(), Cancel(), Finish(), Fail(""), Wait(), Leave(), Restart(),
 )  # fmt: skip
 
 
@@ -237,17 +243,20 @@ def _while_running(job: Job, event: Event) -> Outcome | None:
             return _move(replace(job, progress=1.0), State.SUCCEEDED, Instruction.STOP)
         case Fail():
             return _move(job, State.FAILED, Instruction.STOP, error=event.error)
-        case Leave() | Restart():
-            return _runner_lost(job, event)
+        case Leave() | Restart() | Wait():
+            return _interrupted(job, event)
     return None
 
 
-def _runner_lost(job: Job, event: Leave | Restart) -> Outcome:
-    """Return a running job after its server shut down (Leave) or crashed (Restart), and the instructions."""
+def _interrupted(job: Job, event: Leave | Restart | Wait) -> Outcome:
+    """Return a running job after its server shut down (Leave) or crashed (Restart), or its simulator left (Wait)."""
     if isinstance(event, Leave):
         return replace(job, starts=max(0, job.starts - 1)), ()
+    stop = (Instruction.STOP,) if isinstance(event, Wait) else ()
     if job.wish is not Wish.NONE:
-        return _move(job, State.CANCELLED if job.wish is Wish.CANCEL else State.PAUSED)
+        return _move(job, State.CANCELLED if job.wish is Wish.CANCEL else State.PAUSED, *stop)
+    if isinstance(event, Wait):
+        return _move(replace(job, starts=max(0, job.starts - 1)), State.QUEUED, *stop, Instruction.ENQUEUE)
     if job.starts >= event.most_starts:
         return _move(job, State.FAILED, error=_given_up(job))
     return _move(job, State.QUEUED, Instruction.ENQUEUE)

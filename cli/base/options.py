@@ -73,6 +73,14 @@ LowPass = Annotated[
 PeelWidth = Annotated[
     float | None, typer.Option(help="Vehicles: width, in beats, over which the end of the peel is smoothed.")
 ]
+Rig = Annotated[
+    str | None,
+    typer.Option(
+        metavar="RIG",
+        help="Series: your simulation, my_rig.py or package.module:rig, which runs on this machine; or the name of a "
+        "rig that is installed where it is computed.",
+    ),
+]
 
 
 def refuse(options: Mapping[str, object], why: str) -> None:

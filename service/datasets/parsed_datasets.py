@@ -15,10 +15,10 @@ from sqlalchemy.exc import OperationalError
 from sqlalchemy.orm import Session
 
 from wingfit.records import AnyDataset, Dataset, DatasetError, wing_or_vehicle
-from wingfit.records.errors import fail
 from wingfit.records.files.confined import STORED, Limits, convert_netcdf
 from wingfit.records.files.parsed import load_parsed
 from wingfit.records.files.storage import is_netcdf, label_of
+from wingfit.service.http.problems import conflict
 from wingfit.service.runs.engine import Engine
 from wingfit.service.storage import store
 from wingfit.service.storage.database import Database, is_full
@@ -34,7 +34,7 @@ class Opened(NamedTuple):
     ``parsed``: for a NetCDF file the dataset in the internal format of `records/files/parsed.py`, for a zip None.
     """
 
-    dataset: Dataset
+    dataset: AnyDataset
     parsed: bytes | None
 
 
@@ -44,11 +44,11 @@ class Datasets:
     def __init__(self, database: Database, engine: Engine) -> None:
         self._database, self._engine = database, engine
         self._lock, self._loading, self._converting = threading.Lock(), threading.Lock(), threading.Lock()
-        self._kept: OrderedDict[str, Dataset] = OrderedDict()
+        self._kept: OrderedDict[str, AnyDataset] = OrderedDict()
         # Unreadable files of earlier versions: opening one again could take a quarter of an hour.
         self._damaged: dict[str, DatasetError] = {}
 
-    def get(self, dataset_id: str) -> Dataset:
+    def get(self, dataset_id: str) -> AnyDataset:
         """Return the dataset with this id, from the cache or the database; raise a 404 if there is none."""
         with self._database.read() as session:
             row = store.one(session, DatasetRow, dataset_id)
@@ -63,23 +63,29 @@ class Datasets:
             self.keep(dataset_id, loaded)
         return loaded
 
+    def flapping(self, dataset_id: str) -> Dataset:
+        """Return the dataset with this id; raise a 409 if it is not of a wing or vehicle, a 404 if there is none."""
+        try:
+            return wing_or_vehicle(self.get(dataset_id))
+        except ValueError as error:
+            raise conflict(f"dataset {dataset_id}: {error}") from None
+
     def open(self, archive: bytes, filename: str, limits: Limits | None = None) -> Opened:
         """Read ``archive``, the bytes of a zip or NetCDF file; ValueError says what is wrong with it.
 
         ``limits``: on time and memory of the process that reads NetCDF; None: those of an upload.
         """
         if not is_netcdf(archive):
-            return Opened(_served(self._engine.load(archive, filename), label_of(filename)), None)
+            return Opened(self._engine.load(archive, filename), None)
         label = label_of(filename)
         parsed = convert_netcdf(archive, label, limits)
-        return Opened(_served(load_parsed(parsed, label), label), parsed)
+        return Opened(load_parsed(parsed, label), parsed)
 
-    def _load(self, dataset_id: str, filename: str) -> Dataset:
+    def _load(self, dataset_id: str, filename: str) -> AnyDataset:
         with self._database.read() as session:
             parsed = store.parsed(session, dataset_id)
             archive = store.archive(session, dataset_id) if parsed is None else b""
-        loaded = self._engine.load(archive, filename) if parsed is None else load_parsed(parsed, filename)
-        return _served(loaded, filename)
+        return self._engine.load(archive, filename) if parsed is None else load_parsed(parsed, filename)
 
     def _is_old(self, dataset_id: str) -> bool:
         """Return whether an earlier version stored this NetCDF dataset without its form in the internal format."""
@@ -88,7 +94,7 @@ class Datasets:
                 connection, dataset_id
             )
 
-    def _convert(self, dataset_id: str, filename: str) -> Dataset:
+    def _convert(self, dataset_id: str, filename: str) -> AnyDataset:
         if dataset_id in self._damaged:
             raise self._damaged[dataset_id].with_traceback(None)
         with self._database.read() as session:
@@ -112,13 +118,13 @@ class Datasets:
                 raise
             LOG.warning("the stored form of %s is not kept: the disk is full or fails (%s)", dataset_id, error.orig)
 
-    def _known(self, dataset_id: str) -> Dataset | None:
+    def _known(self, dataset_id: str) -> AnyDataset | None:
         with self._lock:
             if dataset_id in self._kept:
                 self._kept.move_to_end(dataset_id)
             return self._kept.get(dataset_id)
 
-    def keep(self, dataset_id: str, loaded: Dataset) -> None:
+    def keep(self, dataset_id: str, loaded: AnyDataset) -> None:
         """Put the dataset ``loaded`` into the cache."""
         with self._lock:
             self._kept[dataset_id] = loaded
@@ -135,12 +141,3 @@ class Datasets:
         with self._lock:
             self._kept.pop(dataset_id, None)
             self._damaged.pop(dataset_id, None)
-
-
-def _served(dataset: AnyDataset, label: str) -> Dataset:
-    """Return ``dataset``, called ``label`` in messages; DatasetError for a kind that the server does not compute."""
-    try:
-        return wing_or_vehicle(dataset)
-    except ValueError as error:
-        message = f"{error}; diagnose it without a server: wingfit diagnose FOLDER --local --rig my_rig.py"
-        raise fail(label, dataset.kind, message) from None

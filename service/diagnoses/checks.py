@@ -7,7 +7,8 @@ from dataclasses import replace
 
 from wingfit.calibration.spec import CalibrationSpec
 from wingfit.diagnosis.spec import DiagnosisSpec
-from wingfit.records import Dataset
+from wingfit.records import Dataset, SeriesDataset
+from wingfit.rigs.rig import Rig
 from wingfit.service.diagnoses.diagnoser import Diagnoser
 from wingfit.service.diagnoses.requests import DiagnosisIn
 from wingfit.service.http.problems import error_item, invalid
@@ -15,6 +16,28 @@ from wingfit.service.runs import spec_views
 from wingfit.service.runs.engine import Engine
 from wingfit.service.runs.request_checks import gene_names, refuse_unknown
 from wingfit.service.runs.requests import VehicleModel
+
+
+def checked_rig(
+    body: DiagnosisIn,
+    dataset: SeriesDataset,
+    rig: Rig,
+    diagnoser: Diagnoser,
+    genome: Mapping[str, float] | None = None,
+) -> DiagnosisSpec:
+    """Return the specification of a diagnosis of series with their simulation ``rig``; raise a 422 if it does not fit.
+
+    ``genome``: values by gene name from which to start.
+    """
+    spec_views.refuse_foreign(body, dataset)
+    calibration = CalibrationSpec(genes=tuple(body.genes), fixed=body.fixed, recordings=tuple(body.recordings))
+    start = dict(genome or {})
+    spec = DiagnosisSpec(calibration, start, tuple(body.suspects), refits=body.refits)
+    try:
+        diagnoser.check_rig(spec, dataset, rig)
+    except ValueError as error:
+        raise invalid("the diagnosis does not fit the dataset", [error_item("body", None, str(error))]) from None
+    return spec
 
 
 def checked(

@@ -16,6 +16,7 @@ from wingfit.service.datasets.parsed_datasets import Datasets
 from wingfit.service.diagnoses import views
 from wingfit.service.diagnoses.diagnoser import Diagnoser
 from wingfit.service.jobs.job_kind import JobKind, Points, Step
+from wingfit.service.rigs.stored_rig import rig_of
 from wingfit.service.storage.database import Database
 from wingfit.service.storage.tables import DiagnosisRow, FindingRow, StepRow
 from wingfit.workers import jobs
@@ -48,8 +49,9 @@ class Diagnosing(JobKind):
     def steps(self, row: DiagnosisRow, evaluator: Evaluator) -> Iterator[Step]:
         """Yield a step at each new stage of the diagnosis, and within a stage at most every STORE_SECONDS."""
         spec, dataset = views.spec(row), self._datasets.get(row.dataset_id)
+        rig = None if row.rig is None else rig_of(row.rig)
         stage, stored_at = "", 0.0
-        for progress in self._diagnoser.diagnose(spec, dataset, evaluator):
+        for progress in self._diagnoser.diagnose(spec, dataset, evaluator, rig):
             if progress.finding is not None:
                 yield _finding(progress, progress.finding, self._diagnoser.stored(progress.finding))
                 return

@@ -11,13 +11,13 @@ from typing import Any
 from pydantic import ValidationError
 
 from wingfit.calibration.evaluator import Evaluator
-from wingfit.calibration.spec import CalibrationSpec
 from wingfit.client.transport import WingfitError
-from wingfit.diagnosis import DiagnosisSpec, Progress, diagnose_rig
+from wingfit.diagnosis import DiagnosisSpec, Progress
 from wingfit.diagnosis.finding import Finding
-from wingfit.records import AnyDataset, Dataset, SeriesDataset, load_dataset
+from wingfit.records import AnyDataset, SeriesDataset, load_dataset
 from wingfit.rigs.load import RigError, load_rig
-from wingfit.service.diagnoses.checks import checked
+from wingfit.rigs.rig import Rig
+from wingfit.service.diagnoses.checks import checked, checked_rig
 from wingfit.service.diagnoses.diagnoser import Diagnoser
 from wingfit.service.diagnoses.requests import DiagnosisIn
 from wingfit.service.http.problems import ProblemError, from_pydantic
@@ -29,9 +29,6 @@ from wingfit.workers.jobs import eta_seconds
 OnProgress = Callable[[float, float | None, str], None]
 Steps = Callable[[Evaluator], Iterator[Progress]]
 
-RIG_SETTINGS = {"genes", "fixed", "recordings", "suspects", "refits", "name", "refine", "seed"}
-"""Settings of a diagnosis that a rig of the user's own accepts; it has no finer discretisation, and draws nothing."""
-
 
 def diagnose(
     path: Path, request: dict[str, Any], workers: int | None, on_progress: OnProgress, rig: str | None = None
@@ -42,12 +39,7 @@ def diagnose(
     done, the remaining time (s, None if unknown) and the stage. ``rig``: the simulation of a dataset of series, as
     :func:`wingfit.rigs.load.load_rig` takes it. WingfitError says what is wrong.
     """
-    dataset = _loaded(path)
-    steps = (
-        _steps_of_rig(dataset, request, rig)
-        if isinstance(dataset, SeriesDataset)
-        else _steps_of_dataset(dataset, request, rig)
-    )
+    steps = _steps(_loaded(path), request, rig)
     started, points = time.monotonic(), list[tuple[float, float]]()
     try:
         with closing(make_evaluator("processes", workers)) as evaluator:
@@ -61,42 +53,42 @@ def diagnose(
     raise WingfitError("the diagnosis ended without a finding")
 
 
-def _steps_of_dataset(dataset: Dataset, request: dict[str, Any], rig: str | None) -> Steps:
-    """Return what diagnoses a wing or vehicle; WingfitError where ``request`` does not fit it."""
-    if rig is not None:
-        raise WingfitError("this dataset describes its own rig", "it has a wing or a vehicle: leave --rig out")
-    diagnoser = Diagnoser()
+def _steps(dataset: AnyDataset, request: dict[str, Any], reference: str | None) -> Steps:
+    """Return what diagnoses ``dataset``; WingfitError where ``request`` or the rig at ``reference`` does not fit it."""
+    diagnoser, rig = Diagnoser(), _rig(dataset, reference)
     try:
-        spec = checked(DiagnosisIn.model_validate(request), dataset, Engine(), diagnoser)
+        body = DiagnosisIn.model_validate(request)
+        spec = _spec(body, dataset, rig, diagnoser)
     except ValidationError as error:
         raise WingfitError("the request is invalid", errors=[from_pydantic(one) for one in error.errors()]) from None
     except ProblemError as problem:
         raise WingfitError(problem.detail, errors=problem.errors) from None
-    return lambda evaluator: diagnoser.diagnose(spec, dataset, evaluator)
+    return lambda evaluator: diagnoser.diagnose(spec, dataset, evaluator, rig)
 
 
-def _steps_of_rig(dataset: SeriesDataset, request: dict[str, Any], rig: str | None) -> Steps:
-    """Return what diagnoses series with the user's simulation; WingfitError where ``request`` or ``rig`` is wrong."""
-    if rig is None:
+def _spec(body: DiagnosisIn, dataset: AnyDataset, rig: Rig | None, diagnoser: Diagnoser) -> DiagnosisSpec:
+    if isinstance(dataset, SeriesDataset):
+        if rig is None:
+            raise TypeError("series have a rig")
+        return checked_rig(body, dataset, rig, diagnoser)
+    return checked(body, dataset, Engine(), diagnoser)
+
+
+def _rig(dataset: AnyDataset, reference: str | None) -> Rig | None:
+    """Return the user's simulation of a dataset of series, None for others; WingfitError where that is wrong."""
+    if not isinstance(dataset, SeriesDataset):
+        if reference is not None:
+            raise WingfitError("this dataset describes its own rig", "it has a wing or a vehicle: leave --rig out")
+        return None
+    if reference is None:
         raise WingfitError(
             f"this dataset has series of rig {dataset.rig!r}",
             "name its simulation: --rig my_rig.py (README, Bring your own)",
         )
-    unknown = sorted(set(request) - RIG_SETTINGS)
-    if unknown:
-        known = ", ".join(sorted(RIG_SETTINGS))
-        raise WingfitError(f"a rig of your own has no setting {unknown[0]!r}", f"leave it out; there are {known}")
-    calibration = CalibrationSpec(
-        genes=tuple(request.get("genes", ())),
-        fixed=request.get("fixed", {}),
-        recordings=tuple(request.get("recordings", ())),
-    )
-    spec = DiagnosisSpec(calibration, suspects=tuple(request.get("suspects", ())), refits=request.get("refits", 8))
     try:
-        loaded = load_rig(rig)
+        return load_rig(reference)
     except RigError as error:
         raise WingfitError("the rig cannot be loaded", str(error)) from error
-    return lambda evaluator: diagnose_rig(loaded, dataset, spec, evaluator)
 
 
 def _loaded(path: Path) -> AnyDataset:

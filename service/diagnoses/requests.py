@@ -6,6 +6,7 @@ from typing import Annotated
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StrictBool
 
+from wingfit.service.rigs.stored_rig import RigIn
 from wingfit.service.runs.requests import DATASET_ID, Axes, JobSettings, Name, Number, Title, Whole, once
 
 MOST_REFITS = 50
@@ -27,6 +28,7 @@ class DiagnosisIn(JobSettings, BaseModel):
 
     dataset_id: Annotated[Name | None, Field(description="null: that of the run")] = None
     run_id: Annotated[Name | None, Field(description="run to start from: its best genome and its settings")] = None
+    rig: RigIn | None = None
     name: Title | None = None
     genes: Annotated[
         list[Name], Field(max_length=1000, description="free genes of the nominal model; empty: all usual")

@@ -21,6 +21,10 @@ class InterruptedStepError(Exception):
     """Raised within a step when the job is to be cancelled or the service stops."""
 
 
+class NotReadyError(Exception):
+    """Raised within a step when the job cannot go on for now: it goes back to the queue until its kind is ready."""
+
+
 @dataclass(frozen=True)
 class Step:
     """One finished step of a job: a generation of a run, a report of progress of a diagnosis, or the final result.

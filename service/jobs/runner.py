@@ -20,8 +20,10 @@ from sqlalchemy.orm import Session
 
 from wingfit.service.http.problems import conflict
 from wingfit.service.jobs.interruptible import InterruptibleEvaluator
-from wingfit.service.jobs.job_kind import InterruptedStepError, JobKind, Points, Step
+from wingfit.service.jobs.job_kind import InterruptedStepError, JobKind, NotReadyError, Points, Step
 from wingfit.service.jobs.wakeups import Changes
+from wingfit.service.rigs.driving import Driving
+from wingfit.service.rigs.stored_rig import is_driven
 from wingfit.service.runs.simulation_hints import with_remedy
 from wingfit.service.storage import store
 from wingfit.service.storage.database import Database, DatabaseClosedError, is_full
@@ -39,11 +41,17 @@ Written = TypeVar("Written")
 
 
 class JobRef(NamedTuple):
-    """Identifies a job: its kind (run or diagnosis), id and owner."""
+    """Identifies a job: its kind (run or diagnosis), id and owner, and whether drivers compute its simulations."""
 
     kind: JobKind
     id: str
     owner: str | None
+    driven: bool = False
+
+    @classmethod
+    def of(cls, kind: JobKind, row: JobRow) -> JobRef:
+        """Return the job that ``row`` stores."""
+        return cls(kind, row.id, row.owner, is_driven(row.rig))
 
     def __str__(self) -> str:
         return f"{self.kind.what} {self.id}"
@@ -71,13 +79,15 @@ class Runner:
         at_once: int,
         of_one: int | None = None,
         most_starts: int = jobs.MOST_STARTS,
+        *,
+        driving: Driving,
     ) -> None:
         """Compute at most ``at_once`` jobs at a time, at most ``of_one`` of them for one owner (None: ``at_once``).
 
         ``kinds``: the kinds of job; ``changes``: notified of every change of a job; ``most_starts``: a job fails if the
-        server crashed that many times while the job ran without progress.
+        server crashed that many times while the job ran without progress; ``driving``: of jobs that drivers simulate.
         """
-        self._database, self._changes, self._kinds = database, changes, kinds
+        self._database, self._changes, self._kinds, self._driving = database, changes, kinds, driving
         self._at_once, self._of_one, self._most_starts = at_once, of_one or at_once, most_starts
         self._lock = threading.RLock()
         self._waiting: deque[JobRef] = deque()
@@ -97,7 +107,7 @@ class Runner:
         with self._lock:
             with self._database.write() as session:
                 left = [
-                    (row, JobRef(kind, row.id, row.owner))
+                    (row, JobRef.of(kind, row))
                     for state in (jobs.State.RUNNING, jobs.State.QUEUED)
                     for row, kind in self._unfinished(session, state)
                 ]
@@ -112,9 +122,13 @@ class Runner:
             self._evaluator = evaluator
         self._dispatch()
 
-    def enqueue(self, kind: JobKind, job_id: str, owner: str | None) -> None:
+    def enqueue(self, job: JobRef) -> None:
         """Put a new job, already stored as QUEUED, at the end of the queue."""
-        self._obey(JobRef(kind, job_id, owner), (Instruction.ENQUEUE, Instruction.PUBLISH))
+        self._obey(job, (Instruction.ENQUEUE, Instruction.PUBLISH))
+
+    def wake(self) -> None:
+        """Start queued jobs that were not ready and now are."""
+        self._dispatch()
 
     def control(self, kind: JobKind, job_id: str, event: jobs.Event) -> JobRow:
         """Apply ``event`` (cancel, pause or resume, requested by a user) to a job; return the job's new row.
@@ -124,7 +138,7 @@ class Runner:
         with self._lock:
             with self._database.write() as session:
                 row = store.one(session, kind.table, job_id)
-                job = JobRef(kind, job_id, row.owner)
+                job = JobRef.of(kind, row)
                 if row.state == jobs.State.RUNNING and job not in self._threads and not self._stopping:
                     _step(row, jobs.Restart(self._most_starts))  # the end of its thread could not be stored
                 try:
@@ -229,10 +243,12 @@ class Runner:
     def _may_start(self, job: JobRef) -> bool:
         """Return whether fewer than the permitted number of jobs of this owner run, and the job itself has no thread.
 
-        A job that was paused and resumed at once may still have its earlier thread.
+        A job that was paused and resumed at once may still have its earlier thread. One that drivers simulate also
+        needs a driver.
         """
         beside = sum(other.owner == job.owner for other in self._threads)
-        return job not in self._threads and beside < self._of_one
+        is_ready = not job.driven or self._driving.attended(job.id)
+        return is_ready and job not in self._threads and beside < self._of_one
 
     # -- in the job's thread ---------------------------------------------------------------------------------
 
@@ -245,9 +261,14 @@ class Runner:
         except InterruptedStepError:
             if not self._stopping:
                 self._end(job, jobs.Fail("interrupted"))  # becomes CANCELLED where that is pending
+        except NotReadyError as error:
+            LOG.info("%s: goes back to the queue (%s)", job, error)
+            self._end(job, jobs.Wait())
         except Exception as error:
             self._fail(job, error)
         finally:
+            if job.driven:
+                self._driving.left(job.id)
             with self._lock:
                 self._threads.pop(job, None)
                 self._progressed.pop(job, None)
@@ -260,7 +281,8 @@ class Runner:
         row, points = self._start(job)
         earlier, began = row.elapsed_seconds, time.monotonic()
         LOG.info("%s: starts after step %d", job, row.generations)
-        interruptible = InterruptibleEvaluator(evaluator, lambda: self._stopping or job in self._cancelled)
+        used = self._driving.evaluator(job.id) if job.driven else evaluator
+        interruptible = InterruptibleEvaluator(used, lambda: self._stopping or job in self._cancelled)
 
         def first_step() -> Iterator[Step]:
             steps = job.kind.steps(row, interruptible)
@@ -336,7 +358,7 @@ class Runner:
         LOG.error("%s failed", job, exc_info=error)
         self._end(job, jobs.Fail(_failure(job, error)))
 
-    def _end(self, job: JobRef, event: jobs.Fail) -> None:
+    def _end(self, job: JobRef, event: jobs.Fail | jobs.Wait) -> None:
         def write() -> tuple[Instruction, ...]:
             with self._database.write() as session:
                 return _step(store.one(session, job.kind.table, job.id), event)

@@ -13,7 +13,7 @@ from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response, StreamingResponse
 
 from wingfit.client import answers as a
-from wingfit.records import Dataset
+from wingfit.records import AnyDataset
 from wingfit.records.files.confined import ReaderError
 from wingfit.service.auth.access import owner_of_new
 from wingfit.service.container import DOWNLOAD_SLOT, UPLOAD_SLOT, Service, ServiceDep
@@ -148,7 +148,7 @@ def _open(service: Service, data: bytes, filename: str) -> Opened:
         raise invalid("the dataset cannot be read", listed or fallback) from None
 
 
-def _row(loaded: Dataset, name: str | None, filename: str, digest: str, size: int) -> DatasetRow:
+def _row(loaded: AnyDataset, name: str | None, filename: str, digest: str, size: int) -> DatasetRow:
     return DatasetRow(
         id=store.new_id("ds"),
         owner=owner_of_new(),
@@ -161,4 +161,5 @@ def _row(loaded: Dataset, name: str | None, filename: str, digest: str, size: in
         size_bytes=size,
         markers=len(loaded.wing.markers) if loaded.kind == "tracks" else 0,
         recordings=views.recordings(loaded),
+        rig=views.rig_info(loaded),
     )

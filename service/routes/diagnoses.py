@@ -10,12 +10,14 @@ from starlette.responses import HTMLResponse, Response
 
 from wingfit.client.answers import Page
 from wingfit.client.diagnosis_answers import Diagnosis
+from wingfit.records import SeriesDataset, wing_or_vehicle
 from wingfit.service.container import DOWNLOAD_SLOT, Service, ServiceDep
 from wingfit.service.diagnoses import checks, views
 from wingfit.service.diagnoses.requests import DiagnosisIn
 from wingfit.service.http import responses as http
 from wingfit.service.http.problems import ProblemError, conflict, error_item, invalid
-from wingfit.service.routes.jobs import Actions, add_job_routes, load, submit_job
+from wingfit.service.rigs.stored_rig import given_rig, requested_rig, stored_rig
+from wingfit.service.routes.jobs import Actions, add_job_routes, load_any, submit_job
 from wingfit.service.runs import spec_views
 from wingfit.service.storage import store
 from wingfit.service.storage.tables import DiagnosisRow, RunRow
@@ -59,12 +61,18 @@ def submit(
     def plan() -> DiagnosisRow:
         run = _run(service, body.run_id)
         dataset_id = _dataset_id(body, run)
-        dataset = load(service, dataset_id)
-        of_run = store.spec(run) if run else None
-        spec = checks.checked(body, dataset, service.engine, service.diagnoser, of_run, _genome(run))
+        dataset = load_any(service, dataset_id)
+        given = given_rig(run.rig) if body.rig is None and run and run.rig else body.rig
+        rig, of_run = requested_rig(given, dataset), store.spec(run) if run else None
+        if isinstance(dataset, SeriesDataset) and rig:
+            spec = checks.checked_rig(body, dataset, rig, service.diagnoser, _genome(run))
+        else:
+            known = wing_or_vehicle(dataset)
+            spec = checks.checked(body, known, service.engine, service.diagnoser, of_run, _genome(run))
         name = body.name or f"{dataset.name}, {spec_views.model_name(dataset, spec.calibration)}"
         row = DiagnosisRow(dataset_id=dataset_id, kind=dataset.kind, name=name[: spec_views.LONGEST_NAME])
         row.run_id, row.spec = body.run_id, store.spec_json(spec)
+        row.rig = None if given is None else stored_rig(given)
         return row
 
     return submit_job(request, service, service.diagnosing, idempotency_key, body, plan)

@@ -44,7 +44,7 @@ def forces(
     row = run_row(service, run_id)
     if row.kind != "forces":
         raise conflict(f"run {run_id} is on tracks; /v1/runs/{run_id}/comparison has them")
-    dataset, spec = service.datasets.get(row.dataset_id), store.spec(row)
+    dataset, spec = service.datasets.flapping(row.dataset_id), store.spec(row)
     wanted = dataset.recordings[0].name if recording is None else recording
     check_recording(dataset, wanted, "query.recording")
     with simulating():
@@ -65,7 +65,7 @@ def forces(
 def predict(service: ServiceDep, run_id: str, body: PredictionIn) -> Response:
     """Return the forces over a beat that the run's global model predicts for a condition; nothing is stored."""
     row = run_row(service, run_id)
-    law = coefficient_source.law(row, dataset := service.datasets.get(row.dataset_id))
+    law = coefficient_source.law(row, dataset := service.datasets.flapping(row.dataset_id))
     with simulating():
         found = service.engine.predict(store.spec(row), dataset, law, force_views.condition(body))
     return JSONResponse(force_views.prediction(found))

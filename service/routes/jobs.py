@@ -10,12 +10,13 @@ from pydantic import BaseModel
 from sqlalchemy.orm import Session
 from starlette.responses import Response, StreamingResponse
 
-from wingfit.records import Dataset
+from wingfit.records import AnyDataset, Dataset, wing_or_vehicle
 from wingfit.service.container import Service, ServiceDep
 from wingfit.service.http import responses as http
 from wingfit.service.http.events import LastEventId, described, watched
 from wingfit.service.http.problems import ProblemError, error_item, invalid
 from wingfit.service.jobs.job_kind import JobKind
+from wingfit.service.jobs.runner import JobRef
 from wingfit.service.storage import store
 from wingfit.service.storage.tables import JobRow
 from wingfit.workers import jobs
@@ -50,7 +51,7 @@ def submit_job(
 
     answer, new = http.created(service.database, again, create)
     if new:
-        service.runner.enqueue(kind, row.id, row.owner)
+        service.runner.enqueue(JobRef.of(kind, row))
     return http.sent(answer)
 
 
@@ -122,6 +123,14 @@ def add_job_routes(
 
 
 def load(service: Service, dataset_id: str) -> Dataset:
+    """Return the dataset of a wing or vehicle that a request names; raise a 422 for another, or if there is none."""
+    try:
+        return wing_or_vehicle(load_any(service, dataset_id))
+    except ValueError as error:
+        raise invalid("this is not for series", [error_item("body.dataset_id", dataset_id, str(error))]) from None
+
+
+def load_any(service: Service, dataset_id: str) -> AnyDataset:
     """Return the dataset that a request names; raise a 422 if there is no such dataset."""
     try:
         return service.datasets.get(dataset_id)

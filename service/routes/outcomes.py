@@ -203,7 +203,7 @@ def _chosen(
     row = run_row(service, run_id)
     if row.kind != "tracks":
         raise conflict(f"run {run_id} is on forces; /v1/runs/{run_id}/forces has them")
-    dataset, spec = service.datasets.get(row.dataset_id), store.spec(row)
+    dataset, spec = service.datasets.flapping(row.dataset_id), store.spec(row)
     wanted = dataset.recordings[0].name if recording is None else recording
     check_recording(dataset, wanted, "query.recording")
     values = best_genome.best(row) if genome == "best" else service.engine.genome(spec, dataset, {})

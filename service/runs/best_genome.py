@@ -24,5 +24,5 @@ def standing(service: Service, row: RunRow) -> GenomeInfo:
     """
     if row.result is not None:
         return GenomeInfo(genes=row.result["genes"], final=True)
-    genes = service.engine.genes(store.spec(row), service.datasets.get(row.dataset_id), best(row))
+    genes = service.engine.genes(store.spec(row), service.datasets.flapping(row.dataset_id), best(row))
     return GenomeInfo(genes=[views.gene(gene) for gene in genes], final=False)

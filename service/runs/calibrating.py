@@ -42,7 +42,7 @@ class Calibrating(JobKind):
 
     def steps(self, row: RunRow, evaluator: Evaluator) -> Iterator[Step]:
         """Yield a step for each generation of the search, then one with the result on every recording."""
-        spec, dataset = store.spec(row), self._datasets.get(row.dataset_id)
+        spec, dataset = store.spec(row), self._datasets.flapping(row.dataset_id)
         with self._database.read() as session:
             checkpoint = store.checkpoint(session, row.id)
         for generation in self._engine.calibrate(spec, dataset, evaluator, checkpoint):
@@ -63,7 +63,7 @@ def _step(generation: Generation) -> Step:
     def store_step(session: Session, row: RunRow, eta: float | None) -> None:
         row.stage, row.genome = generation.stage, generation.genome
         misfit = views.misfit(row.kind, generation.distance)
-        row.best_mm, row.best_mn = misfit["best_mm"], misfit["best_mn"]
+        row.best_mm, row.best_mn, row.best_percent = misfit["best_mm"], misfit["best_mn"], misfit["best_percent"]
         row.evaluations = generation.evaluations
         row.eta_seconds = eta if row.state == jobs.State.RUNNING else None
         session.add(_generation_row(row, generation, eta))
@@ -77,6 +77,7 @@ def _result(outcome: Mapping[str, Any]) -> Step:
         row.result = dict(outcome)
         # While the run is running, the best of the current stage; in the end, the misfit to all fitted recordings.
         row.best_mm, row.best_mn = outcome.get("after_mm"), outcome.get("after_mn")
+        row.best_percent = outcome.get("after_percent")
 
     return Step(1.0, store_step, last=True)
 

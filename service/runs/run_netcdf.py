@@ -47,7 +47,7 @@ def file(service: Service, exported: Exported[RunRow], genome: GenomeInfo, gone:
 
     ``gone()`` says whether the client has hung up; the next recording is then not simulated, and a 503 raised.
     """
-    dataset = service.datasets.get(exported.row.dataset_id)
+    dataset = service.datasets.flapping(exported.row.dataset_id)
 
     def write(root: Any) -> None:
         root.dimensions = {"generation": exported.row.generations, "gene": len(genome["genes"])}

@@ -11,7 +11,7 @@ from pydantic import BaseModel
 from wingfit.calibration.effects import effect_of
 from wingfit.calibration.search import CalibrationSpec
 from wingfit.client.answers import RunSpec
-from wingfit.records import Dataset, Recording
+from wingfit.records import AnyDataset, Dataset, Recording, SeriesDataset
 from wingfit.service.answers import answer, in_si
 from wingfit.service.http.problems import ErrorItem, error_item, invalid
 from wingfit.service.outcomes.requests import WingIn
@@ -31,7 +31,7 @@ WHY_IDLE = {
     "gauss_newton": "which searches nothing; leave it out, or use genetic or cma_es",
     "auto": "which ends with Gauss-Newton in any case; leave it out",
 }
-USUAL = {"tracks": "genetic", "forces": "gauss_newton"}
+USUAL = {"tracks": "genetic", "forces": "gauss_newton", "series": "auto"}
 LONGEST_NAME = 200
 
 
@@ -110,12 +110,19 @@ def unknown_genes(named: Iterable[tuple[str, str]], known: Sequence[str]) -> lis
     return faults
 
 
-def refuse_foreign(body: BaseModel, dataset: Dataset) -> None:
-    """Raise a 422 for settings that apply only to vehicles in a request about a wing, and the reverse.
+FOREIGN = {
+    "tracks": ("wing", VEHICLE_ONLY),
+    "forces": ("vehicle", WING_ONLY),
+    "series": ("rig of your own", (*WING_ONLY, *VEHICLE_ONLY)),
+}
+
+
+def refuse_foreign(body: BaseModel, dataset: AnyDataset) -> None:
+    """Raise a 422 for settings that do not apply to the rig of ``dataset``, such as a vehicle's in one of a wing.
 
     Settings that have their default value are ignored.
     """
-    what, names = ("wing", VEHICLE_ONLY) if dataset.kind == "tracks" else ("vehicle", WING_ONLY)
+    what, names = FOREIGN[dataset.kind]
     message = f"means nothing for a {what}, which the dataset describes; leave it out"
     if faults := _given(body, names, message):
         raise invalid(f"the request has settings that a {what} does not have", faults)
@@ -133,7 +140,7 @@ def refuse_idle(body: RunIn, method: str | None) -> None:
         raise invalid("the request has settings that its method does not use", faults)
 
 
-def run_name(dataset: Dataset, spec: CalibrationSpec) -> str:
+def run_name(dataset: AnyDataset, spec: CalibrationSpec) -> str:
     """Return the default name of a run, made of the settings in which runs on the same dataset usually differ."""
     unusual = spec.method not in (None, USUAL[dataset.kind])
     method = METHODS.get(spec.method or "", spec.method) if unusual else None
@@ -144,9 +151,12 @@ def run_name(dataset: Dataset, spec: CalibrationSpec) -> str:
     return ", ".join(part for part in parts if part)[:LONGEST_NAME]
 
 
-def model_name(dataset: Dataset, spec: CalibrationSpec) -> str:
+def model_name(dataset: AnyDataset, spec: CalibrationSpec) -> str:
     """Return the model in words for names of runs and diagnoses, e.g. "division 11 with hinge_offset"."""
-    model = f"division {spec.division}" if dataset.kind == "tracks" else spec.preset
+    if isinstance(dataset, SeriesDataset):
+        model = dataset.rig
+    else:
+        model = f"division {spec.division}" if dataset.kind == "tracks" else spec.preset
     if spec.without:
         model += f" without {', '.join(spec.without)}"
     if spec.effects:

@@ -12,8 +12,10 @@ from sqlalchemy.orm import class_mapper
 from wingfit.calibration import result as tracks_result
 from wingfit.client import answers as a
 from wingfit.client.answers import Comparison, Numerics
-from wingfit.records import Dataset, Recording
+from wingfit.records import AnyDataset, Recording, Series, SeriesDataset
+from wingfit.records.array_types import Mask
 from wingfit.service.answers import answer, checked
+from wingfit.service.rigs.stored_rig import is_driven, rig_in_words
 from wingfit.service.runs.spec_views import run_settings
 from wingfit.service.storage import store
 from wingfit.service.storage.tables import DatasetRow, RunRow
@@ -22,8 +24,8 @@ from wingfit.workers.jobs import Wish
 
 T = TypeVar("T")
 MOST_COORDINATES = 1_000_000  # recorded ones in one answer
-# Fields that rows of recordings do not have if they were stored before datasets could contain forces.
-BEFORE_FORCES: dict[str, Any] = {"channels": []}
+# Fields that rows of recordings do not have if an earlier version stored them.
+LATER: dict[str, Any] = {"channels": [], "settings": {}, "duration_s": None}
 # Digits that a page can show; a track in full precision is three times as long on the wire.
 TRACK_DECIMALS = 6
 PHASE_DECIMALS = 9
@@ -31,14 +33,16 @@ PHASE_DECIMALS = 9
 
 def dataset(row: DatasetRow) -> a.Dataset:
     """Return the JSON answer that describes the dataset stored in ``row``."""
-    recordings = [BEFORE_FORCES | record for record in row.recordings]
+    recordings = [LATER | record for record in row.recordings]
     return checked(a.Dataset, columns(row) | {"recordings": recordings})
 
 
-def recording(record: Recording, held_out: bool) -> a.RecordingInfo:
+def recording(record: Recording | Series, held_out: bool) -> a.RecordingInfo:
     """Return the JSON answer about one recording and its condition; ``held_out``: used for validation only."""
+    if isinstance(record, Series):
+        return _series(record, held_out)
     tracked = record.kind == "tracks"
-    seen = np.isfinite(record.positions).all(axis=2) if tracked else record.valid
+    seen = np.asarray(np.isfinite(record.positions).all(axis=2)) if tracked else record.valid
     return answer(
         a.RecordingInfo,
         record.condition,
@@ -48,11 +52,44 @@ def recording(record: Recording, held_out: bool) -> a.RecordingInfo:
         frames=len(record.times),
         markers=int(seen.any(axis=0).sum()) if tracked else 0,
         channels=[] if tracked else list(record.channels),
-        missing_percent=round(100.0 * (1.0 - float(seen.mean())), 3) if seen.size else 0.0,
+        missing_percent=_missing_percent(seen),
+        settings={},
+        duration_s=float(np.ptp(record.times)),
     )
 
 
-def recordings(loaded: Dataset) -> list[a.RecordingInfo]:
+def _series(record: Series, held_out: bool) -> a.RecordingInfo:
+    return {
+        "name": record.name,
+        "rig": "",
+        "held_out": held_out,
+        "frames": len(record.times),
+        "markers": 0,
+        "channels": list(record.channels),
+        "missing_percent": _missing_percent(record.valid),
+        "settings": dict(record.settings),
+        "duration_s": float(np.ptp(record.times)),
+        **dict.fromkeys(a.CONDITION),  # type: ignore[typeddict-item]
+    }
+
+
+def _missing_percent(seen: Mask) -> float:
+    return round(100.0 * (1.0 - float(seen.mean())), 3) if seen.size else 0.0
+
+
+def rig_info(loaded: AnyDataset) -> a.RigInfo | None:
+    """Return what a dataset of series holds, with units; None for a wing or vehicle."""
+    if not isinstance(loaded, SeriesDataset):
+        return None
+    return {
+        "name": loaded.rig,
+        "channels": [{"name": one.name, "unit": one.unit, "description": one.description} for one in loaded.channels],
+        "inputs": [{"name": one.name, "unit": one.unit, "description": one.description} for one in loaded.inputs],
+        "settings": [{"name": one.name, "unit": one.unit, "description": one.description} for one in loaded.settings],
+    }
+
+
+def recordings(loaded: AnyDataset) -> list[a.RecordingInfo]:
     """Return the JSON descriptions of all recordings of a dataset, as its database row stores them."""
     return [recording(r, r.name in loaded.held_out) for r in loaded.recordings]
 
@@ -73,7 +110,9 @@ def job_of(shape: type[T], values: Mapping[str, Any], spec: object) -> T:
     ``values``: its database row, column name to value; ``spec``: its settings as the answer contains them.
     """
     action = None if values["wish"] == Wish.NONE else values["wish"]
-    return checked(shape, {**values, "pending_action": action, "steps": values["generations"], "spec": spec})
+    rig = values["rig"]
+    shown = {"rig": rig_in_words(rig), "driven": is_driven(rig)}
+    return checked(shape, {**values, **shown, "pending_action": action, "steps": values["generations"], "spec": spec})
 
 
 def gene(estimated: tracks_result.GeneResult) -> a.GeneInfo:
@@ -119,9 +158,15 @@ def mean_distance_mm(tracks: tracks_result.Comparison) -> float | None:
 
 
 def misfit(kind: str, distance: float) -> dict[str, float | None]:
-    """Return ``distance`` as ``best_mm`` (of tracks, from m) or ``best_mn`` (of forces, from N); the other is None."""
-    tracks = kind == "tracks"
-    return {"best_mm": mm(distance) if tracks else None, "best_mn": None if tracks else mn(distance)}
+    """Return ``distance`` under its name for the ``kind`` of data; the others are None.
+
+    ``best_mm`` of tracks (from m), ``best_mn`` of forces (from N), ``best_percent`` of series (from a fraction).
+    """
+    return {
+        "best_mm": mm(distance) if kind == "tracks" else None,
+        "best_mn": mn(distance) if kind == "forces" else None,
+        "best_percent": finite(100.0 * distance) if kind == "series" else None,
+    }
 
 
 def track_mm(positions: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:

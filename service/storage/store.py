@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 
 from pydantic import TypeAdapter
 from sqlalchemy import ColumnElement, delete, func, select
-from sqlalchemy.orm import Session
+from sqlalchemy.orm import Session, object_session
 
 from wingfit.calibration.search import CalibrationSpec
 from wingfit.diagnosis.spec import DiagnosisSpec
@@ -32,6 +32,7 @@ from wingfit.service.storage.tables import (
     OwnedRow,
     ParsedRow,
     RunRow,
+    SimulatedRow,
     StepOfJob,
 )
 from wingfit.workers.jobs import Job, State, Wish
@@ -275,6 +276,8 @@ def put_job(row: JobRow, after: Job) -> None:
         row.started_at = now()
     if after.state.final:
         row.finished_at = now()
+        if session := object_session(row):
+            session.execute(delete(SimulatedRow).where(SimulatedRow.job_id == row.id))
     if after.state.final or after.state is State.PAUSED:
         row.eta_seconds = None
 

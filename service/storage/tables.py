@@ -29,7 +29,7 @@ class OwnedRow:
         id: public id, e.g. "run_5c1e07a94bd83f26".
         owner: of a dataset, the owner of the API key that uploaded it, None if no key was required; of a job, the owner
             of its dataset.
-        kind: "tracks" (markers of a flexible wing) or "forces" (of a vehicle).
+        kind: "tracks" (markers of a flexible wing), "forces" (of a vehicle) or "series" (of a rig of the user's own).
     """
 
     __tablename__: Any
@@ -65,7 +65,8 @@ class DatasetRow(OwnedRow, Table):
     """The description of an uploaded dataset; its bytes are in :class:`ArchiveRow`.
 
     ``filename``, ``sha256`` and ``size_bytes`` are those of the uploaded file; ``markers`` is the number of markers on
-    the wing (0 for forces); ``recordings`` describes each recording as JSON.
+    the wing (else 0); ``recordings`` describes each recording as JSON, ``rig`` the rig of a dataset of series (else
+    None).
     """
 
     __tablename__ = "dataset"
@@ -76,6 +77,7 @@ class DatasetRow(OwnedRow, Table):
     size_bytes: Mapped[int]
     markers: Mapped[int]
     recordings: Mapped[list[dict[str, Any]]]
+    rig: Mapped[dict[str, Any] | None] = mapped_column(JSON(none_as_null=True))
 
 
 class ArchiveRow(Table):
@@ -114,6 +116,7 @@ class JobRow(OwnedRow):
 
     Attributes:
         spec: the specification (model, method, settings) as JSON.
+        rig: of a job on series, the rig as `service.rigs.stored_rig` stores it; else None.
         state, wish, generations, progress, error, starts: those of `workers.jobs.Job`.
         stage: name of the present stage of the search.
         eta_seconds: estimated remaining time (s), None if unknown.
@@ -124,6 +127,7 @@ class JobRow(OwnedRow):
 
     dataset_id: Mapped[str] = mapped_column(ForeignKey("dataset.id", ondelete="RESTRICT"), index=True)
     spec: Mapped[dict[str, Any]]
+    rig: Mapped[dict[str, Any] | None] = mapped_column(JSON(none_as_null=True))
     state: Mapped[str] = mapped_column(index=True)
     wish: Mapped[str]
     stage: Mapped[str | None]
@@ -143,8 +147,8 @@ class RunRow(JobRow, Table):
     """A calibration run.
 
     Attributes:
-        best_mm, best_mn: misfit of the best genome (of the present stage, at the end of the result): mm for tracks, mN
-            for forces.
+        best_mm, best_mn, best_percent: misfit of the best genome (of the present stage, at the end of the result): mm
+            for tracks, mN for forces, percent of the range of the channels for series.
         genome: best genome so far, gene name to value; None before the first generation.
         result: result as JSON; None unless the run has succeeded.
     """
@@ -153,6 +157,7 @@ class RunRow(JobRow, Table):
 
     best_mm: Mapped[float | None]
     best_mn: Mapped[float | None]
+    best_percent: Mapped[float | None]
     genome: Mapped[dict[str, Any] | None] = mapped_column(JSON(none_as_null=True))
     result: Mapped[dict[str, Any] | None] = mapped_column(JSON(none_as_null=True))
 
@@ -221,7 +226,7 @@ class GenerationRow(StepOfJob, Table):
     Attributes:
         generation: number of the generation within its stage, from 0.
         best, mean: sum of squares (m^2 or N^2) of the best individual, and its mean over those that did not fail.
-        best_mm, best_mn: misfit of the best individual, of tracks (mm) or of forces (mN); the other is None.
+        best_mm, best_mn, best_percent: misfit of the best individual, as in :class:`RunRow`; two of them are None.
         failed, reasons: number of individuals whose simulation failed, and why.
     """
 
@@ -234,8 +239,24 @@ class GenerationRow(StepOfJob, Table):
     diversity: Mapped[float | None]
     best_mm: Mapped[float | None]
     best_mn: Mapped[float | None]
+    best_percent: Mapped[float | None]
     failed: Mapped[int]
     reasons: Mapped[list[str]] = mapped_column(JSON)
+
+
+class SimulatedRow(Table):
+    """One simulation that a driver computed for a job, so that a job that starts again does not ask for it again.
+
+    ``key`` identifies effects, recording and values of the genes; ``channels`` are float64 values [T, C], row by row;
+    None if the simulation failed, for the ``reason``. Rows are deleted when their job ends.
+    """
+
+    __tablename__ = "simulated"
+
+    job_id: Mapped[str] = mapped_column(primary_key=True)
+    key: Mapped[str] = mapped_column(primary_key=True)
+    channels: Mapped[bytes | None] = mapped_column(LargeBinary)
+    reason: Mapped[str | None]
 
 
 class AnswerRow(Table):

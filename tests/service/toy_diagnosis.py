@@ -32,7 +32,8 @@ from wingfit.diagnosis.finding import (
     Where,
 )
 from wingfit.diagnosis.spec import DiagnosisSpec, Progress
-from wingfit.records import Dataset
+from wingfit.records import AnyDataset, Dataset, wing_or_vehicle
+from wingfit.rigs.rig import Rig
 from wingfit.service.diagnoses.diagnoser import Diagnoser
 
 KNOWN = ("hinge_offset", "camera_shift", "added_mass")
@@ -57,7 +58,9 @@ class ToyDiagnoser(Diagnoser):
             if name not in KNOWN:
                 raise ValueError(f"unknown suspect {name!r}; there are {', '.join(KNOWN)}")
 
-    def diagnose(self, spec: DiagnosisSpec, dataset: Dataset, evaluator: Evaluator) -> Iterator[Progress]:
+    def diagnose(
+        self, spec: DiagnosisSpec, dataset: AnyDataset, evaluator: Evaluator, rig: Rig | None = None
+    ) -> Iterator[Progress]:
         self.starts += 1
         total = STEPS * len(STAGES)
         for done in range(total):
@@ -69,7 +72,7 @@ class ToyDiagnoser(Diagnoser):
             yield Progress((done + 1) / (total + 1), f"{STAGES[done // STEPS]}, part {done % STEPS + 1}", 10 * done)
         if self.gate:
             self.gate(total)
-        yield Progress(1.0, "done", 10 * total, finding(spec, dataset))
+        yield Progress(1.0, "done", 10 * total, finding(spec, wing_or_vehicle(dataset)))
 
     def stored(self, finding: Finding) -> dict[str, Any]:
         return report.finding_json(finding)

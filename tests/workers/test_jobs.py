@@ -28,6 +28,7 @@ from wingfit.workers.jobs import (
     Start,
     State,
     Submit,
+    Wait,
     Wish,
     allowed,
     eta_seconds,
@@ -43,6 +44,7 @@ EVENTS: dict[str, Event] = {
     "cancel": Cancel(),
     "finish": Finish(),
     "fail": Fail("it broke"),
+    "wait": Wait(),
     "leave": Leave(),
     "restart": Restart(),
 }
@@ -63,6 +65,7 @@ TABLE: dict[str, dict[str, tuple[str, tuple[Instruction, ...]]]] = {
         "cancel": ("RUNNING/CANCEL", ()),
         "finish": ("SUCCEEDED", (S, P)),
         "fail": ("FAILED", (S, P)),
+        "wait": ("QUEUED", (S, E, P)),
         "leave": ("RUNNING", ()),
         "restart": ("QUEUED", (E, P)),
     },
@@ -73,6 +76,7 @@ TABLE: dict[str, dict[str, tuple[str, tuple[Instruction, ...]]]] = {
         "cancel": ("RUNNING/CANCEL", ()),
         "finish": ("SUCCEEDED", (S, P)),
         "fail": ("FAILED", (S, P)),
+        "wait": ("PAUSED", (S, P)),
         "leave": ("RUNNING/PAUSE", ()),
         "restart": ("PAUSED", (P,)),
     },
@@ -81,6 +85,7 @@ TABLE: dict[str, dict[str, tuple[str, tuple[Instruction, ...]]]] = {
         "cancel": ("RUNNING/CANCEL", ()),
         "finish": ("CANCELLED", (S, P)),
         "fail": ("CANCELLED", (S, P)),
+        "wait": ("CANCELLED", (S, P)),
         "leave": ("RUNNING/CANCEL", ()),
         "restart": ("CANCELLED", (P,)),
     },
@@ -130,6 +135,7 @@ def test_a_job_fails_after_the_third_start_without_progress() -> None:
     assert "(after step 0)" in str(given_up.error)
     assert step(running, Restart(MOST_STARTS + 1))[0].state is State.QUEUED
     assert step(step(running, Leave())[0], Restart())[0].state is State.QUEUED
+    assert step(running, Wait())[0].starts == MOST_STARTS - 1
     assert step(step(running, Generation(0.1))[0], Restart())[0].state is State.QUEUED
     assert step(step(running, Generation(0.1, lasting=False))[0], Restart())[0].state is State.FAILED
     assert step(step(running, Cancel())[0], Restart())[0].state is State.CANCELLED

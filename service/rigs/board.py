@@ -1,0 +1,174 @@
+"""Simulations that jobs wait for, and the drivers that compute them.
+
+A driver is a process of the user's that takes simulations, and returns their results over HTTP. Any number of drivers
+may serve a job; they may come and go. A simulation that a driver has taken is offered again once that driver has been
+silent for SILENT_SECONDS.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import threading
+import time
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+from wingfit.client.drive_answers import Simulation
+from wingfit.rigs.rig_model import Simulated
+from wingfit.service.jobs.wakeups import Changes
+
+SILENT_SECONDS = 60.0
+POLL_SECONDS = 0.2
+
+
+@dataclass(frozen=True)
+class Call:
+    """One simulation: values of the ``genes`` by name, ``effects`` that are added, and the name of the recording."""
+
+    recording: str
+    effects: tuple[str, ...]
+    genes: Mapping[str, float]
+
+    @cached_property
+    def key(self) -> str:
+        """Hash of the contents; equal calls have equal keys, on any server."""
+        text = json.dumps([self.recording, self.effects, list(self.genes.items())])
+        return hashlib.sha256(text.encode()).hexdigest()[:32]
+
+    def simulation(self) -> Simulation:
+        """Return the call as a driver receives it."""
+        return {
+            "id": self.key,
+            "recording": self.recording,
+            "effects": list(self.effects),
+            "genes": dict(self.genes),
+        }
+
+
+@dataclass
+class _Open:
+    """A call without a result; ``waiting`` counts the batches that need it, ``driver`` took it."""
+
+    call: Call
+    waiting: int = 1
+    driver: str | None = None
+
+
+@dataclass
+class _Desk:
+    """What one job waits for, by key, what was computed for it, and when each of its drivers was last heard of."""
+
+    open: dict[str, _Open] = field(default_factory=dict)
+    done: dict[str, Simulated] = field(default_factory=dict)
+    heard: dict[str, float] = field(default_factory=dict)
+
+
+class Board:
+    """The open simulations of all jobs; threads of jobs put them up, requests of drivers take and settle them.
+
+    ``clock`` returns seconds. ``changes`` wakes the requests that wait for simulations of a job.
+    """
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self._clock, self._changed = clock, threading.Condition()
+        self._desks: dict[str, _Desk] = {}
+        self.changes = Changes()
+
+    def hear(self, job_id: str, driver: str) -> None:
+        """Note that ``driver`` serves the job."""
+        with self._changed:
+            self._desk(job_id).heard[driver] = self._clock()
+
+    def attended(self, job_id: str) -> bool:
+        """Return whether a driver of the job was heard of within SILENT_SECONDS."""
+        with self._changed:
+            desk = self._desks.get(job_id)
+            return desk is not None and any(self._present(desk, driver) for driver in desk.heard)
+
+    def put(self, job_id: str, calls: Sequence[Call]) -> None:
+        """Put up ``calls`` of a job; one that is open already is computed once."""
+        with self._changed:
+            desk = self._desk(job_id)
+            for call in calls:
+                if call.key in desk.open:
+                    desk.open[call.key].waiting += 1
+                else:
+                    desk.open[call.key] = _Open(call)
+        self.changes.publish(job_id)
+
+    def results(self, job_id: str, keys: Sequence[str]) -> dict[str, Simulated] | None:
+        """Return the results of ``keys``, or None if some are missing after a wait of POLL_SECONDS."""
+        with self._changed:
+            desk = self._desk(job_id)
+            if not self._changed.wait_for(lambda: all(key in desk.done for key in keys), POLL_SECONDS):
+                return None
+            return {key: desk.done[key] for key in keys}
+
+    def withdraw(self, job_id: str, keys: Sequence[str]) -> None:
+        """Remove calls that a batch no longer waits for, and their results."""
+        with self._changed:
+            desk = self._desk(job_id)
+            for key in keys:
+                one = desk.open.get(key)
+                if one is not None:
+                    one.waiting -= 1
+                if one is None or one.waiting <= 0:
+                    desk.open.pop(key, None)
+                    desk.done.pop(key, None)
+
+    def take(self, job_id: str, driver: str, limit: int, holding: Collection[str] = ()) -> list[Call]:
+        """Give up to ``limit`` calls of the job to ``driver``, which computes those with the keys ``holding`` already.
+
+        What it took and does not hold got lost on the way, and is free again.
+        """
+        with self._changed:
+            desk = self._desk(job_id)
+            desk.heard[driver] = self._clock()
+            free = [
+                one
+                for key, one in desk.open.items()
+                if key not in desk.done and key not in holding and self._free(desk, one, driver)
+            ]
+            for one in free[:limit]:
+                one.driver = driver
+            return [one.call for one in free[:limit]]
+
+    def open_call(self, job_id: str, key: str) -> Call | None:
+        """Return the open call with this ``key``; None if the job does not wait for it, or has its result."""
+        with self._changed:
+            desk = self._desks.get(job_id)
+            one = desk.open.get(key) if desk and key not in desk.done else None
+            return one.call if one else None
+
+    def settle(self, job_id: str, results: Mapping[str, Simulated]) -> None:
+        """Store the ``results`` of open calls by key; those for which no batch waits are dropped."""
+        with self._changed:
+            desk = self._desk(job_id)
+            for key, result in results.items():
+                if key in desk.open:
+                    desk.done.setdefault(key, result)
+            self._changed.notify_all()
+
+    def release(self, job_id: str, driver: str) -> None:
+        """Offer what ``driver`` has taken to others, because it leaves."""
+        with self._changed:
+            desk = self._desk(job_id)
+            desk.heard.pop(driver, None)
+        self.changes.publish(job_id)
+
+    def forget(self, job_id: str) -> None:
+        """Drop all that is known of a job, because it has ended."""
+        with self._changed:
+            self._desks.pop(job_id, None)
+        self.changes.publish(job_id)
+
+    def _desk(self, job_id: str) -> _Desk:
+        return self._desks.setdefault(job_id, _Desk())
+
+    def _free(self, desk: _Desk, one: _Open, driver: str) -> bool:
+        return one.driver in (None, driver) or not self._present(desk, one.driver)
+
+    def _present(self, desk: _Desk, driver: str | None) -> bool:
+        return driver in desk.heard and self._clock() - desk.heard[driver] < SILENT_SECONDS

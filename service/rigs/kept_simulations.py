@@ -1,0 +1,62 @@
+"""Results that drivers returned, in the database: a job that starts again, after a crash or a pause, finds them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from sqlalchemy import func, select
+
+from wingfit.rigs.rig_model import Simulated
+from wingfit.service.storage.database import Database
+from wingfit.service.storage.tables import SimulatedRow
+
+MOST_BYTES = 256 * 10**6  # of one job; results beyond are not stored, and computed again if the job starts again
+AT_ONCE = 500  # keys in one query
+
+
+class KeptSimulations:
+    """Reads and writes the results of simulations of a job by the key of their call; deleted when the job ends."""
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+        self._bytes: dict[str, int] = {}
+
+    def read(self, job_id: str, shapes: Mapping[str, tuple[int, ...]]) -> dict[str, Simulated]:
+        """Return the stored results among the keys of ``shapes``, which has the shape (T, C) of each."""
+        found, keys = dict[str, Simulated](), list(shapes)
+        with self._database.read() as session:
+            for start in range(0, len(keys), AT_ONCE):
+                some = keys[start : start + AT_ONCE]
+                rows = select(SimulatedRow).where(SimulatedRow.job_id == job_id, SimulatedRow.key.in_(some))
+                found |= {row.key: _result(row, shapes[row.key]) for row in session.scalars(rows)}
+        return found
+
+    def write(self, job_id: str, results: Mapping[str, Simulated]) -> None:
+        """Store ``results`` by key, up to MOST_BYTES for the job."""
+        size = sum(one.channels.nbytes for one in results.values() if one.reason is None)
+        with self._database.write() as session:
+            held = self._bytes.get(job_id)
+            if held is None:
+                stored = select(func.sum(func.length(SimulatedRow.channels))).where(SimulatedRow.job_id == job_id)
+                held = session.scalar(stored) or 0
+            if held + size > MOST_BYTES:
+                return
+            for key, one in results.items():
+                session.merge(_row(job_id, key, one))
+        self._bytes[job_id] = held + size
+
+    def forget(self, job_id: str) -> None:
+        """Forget the size of what is stored for a job that has ended."""
+        self._bytes.pop(job_id, None)
+
+
+def _result(row: SimulatedRow, shape: tuple[int, ...]) -> Simulated:
+    if row.channels is None:
+        return Simulated(np.full(shape, np.nan), row.reason)
+    return Simulated(np.frombuffer(row.channels, "<f8").astype(float).reshape(shape), None)
+
+
+def _row(job_id: str, key: str, result: Simulated) -> SimulatedRow:
+    channels = None if result.reason is not None else np.ascontiguousarray(result.channels, "<f8").tobytes()
+    return SimulatedRow(job_id=job_id, key=key, channels=channels, reason=result.reason)
