@@ -7,19 +7,19 @@ from collections.abc import AsyncIterator
 from pathlib import PurePath
 from typing import Annotated
 
-from fastapi import APIRouter, Form, Request, UploadFile
+from fastapi import APIRouter, Form, Query, Request, UploadFile
 from sqlalchemy.orm import Session
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response, StreamingResponse
 
 from wingfit.client import answers as a
-from wingfit.records import AnyDataset
+from wingfit.records import AnyDataset, SeriesDataset
 from wingfit.records.files.confined import ReaderError
 from wingfit.service.auth.access import owner_of_new
 from wingfit.service.container import DOWNLOAD_SLOT, UPLOAD_SLOT, Service, ServiceDep
 from wingfit.service.datasets.parsed_datasets import Opened
 from wingfit.service.http import responses as http
-from wingfit.service.http.problems import ProblemError, error_item, invalid
+from wingfit.service.http.problems import ProblemError, conflict, error_item, invalid
 from wingfit.service.http.request_limits import UPLOAD_LIMIT
 from wingfit.service.runs import views
 from wingfit.service.storage import store
@@ -127,6 +127,29 @@ async def _pieces(database: Database, dataset_id: str, size: int) -> AsyncIterat
 
     for start in range(0, size, PIECE):
         yield await run_in_threadpool(piece, start)
+
+
+@router.get(
+    "/{dataset_id}/series",
+    response_model=a.SeriesValues,
+    responses=http.errors(404, 409),
+    summary="Fetch the values of a recording of series",
+)
+def fetch_series(
+    service: ServiceDep,
+    dataset_id: str,
+    recording: Annotated[str | None, Query(max_length=200, description="its name; null: the first")] = None,
+    if_none_match: http.IfNoneMatch = None,
+) -> Response:
+    """Return channels and inputs of one recording of a rig of the user's own, to look at them."""
+    dataset = service.datasets.get(dataset_id)
+    if not isinstance(dataset, SeriesDataset):
+        raise conflict(f"dataset {dataset_id} has {dataset.kind}, not series")
+    try:
+        chosen = dataset.recordings[0] if recording is None else dataset.recording(recording)
+    except ValueError as error:
+        raise invalid("there is no such recording", [error_item("query.recording", recording, str(error))]) from None
+    return http.tagged(views.series_values(chosen), if_none_match)
 
 
 @router.delete("/{dataset_id}", status_code=204, responses=http.errors(404, 409), summary="Delete a dataset")

@@ -13,7 +13,7 @@ from wingfit.calibration import result as tracks_result
 from wingfit.client import answers as a
 from wingfit.client.answers import Comparison, Numerics
 from wingfit.records import AnyDataset, Recording, Series, SeriesDataset
-from wingfit.records.array_types import Mask
+from wingfit.records.array_types import Array, Mask
 from wingfit.service.answers import answer, checked
 from wingfit.service.rigs.stored_rig import is_driven, rig_in_words
 from wingfit.service.runs.spec_views import run_settings
@@ -23,6 +23,7 @@ from wingfit.service.units import MM, finite, mm, mn, tidy_mm
 from wingfit.workers.jobs import Wish
 
 T = TypeVar("T")
+MOST_SERIES_VALUES = 50_000  # in one answer with a recording of series
 MOST_COORDINATES = 1_000_000  # recorded ones in one answer
 # Fields that rows of recordings do not have if an earlier version stored them.
 LATER: dict[str, Any] = {"channels": [], "settings": {}, "duration_s": None}
@@ -71,6 +72,22 @@ def _series(record: Series, held_out: bool) -> a.RecordingInfo:
         "duration_s": float(np.ptp(record.times)),
         **dict.fromkeys(a.CONDITION),  # type: ignore[typeddict-item]
     }
+
+
+def series_values(record: Series) -> a.SeriesValues:
+    """Return the values of a recording of series as the JSON answer; of a long one every ``stride``-th sample."""
+    stride = max(1, -(-(record.values.size + len(record.inputs) * len(record.times)) // MOST_SERIES_VALUES))
+    return {
+        "recording": record.name,
+        "time_s": record.times[::stride].tolist(),
+        "channels": {name: _nulls(record.values[::stride, k]) for k, name in enumerate(record.channels)},
+        "inputs": {name: _nulls(values[::stride]) for name, values in record.inputs.items()},
+        "stride": stride,
+    }
+
+
+def _nulls(values: Array) -> list[float | None]:
+    return [value if np.isfinite(value) else None for value in values.tolist()]
 
 
 def _missing_percent(seen: Mask) -> float:

@@ -20,18 +20,13 @@ from sqlalchemy import delete, select
 from tests.records.compare import assert_same
 from tests.records.files.test_confined import looping
 from tests.records.samples import falcon_dataset
-from tests.records.series_samples import arm_dataset
 from tests.service.conftest import Api, toy_service
 from wingfit.records import DatasetError, load_archive, wing_or_vehicle
 from wingfit.records.errors import fail
 from wingfit.records.files import confined
-from wingfit.records.files.archive import write_zip
 from wingfit.records.files.confined import convert_netcdf, limits_of_upload
 from wingfit.records.files.netcdf import write_netcdf
-from wingfit.service.datasets.parsed_datasets import Datasets
-from wingfit.service.runs.engine import Engine
 from wingfit.service.settings import Settings
-from wingfit.service.storage.database import Database
 from wingfit.service.storage.tables import ParsedRow
 
 
@@ -110,23 +105,6 @@ def test_faults_come_as_those_of_a_zip_do(api: Api, netcdf: bytes) -> None:
     (error,) = refused.json()["errors"]
     assert error["where"] == "wing.nc: recordings/vacuum-2hz, time index 3"
     assert "times must increase" in error["message"]
-
-
-def test_a_series_of_any_other_rig_is_refused_with_the_remedy(api: Api) -> None:
-    refused = _upload(api, write_netcdf(arm_dataset()))
-    assert refused.status_code == 422
-    (error,) = refused.json()["errors"]
-    assert error["where"] == "wing.nc"
-    assert "is a series of rig 'motor arm'; this needs a wing or a vehicle" in error["message"]
-    assert "wingfit diagnose FOLDER --local --rig my_rig.py" in error["message"]
-    assert api.get("/v1/datasets")["items"] == []
-
-
-def test_a_series_in_a_zip_is_refused_as_well(tmp_path: Path) -> None:
-    database = Database(tmp_path)
-    with pytest.raises(DatasetError, match=r"arm\.zip: dataset 'arm' is a series of rig 'motor arm'"):
-        Datasets(database, Engine()).open(write_zip(arm_dataset()), "C:\\mine\\arm.zip")
-    database.close()
 
 
 def test_what_is_stored_beside_an_archive_counts(tmp_path: Path, netcdf: bytes) -> None:
