@@ -138,7 +138,7 @@ async def _pieces(database: Database, dataset_id: str, size: int) -> AsyncIterat
 def fetch_series(
     service: ServiceDep,
     dataset_id: str,
-    recording: Annotated[str | None, Query(max_length=200, description="its name; null: the first")] = None,
+    recording: Annotated[str | None, Query(max_length=200, description="its name; without it, the first")] = None,
     if_none_match: http.IfNoneMatch = None,
 ) -> Response:
     """Return channels and inputs of one recording of a rig of the user's own, to look at them."""
