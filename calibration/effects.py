@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 
 from wingfit.sim.effects.contract import Effect
 from wingfit.sim.effects.registry import EFFECTS
@@ -45,13 +45,13 @@ def is_measured(gene: str) -> bool:
     return effect is not None and effect.family == "measurement"
 
 
-def refuse_idle(names: Collection[str], free: Collection[str], fixed: Mapping[str, float]) -> None:
-    """Raise ValueError if an effect in ``names`` would stay switched off, as none of its sizes can be non-zero.
+def refuse_idle(effects: Mapping[str, Sequence[str]], free: Collection[str], fixed: Mapping[str, float]) -> None:
+    """Raise ValueError if an effect would stay switched off, as none of its sizes can be non-zero.
 
-    A size can be non-zero if it is searched (in ``free``) or has a non-zero value in ``fixed``.
+    ``effects``: names of the size genes of each effect by its name. A size can be non-zero if it is searched (in
+    ``free``) or has a non-zero value in ``fixed``.
     """
-    for name in names:
-        mine = sizes(EFFECTS[name])
+    for name, mine in effects.items():
         if not any(size in free or fixed.get(size) for size in mine):
             raise ValueError(
                 f"effect {name!r} would stay switched off: none of {', '.join(mine)} is searched; "

@@ -20,7 +20,10 @@ from wingfit.records.array_types import Array
 from wingfit.records.blas_threads import one_blas_thread
 from wingfit.sim.model import Model
 
-__all__ = ["CalibrationSpec", "Generation", "calibrate", "found", "model_for", "prepare", "resolved"]
+__all__ = [
+    "CalibrationSpec", "Generation", "calibrate", "calibrate_prepared", "found", "found_of", "model_for", "prepare",
+    "resolved",
+]  # fmt: skip
 
 EXPECTED_GENERATIONS = 45
 EXPECTED_ITERATIONS = 10
@@ -71,7 +74,14 @@ def calibrate(
     A resumed run gives the same results as an uninterrupted one, bit for bit. ValueError if ``spec`` does not fit
     ``dataset``.
     """
-    ready = prepare(spec, dataset)
+    yield from calibrate_prepared(prepare(spec, dataset), evaluator, checkpoint)
+
+
+@one_blas_thread
+def calibrate_prepared(
+    ready: Prepared, evaluator: Evaluator, checkpoint: dict[str, Any] | None = None
+) -> Iterator[Generation]:
+    """Run the calibration that is ``ready``, as :func:`calibrate`."""
     spec = ready.spec
     state = _State.start(spec, ready.model) if checkpoint is None else _State.from_json(checkpoint, spec)
     while state.stage < len(ready.stages):
@@ -89,7 +99,12 @@ def calibrate(
 
 def found(spec: CalibrationSpec, dataset: Dataset, checkpoint: dict[str, Any]) -> dict[str, dict[str, float]]:
     """Return the best genome (all genes, by name) of each stage in ``checkpoint``, by name of the stage."""
-    return _State.from_json(checkpoint, resolved(spec, dataset)).found
+    return found_of(resolved(spec, dataset), checkpoint)
+
+
+def found_of(spec: CalibrationSpec, checkpoint: dict[str, Any]) -> dict[str, dict[str, float]]:
+    """Return the best genomes as :func:`found`, with the ``spec`` of a calibration that is prepared."""
+    return _State.from_json(checkpoint, spec).found
 
 
 @dataclass
