@@ -87,7 +87,6 @@ def prepare_rig(spec: CalibrationSpec, rig: Rig, dataset: SeriesDataset) -> Prep
     spec = resolved_for_rig(spec)
     model = model_of(rig, dataset)
     _refuse_repeated("effect", spec.effects)
-    added = {suspect.name: suspect.size_genes for suspect in model.suspects if suspect.name in spec.effects}
     model = model.with_effects(*spec.effects)
     _refuse_genes(spec, model)
     fitted = _fitted(spec, dataset)
@@ -99,7 +98,7 @@ def prepare_rig(spec: CalibrationSpec, rig: Rig, dataset: SeriesDataset) -> Prep
             )
     known_noise(dataset.recordings)  # refuses repeats that differ
     free = _free(spec, model, _elsewhere(spec, model, dataset, [one.name for one in fitted]))
-    refuse_idle(added, free, spec.fixed)
+    refuse_idle({one.name: one.size_genes for one in model.added}, free, spec.fixed)
     return Prepared(spec, model, (Stage("joint", free, fitted),), dataset.select(dataset.held_out))
 
 

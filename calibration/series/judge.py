@@ -55,7 +55,7 @@ def judge_series(
             *remarks.not_simulated(everywhere),
             *beyond,
             *errors.unfinished,
-            *remarks.at_bounds(ready, rig, dataset, best),
+            *remarks.at_bounds(ready, best),
             *errors.remarks,
             *remarks.unknown_noise(fitted),
             *remarks.own_genes(own, dataset),

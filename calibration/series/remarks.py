@@ -6,14 +6,13 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
+from wingfit.calibration.effects import added_effects, switched_off
 from wingfit.calibration.estimates import likelihood
 from wingfit.calibration.preparation import Prepared
 from wingfit.calibration.result import ADEQUATE
 from wingfit.calibration.series.misfits import Compared
 from wingfit.calibration.series.own_genes import OwnGenes
 from wingfit.records import Genome, SeriesDataset
-from wingfit.rigs.dataset_model import model_of
-from wingfit.rigs.rig import Rig
 
 
 def not_simulated(everywhere: Sequence[Compared]) -> tuple[str, ...]:
@@ -91,16 +90,13 @@ def unfinished(moved: Mapping[str, float], limit: float) -> tuple[str, ...]:
     )
 
 
-def at_bounds(ready: Prepared, rig: Rig, dataset: SeriesDataset, best: Genome) -> tuple[str, ...]:
+def at_bounds(ready: Prepared, best: Genome) -> tuple[str, ...]:
     """Return remarks on effects that are switched off in ``best``, and on genes at a bound."""
     free, off, found = ready.searched, set[str](), list[str]()
-    for suspect in model_of(rig, dataset).suspects:
-        own = [gene.name for gene in suspect.genes]
-        if suspect.name in ready.spec.effects and all(best[name] == 0.0 for name in suspect.size_genes):
-            off.update(own)
-            idle = [name for name in own if name in free and name not in suspect.size_genes]
-            without = f", and {', '.join(idle)} {'is' if len(idle) == 1 else 'are'} not determined" if idle else ""
-            found.append(f"effect {suspect.name!r} is switched off in the best genome{without}")
+    for effect in added_effects(ready.model, free):
+        if all(best[name] == 0.0 for name in effect.sizes):
+            off.update(effect.genes)
+            found.append(switched_off(effect, free))
     genes = [gene for gene in best.genes if gene.name in free and gene.name not in off]
     return (*found, *likelihood.at_bounds(genes, best.as_dict()))
 

@@ -146,7 +146,7 @@ def test_fixed_genes_of_a_recording_stay() -> None:
 
 @pytest.mark.parametrize("method", ["auto", "gauss_newton"])
 def test_a_suspect_is_fitted_as_an_effect(method: str) -> None:
-    creeping = three(creep=0.02)
+    creeping = three(added={"creep.rate": 0.02})
     without = calibrated(creeping, spec(method))
     assert without.after is not None
     assert without.after > 3.0
@@ -155,6 +155,22 @@ def test_a_suspect_is_fitted_as_an_effect(method: str) -> None:
     found = calibrated(creeping, spec(method, effects=("creep",)))
     assert distance(genes(found)["creep.rate"], 0.02) < 3.5
     assert found.after == pytest.approx(1.0, abs=0.1)
+
+
+@pytest.mark.parametrize("rate", [3.0, 8.0, 15.0])
+def test_gauss_newton_starts_a_suspect_where_it_lowers_the_misfit(rate: float) -> None:
+    """From its nominal rate of 5 rad/s it ends in another minimum."""
+    found = calibrated(three(added={"hum.size": 0.01, "hum.rate": rate}), spec(effects=("hum",), fixed=TRUTH))
+    assert genes(found)["hum.rate"].best == pytest.approx(rate, rel=0.02)
+    assert found.after == pytest.approx(1.0, abs=0.1)
+
+
+def test_a_suspect_may_have_the_name_of_an_effect_of_a_wing() -> None:
+    tethered = three(added={"tether.k": 10.0, "tether.station": 0.8})
+    found = calibrated(tethered, spec(effects=("tether",), fixed={"stiffness": TRUTH["stiffness"]}))
+    own = genes(found)
+    assert own["tether.k"].best * own["tether.station"].best ** 2 == pytest.approx(6.4, rel=0.02)
+    assert any("tether.k and tether.station compensate each other" in one for one in found.remarks)
 
 
 def test_a_fault_is_fitted_as_an_effect() -> None:

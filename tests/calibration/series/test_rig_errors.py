@@ -67,7 +67,7 @@ def test_noise_of_repeats_and_of_the_highest_frequencies_is_known() -> None:
 
 
 def test_an_accepted_error_counts_as_noise() -> None:
-    coarse = three(creep=0.02)
+    coarse = three(added={"creep.rate": 0.02})
     accepted = (replace(coarse.channels[0], accepted_error=0.05), coarse.channels[1])
     coarse = replace(coarse, recordings=tuple(replace(one, quantities=accepted) for one in coarse.recordings))
     found = calibrated(coarse)
