@@ -43,12 +43,13 @@ class Generation:
     one: they are not comparable, and ``best`` may rise from the search to the first iteration.
 
     ``best`` and ``mean`` are sums of squares, m^2 or N^2; ``distance`` is the best individual's misfit, m or N
-    (:class:`wingfit.calibration.problem.Misfit`; of series, both are relative to the ranges of the channels); ``diversity`` is the standard deviation of the population, genes
-    scaled to 0..1, mean over the free genes (of an iteration: the largest move of a gene); ``evaluations`` counts the
-    individuals evaluated since the start (of equal ones each counts, and one is simulated); ``failed`` counts the
-    generation's failed individuals, and starts that failed since the last, with up to ten different ``reasons``;
-    ``genome`` is the best, all genes by name; ``progress`` estimates the finished part of the calibration (never
-    decreases, 1 only at the end). In ``checkpoint``, ``found`` has the best genome by stage.
+    (:class:`wingfit.calibration.problem.Misfit`; of series, both are relative to the ranges of the channels);
+    ``diversity`` is the standard deviation of the population, genes scaled to 0..1, mean over the free genes (of an
+    iteration: the largest move of a gene); ``evaluations`` counts the individuals evaluated since the start (of equal
+    ones each counts, and one is simulated); ``failed`` counts the generation's failed individuals, and starts that
+    failed since the last, with up to ten different ``reasons``; ``genome`` is the best, all genes by name; ``progress``
+    estimates the finished part of the calibration (never decreases, 1 only at the end). In ``checkpoint``, ``found``
+    has the best genome by stage.
     """
 
     stage: str
