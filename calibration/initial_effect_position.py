@@ -12,14 +12,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wingfit.calibration.effects import effect_of, sizes
+from wingfit.calibration.effects import AddedEffect, added_effects
 from wingfit.calibration.estimates.linearised import Linearised, free_genes, linearise, residuals_of, values_at
 from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.problem import Evaluation, Problem
 from wingfit.inference.noise.white import Noise, whitened_sensitivity
 from wingfit.inference.score_test import INVISIBLE, Nuisance, amounts, remaining, spread
 from wingfit.records.array_types import Array
-from wingfit.sim.effects.contract import Effect
 
 PLACES = 15  # places tried, besides the initial one: with a single size a batch of two groups of lanes
 SMALL = 0.02  # step of a size, as a fraction of the range between its bounds
@@ -34,11 +33,12 @@ def placed(problem: Problem, evaluator: Evaluator, unit: Array) -> tuple[Array, 
     if not effects:
         return unit, 0
     linear = linearise(problem, evaluator, unit)
-    weighed = _Weighed.of(problem, linear, [effect_of(name) not in effects for name in problem.free])
+    moved = {name for effect in effects for name in effect.genes}
+    weighed = _Weighed.of(problem, linear, [name not in moved for name in problem.free])
     start, evaluated = unit.copy(), linear.evaluations
     for effect in effects:
-        own = [k for k, name in enumerate(problem.free) if effect_of(name) is effect]
-        size = [k for k in own if problem.free[k] in sizes(effect)]
+        own = [k for k, name in enumerate(problem.free) if name in effect.genes]
+        size = [k for k in own if problem.free[k] in effect.sizes]
         tried = _tried(unit, [k for k in own if k not in size])
         batch = _small(size, unit, tried)
         evaluation = evaluator.evaluate(problem, values_at(free_genes(problem), batch), residuals=True)
@@ -88,16 +88,14 @@ class _Weighed:
         return float(left @ left) - remaining(own, left, multiples)
 
 
-def _movable(problem: Problem, unit: Array) -> list[Effect]:
+def _movable(problem: Problem, unit: Array) -> list[AddedEffect]:
     """Return the effects of size zero at ``unit`` [F] of which a size and at least one other gene are searched."""
     genes = free_genes(problem)
     genome = problem.base.as_dict() | dict(zip(problem.free, values_at(genes, unit[None])[0].tolist(), strict=True))
-    found = {effect.name: effect for name in problem.free if (effect := effect_of(name))}
     movable = []
-    for effect in found.values():
-        mine = [name for name in problem.free if effect_of(name) is effect]
-        kinds = {name in sizes(effect) for name in mine}
-        if kinds == {True, False} and all(genome[name] == 0.0 for name in sizes(effect)):
+    for effect in added_effects(problem.model, problem.free):
+        kinds = {name in effect.sizes for name in problem.free if name in effect.genes}
+        if kinds == {True, False} and all(genome[name] == 0.0 for name in effect.sizes):
             movable.append(effect)
     return movable
 

@@ -6,17 +6,24 @@ Settings that do not fit the dataset raise ValueError here, before anything is s
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from wingfit.calibration.effects import group_of, refuse_idle
+from wingfit.calibration.effects import group_of, refuse_idle, sizes
 from wingfit.calibration.forces.split_beats import Cut
 from wingfit.calibration.problem import base_genome, compared
-from wingfit.calibration.spec import CalibrationSpec, Mode, model_for, resolved, search_model
-from wingfit.records import Dataset, LowPass, Recording
+from wingfit.calibration.spec import CalibrationSpec, Mode, model_for, resolved, resolved_for_rig, search_model
+from wingfit.inference.noise.series import known_noise
+from wingfit.records import AnyRecording, Dataset, LowPass, Recording, SeriesDataset
+from wingfit.records.recorded import R, Recorded
+from wingfit.rigs.dataset_model import model_of
+from wingfit.rigs.rig import Rig
+from wingfit.rigs.rig_model import RigModel
+from wingfit.sim.effects.registry import EFFECTS
 from wingfit.sim.filtering import default_cutoff, low_passed
-from wingfit.sim.vehicle.blade_element_wing import BladeElementWing
+from wingfit.sim.model import Model
 from wingfit.sim.wing.alignment import recorded_crossing
 from wingfit.sim.wing.flexible_wing import FlexibleWing
 
@@ -29,7 +36,7 @@ class Stage:
 
     name: str
     free: tuple[str, ...]
-    recordings: tuple[Recording, ...]
+    recordings: tuple[AnyRecording, ...]
 
 
 @dataclass(frozen=True)
@@ -45,9 +52,9 @@ class Prepared:
     """
 
     spec: CalibrationSpec
-    model: FlexibleWing | BladeElementWing
+    model: Model
     stages: tuple[Stage, ...]
-    held_out: tuple[Recording, ...]
+    held_out: tuple[AnyRecording, ...]
     search_model: FlexibleWing | None = None
 
     @property
@@ -60,26 +67,76 @@ def prepare(spec: CalibrationSpec, dataset: Dataset) -> Prepared:
     """Choose model, stages and filters, without simulating; ValueError if ``spec`` does not fit ``dataset``."""
     spec = resolved(spec, dataset)
     model, coarse = model_for(dataset, spec), search_model(dataset, spec)
+    _refuse_genes(spec, model)
+    fitted = _fitted(spec, dataset)
+    for recording in dataset.recordings:  # all of them are judged in the end
+        _refuse_unusable(spec, dataset, recording, recording in fitted)
+    free = _free(spec, model)
+    refuse_idle({name: sizes(EFFECTS[name]) for name in spec.effects}, free, spec.fixed)
+    stages = _stages(spec.mode, free, tuple(as_fitted(spec, recording) for recording in fitted))
+    held_out = tuple(as_fitted(spec, one) for one in dataset.recordings if one.name in dataset.held_out)
+    return Prepared(spec, model, stages, held_out, coarse)
+
+
+def prepare_rig(spec: CalibrationSpec, rig: Rig, dataset: SeriesDataset) -> Prepared:
+    """Prepare a calibration of ``rig``, without simulating; ValueError if ``spec``, ``rig``, ``dataset`` do not fit.
+
+    There is one stage, "joint", whose model is a :class:`wingfit.rigs.rig_model.RigModel`. Genes that belong to a
+    recording that is not fitted are not free.
+    """
+    spec = resolved_for_rig(spec)
+    model = model_of(rig, dataset)
+    _refuse_repeated("effect", spec.effects)
+    model = model.with_effects(*spec.effects)
+    _refuse_genes(spec, model)
+    fitted = _fitted(spec, dataset)
+    for recording in dataset.recordings:
+        if not recording.valid.any():
+            raise ValueError(
+                f"recording {recording.name!r} has no value of any channel; there is nothing to compare: leave the "
+                "recording out of the dataset"
+            )
+    known_noise(dataset.recordings)  # refuses repeats that differ
+    free = _free(spec, model, _elsewhere(spec, model, dataset, [one.name for one in fitted]))
+    refuse_idle({one.name: one.size_genes for one in model.added}, free, spec.fixed)
+    return Prepared(spec, model, (Stage("joint", free, fitted),), dataset.select(dataset.held_out))
+
+
+def _elsewhere(spec: CalibrationSpec, model: RigModel, dataset: SeriesDataset, fitted: Sequence[str]) -> set[str]:
+    """Return the genes of recordings not in ``fitted`` (names); ValueError if ``spec`` requests one of them."""
+    found = {
+        gene.name: one.name for one in dataset.recordings if one.name not in fitted for gene in model.genes_of(one)
+    }
+    for name in spec.genes:
+        if name in found:
+            raise ValueError(
+                f"gene {name!r} belongs to recording {found[name]!r}, which is not fitted; fit this recording, or "
+                "leave the gene out"
+            )
+    return set(found)
+
+
+def _refuse_genes(spec: CalibrationSpec, model: Model) -> None:
+    """Raise ValueError if ``spec`` names a gene twice or one that ``model`` lacks, or fixes one beyond its bounds."""
     _refuse_repeated("gene", spec.genes)
     known = [gene.name for gene in model.genes]
     for name in (*spec.genes, *spec.fixed):
         if name not in known:
             raise ValueError(f"unknown gene {name!r}; there are {', '.join(known)}")
     base_genome(model, spec.fixed)
-    fitted = _fitted(spec, dataset)
-    for recording in dataset.recordings:  # all of them are judged in the end
-        _refuse_unusable(spec, dataset, recording, recording in fitted)
+
+
+def _free(spec: CalibrationSpec, model: Model, never: Collection[str] = ()) -> tuple[str, ...]:
+    """Return the genes to search, in the order of ``model`` and without those of ``never``; ValueError if none is."""
     wanted = spec.genes or model.searched
-    free = tuple(name for name in known if name in wanted and name not in spec.fixed)
+    known = [gene.name for gene in model.genes]
+    free = tuple(name for name in known if name in wanted and name not in spec.fixed and name not in never)
     if not free:
         raise ValueError("nothing to calibrate: every gene is fixed, or the model has none that is searched by itself")
-    refuse_idle(spec.effects, free, spec.fixed)
-    stages = _stages(spec.mode, free, tuple(as_fitted(spec, recording) for recording in fitted))
-    held_out = tuple(as_fitted(spec, one) for one in dataset.recordings if one.name in dataset.held_out)
-    return Prepared(spec, model, stages, held_out, coarse)
+    return free
 
 
-def _fitted(spec: CalibrationSpec, dataset: Dataset) -> tuple[Recording, ...]:
+def _fitted(spec: CalibrationSpec, dataset: Recorded[R]) -> tuple[R, ...]:
     """Return the recordings to be fitted, unfiltered; ValueError if one is held out or repeated, or there is none."""
     _refuse_repeated("recording", spec.recordings)
     recordings = dataset.select(spec.recordings) if spec.recordings else dataset.fitted

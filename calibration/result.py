@@ -191,14 +191,25 @@ def _genes(
     known: dict[str, Standing] = {}
     for stage in stages:
         known |= standing(Problem(model, stage.recordings, stage.free, best), evaluator)
+    return gene_results(known, nominal, best, adequate)
+
+
+def gene_results(
+    found: Mapping[str, Standing], nominal: Genome, best: Genome, adequate: bool
+) -> tuple[GeneResult, ...]:
+    """Return the results of all genes; ``found``: standard errors of those that were searched, by name.
+
+    ``adequate``: whether noise explains the misfit; if it does not, no gene counts as identifiable.
+    """
+    known = dict(found)
     before, after = nominal.normalised(), best.normalised()
-    for gene in model.genes:
+    for gene in best.genes:
         if gene.name in known:
-            found = known[gene.name]
-            absolute = found.absolute if gene.share_of is None else found.standard_error * after[gene.name]
-            identifiable = found.identifiable and adequate and not _at_bound(gene, best)
-            known[gene.name] = replace(found, identifiable=identifiable, absolute=absolute)
-    return tuple(GeneResult.of(g, before[g.name], after[g.name], known.get(g.name)) for g in model.genes)
+            own = known[gene.name]
+            absolute = own.absolute if gene.share_of is None else own.standard_error * after[gene.name]
+            identifiable = own.identifiable and adequate and not _at_bound(gene, best)
+            known[gene.name] = replace(own, identifiable=identifiable, absolute=absolute)
+    return tuple(GeneResult.of(g, before[g.name], after[g.name], known.get(g.name)) for g in best.genes)
 
 
 def _at_bound(gene: Gene, best: Genome) -> bool:

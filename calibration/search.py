@@ -20,7 +20,10 @@ from wingfit.records.array_types import Array
 from wingfit.records.blas_threads import one_blas_thread
 from wingfit.sim.model import Model
 
-__all__ = ["CalibrationSpec", "Generation", "calibrate", "found", "model_for", "prepare", "resolved"]
+__all__ = [
+    "CalibrationSpec", "Generation", "calibrate", "calibrate_prepared", "found", "found_of", "model_for", "prepare",
+    "resolved",
+]  # fmt: skip
 
 EXPECTED_GENERATIONS = 45
 EXPECTED_ITERATIONS = 10
@@ -40,12 +43,13 @@ class Generation:
     one: they are not comparable, and ``best`` may rise from the search to the first iteration.
 
     ``best`` and ``mean`` are sums of squares, m^2 or N^2; ``distance`` is the best individual's misfit, m or N
-    (:class:`wingfit.calibration.problem.Misfit`); ``diversity`` is the standard deviation of the population, genes
-    scaled to 0..1, mean over the free genes (of an iteration: the largest move of a gene); ``evaluations`` counts the
-    individuals evaluated since the start (of equal ones each counts, and one is simulated); ``failed`` counts the
-    generation's failed individuals, and starts that failed since the last, with up to ten different ``reasons``;
-    ``genome`` is the best, all genes by name; ``progress`` estimates the finished part of the calibration (never
-    decreases, 1 only at the end). In ``checkpoint``, ``found`` has the best genome by stage.
+    (:class:`wingfit.calibration.problem.Misfit`; of series, both are relative to the ranges of the channels);
+    ``diversity`` is the standard deviation of the population, genes scaled to 0..1, mean over the free genes (of an
+    iteration: the largest move of a gene); ``evaluations`` counts the individuals evaluated since the start (of equal
+    ones each counts, and one is simulated); ``failed`` counts the generation's failed individuals, and starts that
+    failed since the last, with up to ten different ``reasons``; ``genome`` is the best, all genes by name; ``progress``
+    estimates the finished part of the calibration (never decreases, 1 only at the end). In ``checkpoint``, ``found``
+    has the best genome by stage.
     """
 
     stage: str
@@ -71,7 +75,14 @@ def calibrate(
     A resumed run gives the same results as an uninterrupted one, bit for bit. ValueError if ``spec`` does not fit
     ``dataset``.
     """
-    ready = prepare(spec, dataset)
+    yield from calibrate_prepared(prepare(spec, dataset), evaluator, checkpoint)
+
+
+@one_blas_thread
+def calibrate_prepared(
+    ready: Prepared, evaluator: Evaluator, checkpoint: dict[str, Any] | None = None
+) -> Iterator[Generation]:
+    """Run the calibration that is ``ready``, as :func:`calibrate`."""
     spec = ready.spec
     state = _State.start(spec, ready.model) if checkpoint is None else _State.from_json(checkpoint, spec)
     while state.stage < len(ready.stages):
@@ -89,7 +100,12 @@ def calibrate(
 
 def found(spec: CalibrationSpec, dataset: Dataset, checkpoint: dict[str, Any]) -> dict[str, dict[str, float]]:
     """Return the best genome (all genes, by name) of each stage in ``checkpoint``, by name of the stage."""
-    return _State.from_json(checkpoint, resolved(spec, dataset)).found
+    return found_of(resolved(spec, dataset), checkpoint)
+
+
+def found_of(spec: CalibrationSpec, checkpoint: dict[str, Any]) -> dict[str, dict[str, float]]:
+    """Return the best genomes as :func:`found`, with the ``spec`` of a calibration that is prepared."""
+    return _State.from_json(checkpoint, spec).found
 
 
 @dataclass

@@ -16,12 +16,17 @@ from wingfit.sim.wing.flexible_wing import FlexibleWing
 Mode = Literal["staged", "joint", "local"]
 Method = Literal["genetic", "cma_es", "gauss_newton", "auto"]
 
+OF_WINGS_AND_VEHICLES = (
+    "division", "search_division", "bounds_factor", "accuracy", "preset", "without", "axes", "low_pass", "peel_width",
+)  # fmt: skip  # settings that a rig with a simulation of the user's own does not have
+
 
 @dataclass(frozen=True)
 class CalibrationSpec:
     """Settings of a calibration.
 
-    Defaults are those of van der Grinten's thesis (IV-E) for a wing, of Armanini et al. (2016) for a vehicle.
+    Defaults are those of van der Grinten's thesis (IV-E) for a wing, of Armanini et al. (2016) for a vehicle. Of a rig
+    with a simulation of the user's own, settings in OF_WINGS_AND_VEHICLES must have their defaults.
 
     Attributes:
         division: rigid bodies of the simulated wing: a number ("4", "11", "24"), or bodies along the chord of each
@@ -31,7 +36,7 @@ class CalibrationSpec:
             goes on with ``division`` from what it found. None: both have ``division``.
         mode: "staged" (wings) fits structural genes on vacuum recordings, then aerodynamic ones on the rest; "joint"
             fits all genes to all recordings; "local" (vehicles) fits each recording by itself. None: staged for a
-            wing, local for a vehicle.
+            wing, local for a vehicle, joint for a rig of the user's own.
         population: individuals per generation.
         stall: generations without improvement of the best fitness after which a search ends.
         tolerance: smallest relative decrease of the best fitness that counts as an improvement.
@@ -43,8 +48,9 @@ class CalibrationSpec:
         recordings: names of recordings to fit; empty means all that are not held out.
         genes: names of genes to search; empty means those that the model searches by default.
         fixed: values, by name, of genes that are not searched and have these values instead of their estimates.
-        method: how a stage is searched. None: genetic for a wing, Gauss-Newton for a vehicle. "auto": a short genetic
-            search, then Gauss-Newton from its best individuals (:mod:`wingfit.calibration.starts`).
+        method: how a stage is searched. None: genetic for a wing, Gauss-Newton for a vehicle, auto for a rig of the
+            user's own. "auto": a short genetic search, then Gauss-Newton from its best individuals
+            (:mod:`wingfit.calibration.starts`).
         finish: whether Gauss-Newton follows each stage's search; with "auto", it does in any case.
         preset: blade-element model (:data:`wingfit.sim.vehicle.terms.PRESETS`); for vehicles only.
         without: names of terms of the preset that are omitted.
@@ -52,8 +58,8 @@ class CalibrationSpec:
         low_pass: cut-off (Hz) of the low-pass for forces before they are fitted. None: 3.2 times the flap frequency
             (Armanini et al.: 40 Hz at 12.5 Hz); 0: none. Recordings with a ``low_pass`` of their own are not filtered.
         peel_width: beats over which the end of the peel (wings that touched have separated) is smoothed.
-        effects: names of effects (`sim/effects/registry.py`) that the model contains; their genes start
-            switched off and are searched, within bounds of their own, by default.
+        effects: names of effects (`sim/effects/registry.py`; of a rig of the user's own: of its suspects) that the
+            model contains; their genes start switched off and are searched, within bounds of their own, by default.
     """
 
     division: str = "11"
@@ -90,9 +96,7 @@ def resolved(spec: CalibrationSpec, dataset: Dataset) -> CalibrationSpec:
     """
     wing = dataset.kind == "tracks"
     mode, method = spec.mode or ("staged" if wing else "local"), spec.method or ("genetic" if wing else "gauss_newton")
-    for what, value, known in (("mode", mode, get_args(Mode)), ("method", method, get_args(Method))):
-        if value not in known:
-            raise ValueError(f"unknown {what} {value!r}; there are {', '.join(known)}")
+    _refuse_unknown(mode, method)
     if mode == "staged" and not wing:
         raise ValueError(
             "mode 'staged' separates a wing's structure from its aerodynamics, and this dataset describes a vehicle; "
@@ -103,14 +107,47 @@ def resolved(spec: CalibrationSpec, dataset: Dataset) -> CalibrationSpec:
             "mode 'local' fits each recording by itself, and a wing has one genome for all of them; "
             "use 'staged' or 'joint', and name a single recording to fit that alone"
         )
+    _refuse_impossible(spec, method)
+    _refuse_search_division(spec, method, wing=wing)
+    return replace(spec, mode=mode, method=method)
+
+
+def resolved_for_rig(spec: CalibrationSpec) -> CalibrationSpec:
+    """Return ``spec`` with the mode and method of a rig with a simulation of the user's own.
+
+    ValueError as in :func:`resolved`, and for a setting that only wings and vehicles have.
+    """
+    mode, method = spec.mode or "joint", spec.method or "auto"
+    _refuse_unknown(mode, method)
+    if mode != "joint":
+        raise ValueError(
+            f"mode {mode!r} is for wings or vehicles; a rig with a simulation of its own has one genome for all "
+            "recordings: use 'joint', and name a single recording to fit that alone"
+        )
+    default = CalibrationSpec()
+    for name in OF_WINGS_AND_VEHICLES:
+        if getattr(spec, name) != getattr(default, name):
+            raise ValueError(
+                f"{name} {getattr(spec, name)!r} describes a wing or a vehicle, and this rig has a simulation of its "
+                "own; leave it out"
+            )
+    _refuse_impossible(spec, method)
+    return replace(spec, mode=mode, method=method)
+
+
+def _refuse_unknown(mode: str, method: str) -> None:
+    for what, value, known in (("mode", mode, get_args(Mode)), ("method", method, get_args(Method))):
+        if value not in known:
+            raise ValueError(f"unknown {what} {value!r}; there are {', '.join(known)}")
+
+
+def _refuse_impossible(spec: CalibrationSpec, method: Method) -> None:
     for name in (*WHOLE, *REAL):
         refuse_number(name, getattr(spec, name))
     if method == "auto" and spec.finish:
         raise ValueError(
             "finish means nothing for the method auto, which ends with Gauss-Newton in any case; leave it out"
         )
-    _refuse_search_division(spec, method, wing=wing)
-    return replace(spec, mode=mode, method=method)
 
 
 def _refuse_search_division(spec: CalibrationSpec, method: Method, *, wing: bool) -> None:

@@ -22,7 +22,7 @@ from wingfit.diagnosis.spec import DiagnosisSpec, Progress
 from wingfit.diagnosis.subject import Subject
 from wingfit.diagnosis.verdict.build_finding import build_finding
 from wingfit.inference.noise.series_fit import SeriesReduction
-from wingfit.records import AnyRecording, Dataset, Recording, Series, SeriesDataset
+from wingfit.records import AnyRecording, Dataset, Series, SeriesDataset
 from wingfit.records.blas_threads import one_blas_thread
 from wingfit.rigs.rig import Rig
 
@@ -140,7 +140,7 @@ def _versions() -> dict[str, str]:
 
 def _prepare(
     dataset: Dataset, spec: DiagnosisSpec
-) -> tuple[Subject, tuple[Recording, ...], tuple[Recording, ...], tuple[str, ...]]:
+) -> tuple[Subject, tuple[AnyRecording, ...], tuple[AnyRecording, ...], tuple[str, ...]]:
     """Return the rig, the recordings to fit and those held out (all low-passed as for the fit), and the free genes."""
     axes = _axes(dataset, spec) or spec.calibration.axes
     calibration = replace(spec.calibration, mode="joint", axes=axes, search_division=None)  # there is no search

@@ -9,11 +9,11 @@ from typing import Literal
 
 import numpy as np
 
-from wingfit.diagnosis.rig_subject import check_fits
 from wingfit.inference.differences import STEP
 from wingfit.records import Gene, Series, SeriesDataset
 from wingfit.records.array_types import Array
 from wingfit.records.series import belongs_to
+from wingfit.rigs.dataset_model import check_fits
 from wingfit.rigs.rig import Rig
 from wingfit.rigs.rig_model import RigModel
 from wingfit.rigs.suspect import Suspect

@@ -65,10 +65,15 @@ class RigModel:
         return tuple(suspect for suspect in every if suspect.name not in self.effects)
 
     @cached_property
+    def added(self) -> tuple[Suspect, ...]:
+        """The suspects that were added, in the order of :attr:`effects`."""
+        known = {suspect.name: suspect for suspect in replace(self, effects=()).suspects}
+        return tuple(known[name] for name in self.effects)
+
+    @cached_property
     def genes(self) -> tuple[Gene, ...]:
         """Genes of the nominal model, those of each recording, and those of the effects that were added."""
-        known = {suspect.name: suspect for suspect in replace(self, effects=()).suspects}
-        added = (gene for name in self.effects for gene in known[name].genes)
+        added = (gene for suspect in self.added for gene in suspect.genes)
         return (*self.rig.genes, *(gene for one in self.all_recordings for gene in self.genes_of(one)), *added)
 
     def genes_of(self, recording: Series) -> tuple[Gene, ...]:

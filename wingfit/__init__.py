@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from wingfit._local import calibrate, diagnose
     from wingfit.calibration.forces.result import ForceResult
     from wingfit.calibration.result import GeneResult, RecordingResult, Result
+    from wingfit.calibration.series.result import SeriesResult
     from wingfit.calibration.spec import CalibrationSpec
     from wingfit.client.client import Client
     from wingfit.client.transport import ServerAwayError, WingfitError
@@ -72,6 +73,7 @@ __all__ = [
     "Run",
     "Series",
     "SeriesDataset",
+    "SeriesResult",
     "ServerAwayError",
     "SimulationError",
     "Suspect",
@@ -91,6 +93,7 @@ _MODULES = {
     "wingfit._local": ("calibrate", "diagnose"),
     "wingfit.calibration.forces.result": ("ForceResult",),
     "wingfit.calibration.result": ("GeneResult", "RecordingResult", "Result"),
+    "wingfit.calibration.series.result": ("SeriesResult",),
     "wingfit.calibration.spec": ("CalibrationSpec",),
     "wingfit.client.client": ("Client",),
     "wingfit.client.transport": ("ServerAwayError", "WingfitError"),

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import Any
 
 from wingfit.calibration.forces.result import ForceResult
+from wingfit.calibration.preparation import Prepared, prepare, prepare_rig
 from wingfit.calibration.result import Result
-from wingfit.calibration.search import calibrate as generations_of
+from wingfit.calibration.search import calibrate_prepared
+from wingfit.calibration.series.result import SeriesResult
 from wingfit.calibration.spec import CalibrationSpec
-from wingfit.calibration.summary import summarise
+from wingfit.calibration.summary import summarise, summarise_rig
 from wingfit.diagnosis import DiagnosisSpec, Finding, Progress, diagnose_rig
 from wingfit.diagnosis import diagnose as steps_of
 from wingfit.records import AnyDataset, SeriesDataset, wing_or_vehicle
@@ -23,37 +26,51 @@ def calibrate(
     dataset: AnyDataset,
     spec: CalibrationSpec | None = None,
     *,
+    rig: Rig | None = None,
     workers: int = 1,
     on_progress: OnProgress | None = None,
-) -> Result | ForceResult:
+) -> Result | ForceResult | SeriesResult:
     """Estimate the genes of the dataset's model, and compare the estimate with every recording, held-out ones included.
 
     Args:
         dataset: recordings and the description of their rig (:func:`wingfit.load_dataset`).
         spec: what to calibrate and how; None: the default settings for this kind of rig, those of the published
-            sources.
+            sources. For a rig of the user's own: a short genetic search, then Gauss-Newton.
+        rig: simulation of the rig that was recorded, if it is neither a wing nor a vehicle. With more than one worker,
+            its functions must be importable: defined at the top of a module.
         workers: number of processes that simulate; the results do not depend on it. More than one starts processes,
-            which
-        import the calling script again: call from below ``if __name__ == "__main__":``.
+            which import the calling script again: call from below ``if __name__ == "__main__":``.
         on_progress: called after each generation of the search with the completed fraction, in [0, 1], and the name of
-        the stage.
+            the stage.
 
     Returns:
-        A :class:`Result` for a wing (distances in m), a :class:`ForceResult` for a vehicle (forces in N).
+        A :class:`Result` for a wing (distances in m), a :class:`ForceResult` for a vehicle (forces in N), a
+        :class:`SeriesResult` for a rig of the user's own (channels in their units).
 
     Raises:
-        ValueError: the spec does not fit the dataset, or the dataset is of neither a wing nor a vehicle.
+        ValueError: the spec does not fit the dataset, or the rig does not.
     """
-    known, spec = wing_or_vehicle(dataset), spec or CalibrationSpec()
-    checkpoint = None
+    spec = spec or CalibrationSpec()
     with _evaluator(workers) as evaluator:
-        for generation in generations_of(spec, known, evaluator):
-            checkpoint = generation.checkpoint
-            if on_progress:
-                on_progress(generation.progress, generation.stage)
-        if checkpoint is None:
-            raise ValueError("the search ended without a generation; check max_generations")
+        own = _series_of(dataset, rig)
+        if own is not None:
+            ready = prepare_rig(spec, own[1], own[0])
+            return summarise_rig(ready, own[1], own[0], evaluator, _last_checkpoint(ready, evaluator, on_progress))
+        known = wing_or_vehicle(dataset)
+        checkpoint = _last_checkpoint(prepare(spec, known), evaluator, on_progress)
         return summarise(spec, known, evaluator, checkpoint)
+
+
+def _last_checkpoint(ready: Prepared, evaluator: RunningEvaluator, on_progress: OnProgress | None) -> dict[str, Any]:
+    """Run the calibration that is ``ready``, and return the checkpoint after its last generation."""
+    checkpoint = None
+    for generation in calibrate_prepared(ready, evaluator):
+        checkpoint = generation.checkpoint
+        if on_progress:
+            on_progress(generation.progress, generation.stage)
+    if checkpoint is None:
+        raise ValueError("the search ended without a generation; check max_generations")
+    return checkpoint
 
 
 def diagnose(
@@ -92,13 +109,19 @@ def diagnose(
 def _steps(
     dataset: AnyDataset, rig: Rig | None, spec: DiagnosisSpec, evaluator: RunningEvaluator
 ) -> Iterator[Progress]:
+    own = _series_of(dataset, rig)
+    return diagnose_rig(own[1], own[0], spec, evaluator) if own else steps_of(wing_or_vehicle(dataset), spec, evaluator)
+
+
+def _series_of(dataset: AnyDataset, rig: Rig | None) -> tuple[SeriesDataset, Rig] | None:
+    """Return series with the rig that simulates them; None for a wing or vehicle. ValueError if one is missing."""
     if isinstance(dataset, SeriesDataset):
         if rig is None:
             raise ValueError(f"dataset {dataset.name!r} has series of rig {dataset.rig!r}; give its simulation as rig")
-        return diagnose_rig(rig, dataset, spec, evaluator)
+        return dataset, rig
     if rig is not None:
         raise ValueError(f"dataset {dataset.name!r} describes a {dataset.kind} rig of its own; leave out rig")
-    return steps_of(dataset, spec, evaluator)
+    return None
 
 
 @contextmanager

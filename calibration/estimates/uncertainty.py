@@ -199,13 +199,21 @@ class _Part:
         absorbed = float(np.trace(bread @ self.information)) / len(bread)
         return beat_score_covariance(self.scores, self.used, absorbed)
 
-    def block(self) -> Block:
-        """Return residuals and sensitivities on a regular grid of times, to estimate correlations between samples."""
+    def blocks(self) -> list[Block]:
+        """Return residuals and sensitivities on a regular grid of times, to estimate correlations between samples.
+
+        Channels of a series have different noise, so that each has a block of its own.
+        """
         white, record = self.white, self.record
+        if record.kind == "series":
+            own = (slice(k, k + 1) for k in range(white.shape[1]))
+            return [
+                Block.of(record.times, white[:, k], self.sensitivity[:, k], self.seen[:, k], grouped=False) for k in own
+            ]
         forces = isinstance(record, Recording) and record.kind == "forces"
         if isinstance(record, Recording) and forces:
             white = without_mean_beat(record, white, len(self.scores))
-        return Block.of(record.times, white, self.sensitivity, self.seen, grouped=forces)
+        return [Block.of(record.times, white, self.sensitivity, self.seen, grouped=forces)]
 
 
 def _from_samples(parts: list[_Part], bread: Array) -> Array:
@@ -215,7 +223,8 @@ def _from_samples(parts: list[_Part], bread: Array) -> Array:
     scatter. ``bread`` [F, F] is the covariance of the estimate if residuals were white.
     """
     total = np.zeros_like(bread)
-    for part, meat in zip(parts, score_covariances([part.block() for part in parts], bread), strict=True):
+    blocks = [(part, block) for part in parts for block in part.blocks()]
+    for (part, _), meat in zip(blocks, score_covariances([block for _, block in blocks], bread), strict=True):
         larger = np.ones(len(bread))
         if len(part.scores) >= FEWEST:
             beats = np.diag(part.from_beat_to_beat(bread))

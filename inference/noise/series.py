@@ -13,9 +13,10 @@ discrete cosine transform of its samples (orthonormal, type II). White noise of 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 import scipy
@@ -59,6 +60,17 @@ class SeriesNoise:
     visible: Float[Array, " C"]
 
 
+class KnownNoise(NamedTuple):
+    """What is known of the noise of the C channels of one recording, NaN where nothing is.
+
+    ``standard_deviation`` [C] of one sample, in the unit of the channel; ``relative_error`` [C]: standard error of its
+    square, relative.
+    """
+
+    standard_deviation: Float[Array, " C"]
+    relative_error: Float[Array, " C"]
+
+
 class UnknownNoiseError(ValueError):
     """Raised for a recording whose noise is neither stated nor can be estimated; the message says what to do."""
 
@@ -83,6 +95,41 @@ def noise_of(recordings: Sequence[Series]) -> dict[str, SeriesNoise]:
     return found
 
 
+def known_noise(recordings: Sequence[Series]) -> dict[str, KnownNoise]:
+    """Return the noise of each of ``recordings`` by name, channel by channel, where :func:`noise_of` can know it.
+
+    ValueError for repeats that differ in more than noise.
+    """
+    found = {name: _whole(noise) for name, noise in _from_repeats(recordings)}
+    for one in recordings:
+        if one.name not in found:
+            found[one.name] = _whole(_alone(one)) if _has_periods(one) else _by_channel(one)
+    largest = np.fmax.reduce([one.standard_deviation for one in found.values()])
+    return {name: _completed(one, largest) for name, one in found.items()}
+
+
+def _whole(noise: SeriesNoise) -> KnownNoise:
+    return KnownNoise(noise.standard_deviation, np.full(len(noise.standard_deviation), noise.relative_error))
+
+
+def _by_channel(recording: Series) -> KnownNoise:
+    found = np.full((2, len(recording.quantities)), np.nan)
+    for k in range(len(recording.quantities)):
+        with suppress(UnknownNoiseError):
+            deviation, _, error, _ = _of_channel(recording, k, _shown(recording, k))
+            found[:, k] = max(deviation, FLOOR * float(_largest(recording)[k])), error
+    return KnownNoise(*found)
+
+
+def _completed(noise: KnownNoise, largest: Array) -> KnownNoise:
+    """Return ``noise`` with what it does not know replaced by the ``largest`` [C] of other recordings."""
+    unknown = np.isnan(noise.standard_deviation)
+    errors = np.where(np.isfinite(largest), BORROWED_ERROR, np.nan)
+    return KnownNoise(
+        np.where(unknown, largest, noise.standard_deviation), np.where(unknown, errors, noise.relative_error)
+    )
+
+
 def _as_others(recording: Series, known: Sequence[SeriesNoise]) -> SeriesNoise:
     """Return the largest of the ``known`` noises of each channel, for a recording that does not show its own."""
     deviations = np.nanmax([one.standard_deviation for one in known], axis=0)
@@ -93,7 +140,7 @@ def _as_others(recording: Series, known: Sequence[SeriesNoise]) -> SeriesNoise:
 def _alone(recording: Series) -> SeriesNoise:
     """Noise of a recording that was not repeated."""
     shown = [_shown(recording, k) for k in range(len(recording.quantities))]
-    if recording.period is not None and np.ptp(recording.times) >= LEAST_PERIODS * recording.period:
+    if _has_periods(recording):
         return _from_period(recording, _deviations(shown))
     channels = [_of_channel(recording, k, own) for k, own in enumerate(shown)]
     density = np.stack([own for _, own, _, _ in channels])
@@ -105,6 +152,10 @@ def _alone(recording: Series) -> SeriesNoise:
         min(sources, key=SOURCES.index),
         _deviations(shown),
     )
+
+
+def _has_periods(recording: Series) -> bool:
+    return recording.period is not None and bool(np.ptp(recording.times) >= LEAST_PERIODS * recording.period)
 
 
 def _of_channel(recording: Series, column: int, own: VisibleNoise | None) -> tuple[float, Array, float, Source]:

@@ -113,7 +113,8 @@ def test_finishing_starts_at_the_coarse_optimum_and_ends_at_the_fine_one(
     assert list(dict.fromkeys(g.stage for g in whole)) == stages
     ready = prepare(spec, dataset)
     assert isinstance(ready.search_model, FlexibleWing)
-    assert (ready.model.division, ready.search_model.division) == (FINE, COARSE)  # type: ignore[union-attr]
+    assert isinstance(ready.model, FlexibleWing)
+    assert (ready.model.division, ready.search_model.division) == (FINE, COARSE)
     for before, after, spent, then in zip(whole, whole[1:], counts, counts[1:], strict=False):
         grown = {name for name in then if then[name] > spent.get(name, 0)}
         assert grown == {FINE if after.stage.endswith("Gauss-Newton") else COARSE}

@@ -12,7 +12,7 @@ from tests.calibration.conftest import FORCE_TRUTHS
 from tests.calibration.test_search import Here, refused
 from wingfit.calibration.preparation import as_fitted
 from wingfit.calibration.search import CalibrationSpec, calibrate, prepare
-from wingfit.records import Dataset, LowPass
+from wingfit.records import Dataset, LowPass, Recording
 
 
 def test_each_recording_of_forces_is_a_stage_of_its_own(forces: Dataset) -> None:
@@ -46,12 +46,15 @@ def test_forces_together_have_one_genome(forces: Dataset) -> None:
 def test_forces_are_low_passed_before_they_are_fitted(forces: Dataset) -> None:
     (first, _) = prepare(CalibrationSpec(), forces).stages
     (record,) = first.recordings
+    assert isinstance(record, Recording)
     assert record.low_pass == LowPass(3.2 * 12.5)
     assert (
         np.nanmax(np.abs(np.diff(record.values, axis=0))) < np.abs(np.diff(forces.recordings[0].values, axis=0)).max()
     )
     (wide, _) = prepare(CalibrationSpec(low_pass=67.0), forces).stages
-    assert wide.recordings[0].low_pass == LowPass(67.0)
+    (record_wide, *_) = wide.recordings
+    assert isinstance(record_wide, Recording)
+    assert record_wide.low_pass == LowPass(67.0)
     (raw, _) = prepare(CalibrationSpec(low_pass=0.0), forces).stages
     assert raw.recordings[0] is forces.recordings[0]
     assert prepare(CalibrationSpec(low_pass=67.0), replace(forces, recordings=(record, forces.recordings[1]))).stages[

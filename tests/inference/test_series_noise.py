@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wingfit.inference.noise.series import UnknownNoiseError, noise_of, quantum
+from wingfit.inference.noise.series import BORROWED_ERROR, UnknownNoiseError, known_noise, noise_of, quantum
 from wingfit.inference.noise.series_fit import SeriesReduction, band
 from wingfit.inference.noise.visible_noise import visible_noise
 from wingfit.records import Channel, Series
@@ -199,3 +199,33 @@ def test_a_channel_that_one_recording_lacks_is_not_used_there(repeats: str) -> N
 def test_deviations_are_positive(name: str, value: float) -> None:
     with pytest.raises(ValueError, match=f"channel 'y': {name} is .* m; give a positive number or None"):
         replace(Channel("y", "m"), **{name: value})  # type: ignore[arg-type]
+
+
+def test_noise_is_known_channel_by_channel() -> None:
+    """Where all of it is known, it is that of noise_of; what one recording does not show, others may."""
+    stated = Series(
+        "stated",
+        TIMES,
+        (Channel("y", "m", 0.02), Channel("z", "m")),
+        np.stack([coloured(1, 0.0), MOTIONS["decay"] + coloured(2, 0.0)], axis=1),
+    )
+    (found,) = known_noise([stated]).values()
+    np.testing.assert_array_equal(found.standard_deviation, noise_of([stated])["stated"].standard_deviation)
+    few = replace(stated, name="few", times=TIMES[:12], values=stated.values[:12])
+    (alone,) = known_noise([few]).values()
+    assert alone.standard_deviation[0] == 0.02
+    assert np.isnan(alone.standard_deviation[1])
+    assert np.isnan(alone.relative_error[1])
+    beside = known_noise([stated, few])["few"]
+    assert beside.standard_deviation[1] == found.standard_deviation[1]
+    assert beside.relative_error[1] == BORROWED_ERROR
+
+
+def test_noise_of_a_period_and_of_repeats_is_known() -> None:
+    swing = np.sin(2 * np.pi * TIMES)
+    periodic = series(swing + coloured(1, 0.0), period=1.0)
+    again = [series(swing + coloured(k, 0.0), name=f"r{k}", repeats="r") for k in (2, 3)]
+    known, whole = known_noise([periodic, *again]), noise_of([periodic, *again])
+    for name, one in known.items():
+        np.testing.assert_array_equal(one.standard_deviation, whole[name].standard_deviation)
+        assert one.relative_error[0] == whole[name].relative_error

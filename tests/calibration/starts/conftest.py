@@ -77,7 +77,7 @@ def valleys(monkeypatch: pytest.MonkeyPatch) -> Prepared:
     noise = 0.003 * np.random.default_rng(1).normal(size=(len(empty.times), 1))
     record = replace(empty, values=model.observe(np.array([truth]), empty).channels[0] + noise)
     spec = CalibrationSpec(method="auto", mode="joint", population=8, seed=3)
-    ready = Prepared(spec, model, (Stage("joint", NAMES, (record,)),), ())  # type: ignore[arg-type]
+    ready = Prepared(spec, model, (Stage("joint", NAMES, (record,)),), ())
     monkeypatch.setattr(search, "prepare", lambda *_: ready)
     return ready
 
