@@ -1,4 +1,4 @@
-"""Prints the result of a run: for a wing misfits and genes, for a vehicle misfits and coefficients."""
+"""Prints the result of a run: misfits and genes, for a vehicle misfits and coefficients."""
 
 from __future__ import annotations
 
@@ -7,14 +7,18 @@ from typing import Any
 from wingfit.cli.base.output import Columns, interval, mm, number, records, remarks, say, table
 from wingfit.cli.forces.results import force_result
 from wingfit.client import answers as a
+from wingfit.client.series_answers import SeriesResult
 
 SIGNIFICANT = 2.0  # standard errors from which a value differs from zero; the web page uses the same (parts/tables.js)
 
 
 def print_result(answer: Any) -> None:
-    """Print the result of a run on tracks or on forces."""
+    """Print the result of a run on tracks, forces or series."""
     if answer["kind"] == "forces":
         force_result(answer)
+        return
+    if answer["kind"] == "series":
+        series_result(answer)
         return
     misfits(answer)
     say("")
@@ -45,6 +49,26 @@ def misfits(answer: a.Result) -> None:
     if answer["noise_mm"] is not None:
         say(f"expected from tracking noise alone: {mm(answer['noise_mm'])} mm")
     remarks(answer["remarks"])
+
+
+def series_result(answer: SeriesResult) -> None:
+    """Print the misfit of each channel of a rig of the user's own, in its unit, and the genes."""
+    rows = []
+    for one in answer["recordings"]:
+        use = "held out" if one["held_out"] else "fitted" if one["fitted"] else "not fitted"
+        for channel in one["channels"]:
+            misfits = [number(value) for value in (channel["before"], channel["after"], channel["noise"])]
+            unit = "" if channel["unit"] == "1" else channel["unit"]
+            rows.append([one["name"], use, channel["name"], *misfits, unit])
+    table(["recording", "use", "channel", ">RMS before", ">after", ">noise", "unit"], rows)
+    times = "times the noise" if answer["relative_to"] == "noise" else "of the range"
+    say(f"all fitted: {number(answer['before'], 3)} before, {number(answer['after'], 3)} after, {times}")
+    if answer["held_out_after"] is not None:
+        before, after = number(answer["held_out_before"], 3), number(answer["held_out_after"], 3)
+        say(f"all held out: {before} before, {after} after, {times}")
+    remarks(answer["remarks"])
+    say("")
+    print_genes(answer["genes"])
 
 
 def identifiable(gene: a.GeneInfo) -> str:

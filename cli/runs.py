@@ -11,21 +11,25 @@ import typer
 
 from wingfit.cli.base import options as o
 from wingfit.cli.base.files import new_file, write_text
-from wingfit.cli.base.output import duration, emit, moment, note, percent, say, table
+from wingfit.cli.base.output import duration, emit, moment, note, number, percent, say, table
 from wingfit.cli.base.rounding import with_unit
+from wingfit.cli.driving import drive_job, rig_here, rig_setting
 from wingfit.cli.forces.runs import forces, predict
 from wingfit.cli.jobs import JobKind, check_ended_well, commands, dataset_id, follow, state_of
 from wingfit.cli.results import print_genes, print_result
 from wingfit.client import answers as a
 from wingfit.client.client import DEFAULT_URL, Client
+from wingfit.service.limits import MOST_WORKERS
 from wingfit.service.runs.spec_fields_by_kind import IDLE, VEHICLE_ONLY, WING_ONLY
 from wingfit.service.units import MN
 
 
 def best(run: a.Run) -> str:
-    """Return the smallest misfit of a run so far as text, in mm (tracks) or a unit of force; a dash for none."""
+    """Return the smallest misfit of a run so far as text, in the unit of its kind; a dash for none."""
     if run["kind"] == "tracks":
         return "–" if run["best_mm"] is None else f"{run['best_mm']:.2f} mm"
+    if run["kind"] == "series":
+        return "–" if run["best_percent"] is None else f"{number(run['best_percent'], 3)} % of range"
     return "–" if run["best_mn"] is None else with_unit(run["best_mn"] / MN)
 
 
@@ -86,6 +90,10 @@ def submit(
     axes: o.Axes = None,
     low_pass_hz: o.LowPass = None,
     peel_width_beats: o.PeelWidth = None,
+    rig: o.Rig = None,
+    workers: Annotated[
+        int, typer.Option(min=1, max=MOST_WORKERS, help="With your --rig: processes that simulate here.")
+    ] = 1,
     name: Annotated[str | None, typer.Option(help="A name for the run.")] = None,
     watch_it: Annotated[bool, typer.Option("--watch", help="Stay and show the progress.")] = False,
     url: o.Url = DEFAULT_URL,
@@ -93,15 +101,22 @@ def submit(
 ) -> None:
     """Submit a calibration. Defaults: van der Grinten's thesis for wings, Armanini et al. (2016) for vehicles.
 
+    With your own --rig, this command simulates it, and ends with the run.
+
     Example: wingfit runs submit ID --division 11 --seed 7 --watch
     """
     with Client(url) as client:
-        settings = o.settings(ctx, "dataset", "watch_it", "url", "as_json")
+        own = rig_here(rig)
+        settings = o.settings(ctx, "dataset", "watch_it", "rig", "workers", "url", "as_json") | rig_setting(rig, own)
         run = client.submit_run(dataset_id(client, dataset), **settings)
-        if watch_it:
+        stays = watch_it or own is not None
+        if stays:
             note(f"run {run['id']}")
+        if own is not None and rig is not None:
+            drive_job(client, run["id"], own, rig, workers, "calibrating")
+        if stays:
             run = follow(client, RUNS, run["id"])
-    emit(run, _ended if watch_it else _submitted, as_json=as_json)
+    emit(run, _ended if stays else _submitted, as_json=as_json)
     check_ended_well(RUNS, run)
 
 
@@ -189,7 +204,7 @@ def _show(run: a.Run) -> None:
 def _settings(run: a.Run) -> list[str]:
     """Return "name value" for each setting that the run's kind of dataset and its method use."""
     spec = run["spec"]
-    unused = set(VEHICLE_ONLY if run["kind"] == "tracks" else WING_ONLY)
+    unused = set({"tracks": VEHICLE_ONLY, "forces": WING_ONLY}.get(run["kind"], (*VEHICLE_ONLY, *WING_ONLY)))
     unused |= {*IDLE.get(spec["method"], ()), *(["seed"] if spec["method"] == "gauss_newton" else [])}
     words: dict[type, Callable[..., str]] = {
         bool: lambda value: "yes" if value else "no",

@@ -28,6 +28,7 @@ from wingfit.client.effect_answers import Effect
 from wingfit.client.export_answers import Format
 from wingfit.client.key_client import KeyCalls
 from wingfit.client.load_answers import Loads
+from wingfit.client.series_answers import SeriesResult
 from wingfit.client.transport import (
     DEFAULT_URL,
     CountedFile,
@@ -176,9 +177,9 @@ class Client(DiagnosisCalls, DriveCalls, KeyCalls):
         """Fetch all genes of a run: value in the best genome so far, nominal value, unit and bounds."""
         return cast(a.GenomeInfo, self._json("GET", f"{_run(run_id)}/genome"))
 
-    def result(self, run_id: str) -> a.Result | f.ForceResult:
-        """Fetch the result of a finished run: misfits before and after, and genes; its ``kind``: tracks or forces."""
-        return cast("a.Result | f.ForceResult", self._json("GET", f"{_run(run_id)}/result"))
+    def result(self, run_id: str) -> a.Result | f.ForceResult | SeriesResult:
+        """Fetch the result of a finished run: misfits before and after, and genes; ``kind``: tracks, forces, series."""
+        return cast("a.Result | f.ForceResult | SeriesResult", self._json("GET", f"{_run(run_id)}/result"))
 
     def forces(self, run_id: str, recording: str | None = None, source: f.Source | None = None) -> f.Forces:
         """Fetch recorded and modelled forces of one recording over the beat.

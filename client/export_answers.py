@@ -9,6 +9,7 @@ from typing_extensions import TypedDict
 from wingfit.client.answers import Dataset, GenomeInfo, HistoryItem, Result, Run
 from wingfit.client.diagnosis_answers import Diagnosis
 from wingfit.client.force_answers import ForceResult
+from wingfit.client.series_answers import SeriesResult
 
 Format = Literal["json", "csv", "netcdf"]
 
@@ -31,7 +32,7 @@ class RunExport(Export):
     run: Run
     request: dict[str, Any]
     genome: GenomeInfo | None
-    result: Result | ForceResult | None
+    result: Result | ForceResult | SeriesResult | None
     history: list[HistoryItem]
 
 

@@ -21,6 +21,7 @@ from wingfit.calibration.forces.result import (
 from wingfit.calibration.search import CalibrationSpec
 from wingfit.client import force_answers as f
 from wingfit.client.answers import Result
+from wingfit.client.series_answers import SeriesResult
 from wingfit.records import Condition, Dataset, Recording
 from wingfit.service.answers import answer, checked, in_si
 from wingfit.service.outcomes.requests import PredictionIn
@@ -51,9 +52,11 @@ def result(outcome: ForceResult, spec: CalibrationSpec, dataset: Dataset) -> f.F
     )
 
 
-def stored(kind: str, result: Json) -> Result | f.ForceResult:
-    """Return the JSON answer for ``result``, as stored in the database; ``kind`` is "tracks" or "forces"."""
+def stored(kind: str, result: Json) -> Result | f.ForceResult | SeriesResult:
+    """Return the JSON answer for ``result``, as stored in the database; ``kind``: tracks, forces or series."""
     whole = {"kind": kind} | result
+    if kind == "series":
+        return checked(SeriesResult, whole)
     return checked(Result, whole) if kind == "tracks" else checked(f.ForceResult, whole)
 
 

@@ -34,6 +34,11 @@ def given_rig(stored: Mapping[str, Any]) -> str | RigDeclaration:
     return RigDeclaration.model_validate(stored[DECLARED]) if DECLARED in stored else str(stored[INSTALLED])
 
 
+def requested(stored: Mapping[str, Any]) -> Any:
+    """Return what the request of a job gave as its rig, as JSON."""
+    return stored[DECLARED] if DECLARED in stored else stored[INSTALLED]
+
+
 def rig_of(stored: Mapping[str, Any]) -> Rig:
     """Return the rig of a job; ValueError if it is no longer installed."""
     given = given_rig(stored)

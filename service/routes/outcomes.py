@@ -15,6 +15,7 @@ from wingfit.calibration.search import CalibrationSpec
 from wingfit.client import answers as a
 from wingfit.client.force_answers import Agreement, ForceResult, ForceSimulation
 from wingfit.client.load_answers import Loads
+from wingfit.client.series_answers import SeriesResult
 from wingfit.records import Dataset
 from wingfit.service.answers import answer
 from wingfit.service.container import DOWNLOAD_SLOT, SIMULATION_SLOT, Service, ServiceDep
@@ -31,7 +32,7 @@ from wingfit.service.storage import store
 from wingfit.service.storage.tables import RunRow
 from wingfit.workers.jobs import State
 
-AnyResult = Annotated[a.Result | ForceResult, Field(discriminator="kind")]
+AnyResult = Annotated[a.Result | ForceResult | SeriesResult, Field(discriminator="kind")]
 router = APIRouter(prefix="/v1", tags=["outcomes"])
 
 
@@ -202,7 +203,8 @@ def _chosen(
     """
     row = run_row(service, run_id)
     if row.kind != "tracks":
-        raise conflict(f"run {run_id} is on forces; /v1/runs/{run_id}/forces has them")
+        where = f"; /v1/runs/{run_id}/forces has them" if row.kind == "forces" else ", and no wing"
+        raise conflict(f"run {run_id} is on {row.kind}{where}")
     dataset, spec = service.datasets.flapping(row.dataset_id), store.spec(row)
     wanted = dataset.recordings[0].name if recording is None else recording
     check_recording(dataset, wanted, "query.recording")

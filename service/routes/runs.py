@@ -7,15 +7,18 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Request
 from starlette.responses import JSONResponse, Response
 
+from wingfit.calibration.preparation import prepare_rig
 from wingfit.calibration.search import CalibrationSpec
 from wingfit.calibration.spec import SearchDivisionError
 from wingfit.client.answers import Checked, Page, Run
-from wingfit.records import Dataset
+from wingfit.records import AnyDataset, SeriesDataset, wing_or_vehicle
+from wingfit.rigs.rig import Rig
 from wingfit.service.container import Service, ServiceDep
 from wingfit.service.http import json_reads
 from wingfit.service.http import responses as http
 from wingfit.service.http.problems import error_item, invalid
-from wingfit.service.routes.jobs import Actions, add_job_routes, load, submit_job
+from wingfit.service.rigs.stored_rig import requested_rig, stored_rig
+from wingfit.service.routes.jobs import Actions, add_job_routes, load_any, submit_job
 from wingfit.service.runs import spec_views
 from wingfit.service.runs.request_checks import gene_names, refuse_unknown
 from wingfit.service.runs.requests import RunIn
@@ -64,7 +67,8 @@ def submit(
     def plan() -> RunRow:
         dataset, spec = _planned(service, body)
         name = body.name or spec_views.run_name(dataset, spec)
-        return RunRow(dataset_id=body.dataset_id, kind=dataset.kind, name=name, spec=store.spec_json(spec))
+        rig = None if body.rig is None else stored_rig(body.rig)
+        return RunRow(dataset_id=body.dataset_id, kind=dataset.kind, name=name, spec=store.spec_json(spec), rig=rig)
 
     if validate_only:
         row = plan()
@@ -88,10 +92,14 @@ async def list_runs(
     )
 
 
-def _planned(service: Service, body: RunIn) -> tuple[Dataset, CalibrationSpec]:
+def _planned(service: Service, body: RunIn) -> tuple[AnyDataset, CalibrationSpec]:
     """Return the dataset of a request, and its specification with every default filled in; raise a 422 if invalid."""
-    dataset = load(service, body.dataset_id)
-    spec_views.refuse_foreign(body, dataset)
+    whole = load_any(service, body.dataset_id)
+    spec_views.refuse_foreign(body, whole)
+    rig = requested_rig(body.rig, whole)
+    if isinstance(whole, SeriesDataset) and rig:
+        return whole, _planned_for_rig(body, rig, whole)
+    dataset = wing_or_vehicle(whole)
     spec_views.refuse_cutoff(body.low_pass_hz, dataset.recordings)
     spec_views.refuse_effects(body.effects, dataset, body)
     spec = spec_views.calibration_spec(body)
@@ -106,3 +114,12 @@ def _planned(service: Service, body: RunIn) -> tuple[Dataset, CalibrationSpec]:
         raise invalid("the specification does not fit the dataset", [error_item("body", None, str(error))]) from None
     spec_views.refuse_idle(body, spec.method)
     return dataset, spec
+
+
+def _planned_for_rig(body: RunIn, rig: Rig, dataset: SeriesDataset) -> CalibrationSpec:
+    spec = spec_views.calibration_spec(body)
+    spec_views.refuse_idle(body, spec.method)
+    try:
+        return prepare_rig(spec, rig, dataset).spec
+    except ValueError as error:
+        raise invalid("the specification does not fit the dataset", [error_item("body", None, str(error))]) from None

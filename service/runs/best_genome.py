@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from wingfit.client.answers import GenomeInfo
+from wingfit.records import SeriesDataset, wing_or_vehicle
 from wingfit.service.container import Service
 from wingfit.service.http.problems import conflict
+from wingfit.service.rigs import rig_runs
+from wingfit.service.rigs.stored_rig import rig_of
 from wingfit.service.runs import views
 from wingfit.service.storage import store
 from wingfit.service.storage.tables import RunRow
@@ -24,5 +27,9 @@ def standing(service: Service, row: RunRow) -> GenomeInfo:
     """
     if row.result is not None:
         return GenomeInfo(genes=row.result["genes"], final=True)
-    genes = service.engine.genes(store.spec(row), service.datasets.flapping(row.dataset_id), best(row))
+    spec, dataset = store.spec(row), service.datasets.get(row.dataset_id)
+    if isinstance(dataset, SeriesDataset) and row.rig is not None:
+        genes = rig_runs.genes(spec, rig_of(row.rig), dataset, best(row))
+    else:
+        genes = service.engine.genes(spec, wing_or_vehicle(dataset), best(row))
     return GenomeInfo(genes=[views.gene(gene) for gene in genes], final=False)

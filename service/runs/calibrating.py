@@ -9,11 +9,15 @@ from sqlalchemy.orm import Session
 
 from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.forces.result import ForceResult
-from wingfit.calibration.search import Generation
+from wingfit.calibration.search import CalibrationSpec, Generation
 from wingfit.client.answers import GenerationEvent, Run
+from wingfit.records import SeriesDataset, wing_or_vehicle
+from wingfit.rigs.rig import Rig
 from wingfit.service.datasets.parsed_datasets import Datasets
 from wingfit.service.jobs.job_kind import JobKind, Points, Step
 from wingfit.service.outcomes import force_views
+from wingfit.service.rigs import rig_runs
+from wingfit.service.rigs.stored_rig import rig_of
 from wingfit.service.runs import views
 from wingfit.service.runs.engine import Engine
 from wingfit.service.storage import store
@@ -42,9 +46,13 @@ class Calibrating(JobKind):
 
     def steps(self, row: RunRow, evaluator: Evaluator) -> Iterator[Step]:
         """Yield a step for each generation of the search, then one with the result on every recording."""
-        spec, dataset = store.spec(row), self._datasets.flapping(row.dataset_id)
+        spec, whole = store.spec(row), self._datasets.get(row.dataset_id)
         with self._database.read() as session:
             checkpoint = store.checkpoint(session, row.id)
+        if isinstance(whole, SeriesDataset) and row.rig is not None:
+            yield from _rig_steps(spec, rig_of(row.rig), whole, evaluator, checkpoint)
+            return
+        dataset = wing_or_vehicle(whole)
         for generation in self._engine.calibrate(spec, dataset, evaluator, checkpoint):
             checkpoint = generation.checkpoint
             yield _step(generation)
@@ -55,6 +63,18 @@ class Calibrating(JobKind):
             yield _result(force_views.result(summary, spec, dataset))
         else:
             yield _result(views.result(summary))
+
+
+def _rig_steps(
+    spec: CalibrationSpec, rig: Rig, dataset: SeriesDataset, evaluator: Evaluator, checkpoint: dict[str, Any] | None
+) -> Iterator[Step]:
+    """Yield the steps of a calibration of a rig of the user's own."""
+    for generation in rig_runs.calibrate(spec, rig, dataset, evaluator, checkpoint):
+        checkpoint = generation.checkpoint
+        yield _step(generation)
+    if checkpoint is None:
+        raise ValueError("the search ended without a generation")
+    yield _result(rig_runs.result(rig_runs.summarise(spec, rig, dataset, evaluator, checkpoint)))
 
 
 def _step(generation: Generation) -> Step:
@@ -76,8 +96,8 @@ def _result(outcome: Mapping[str, Any]) -> Step:
     def store_step(_session: Session, row: RunRow, _eta: float | None) -> None:
         row.result = dict(outcome)
         # While the run is running, the best of the current stage; in the end, the misfit to all fitted recordings.
-        row.best_mm, row.best_mn = outcome.get("after_mm"), outcome.get("after_mn")
-        row.best_percent = outcome.get("after_percent")
+        if row.kind != "series":  # of series the result is relative to noise, and the misfit of the search stays
+            row.best_mm, row.best_mn = outcome.get("after_mm"), outcome.get("after_mn")
 
     return Step(1.0, store_step, last=True)
 

@@ -11,12 +11,13 @@ from typing import Generic, TypeVar
 
 from pydantic_core import to_json
 
-from wingfit.client.answers import HistoryItem, Run
+from wingfit.client.answers import HistoryItem
 from wingfit.client.export_answers import Export, RunExport
 from wingfit.service.answers import checked
 from wingfit.service.container import Service
 from wingfit.service.http import csv_text
 from wingfit.service.outcomes import force_views
+from wingfit.service.rigs.stored_rig import requested
 from wingfit.service.runs import best_genome, views
 from wingfit.service.storage import store
 from wingfit.service.storage.database import Database
@@ -70,9 +71,9 @@ def blocks(database: Database, row: RunRow) -> Iterator[list[GenerationRow]]:
 
 def table(database: Database, row: RunRow) -> Iterator[str]:
     """Yield the history as CSV text, one generation per line; the names of columns with a unit end in the unit."""
-    square, misfit = ("m2", "best_mm") if row.kind == "tracks" else ("n2", "best_mn")
+    square, misfit = {"tracks": ("_m2", "best_mm"), "forces": ("_n2", "best_mn")}.get(row.kind, ("", "best_percent"))
     fields = (*COLUMNS, misfit, *MORE_COLUMNS)
-    yield csv_text.lines([[f"{name}_{square}" if name in SQUARES else name for name in fields]])
+    yield csv_text.lines([[f"{name}{square}" if name in SQUARES else name for name in fields]])
     for block in blocks(database, row):
         yield csv_text.lines([[_cell(one, name) for name in fields] for one in block])
 
@@ -82,11 +83,11 @@ def document(service: Service, exported: Exported[RunRow]) -> Iterator[str]:
 
     The head, which needs the dataset, is computed before this function returns; the history while it is sent.
     """
-    row, run = exported.row, views.run(exported.row)
+    row = exported.row
     without_history = RunExport(
         **exported.heading("run-export"),
-        run=run,
-        request=request(run),
+        run=views.run(row),
+        request=request(row),
         genome=None if row.genome is None else best_genome.standing(service, row),
         result=None if row.result is None else force_views.stored(row.kind, row.result),
         history=[],
@@ -102,9 +103,11 @@ def _filled(database: Database, row: RunRow, head: str) -> Iterator[str]:
     yield "]}\n"
 
 
-def request(run: Run) -> dict[str, object]:
+def request(row: RunRow) -> dict[str, object]:
     """Return the body of POST /v1/runs that submits the same run again."""
-    return {"dataset_id": run["dataset_id"], "name": run["name"], **run["spec"]}
+    run = views.run(row)
+    again = {"dataset_id": run["dataset_id"], "name": run["name"], **run["spec"]}
+    return again if row.rig is None else again | {"rig": requested(row.rig)}
 
 
 def _cell(generation: GenerationRow, name: str) -> csv_text.Cell:

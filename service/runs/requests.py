@@ -9,6 +9,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StrictBool
 from pydantic_core import PydanticCustomError
 
 from wingfit.calibration.limits import REAL, WHOLE
+from wingfit.service.rigs.stored_rig import RigIn
 
 Mode = Literal["staged", "joint", "local"]
 Method = Literal["genetic", "cma_es", "gauss_newton", "auto"]
@@ -147,9 +148,14 @@ class RunIn(JobSettings):
     )
 
     dataset_id: Name
+    rig: RigIn | None = None
     name: Title | None = None
-    mode: Annotated[Mode | None, Field(description="null: staged for a wing, local for a vehicle")] = None
-    method: Annotated[Method | None, Field(description="null: genetic for a wing, gauss_newton for a vehicle")] = None
+    mode: Annotated[
+        Mode | None, Field(description="null: staged for a wing, local for a vehicle, joint for series")
+    ] = None
+    method: Annotated[
+        Method | None, Field(description="null: genetic for a wing, gauss_newton for a vehicle, auto for series")
+    ] = None
     population: Annotated[Whole, within("population")] = 50
     stall: Annotated[Whole, within("stall")] = 10
     tolerance: Annotated[Number, within("tolerance")] = 1e-3

@@ -16,11 +16,12 @@ import numpy as np
 
 from wingfit.client.answers import CONDITION, GenomeInfo
 from wingfit.client.force_answers import ByQuantity, Forces
-from wingfit.records import Dataset, Recording
+from wingfit.records import Dataset, Recording, SeriesDataset
 from wingfit.records.files.folder import RECORDINGS
 from wingfit.service.container import Service
 from wingfit.service.http.problems import ProblemError
 from wingfit.service.outcomes import coefficient_source, force_views
+from wingfit.service.rigs.stored_rig import rig_in_words
 from wingfit.service.runs import best_genome, views
 from wingfit.service.runs import netcdf_variables as nc
 from wingfit.service.runs.exports import Exported, blocks, request
@@ -47,22 +48,32 @@ def file(service: Service, exported: Exported[RunRow], genome: GenomeInfo, gone:
 
     ``gone()`` says whether the client has hung up; the next recording is then not simulated, and a 503 raised.
     """
-    dataset = service.datasets.flapping(exported.row.dataset_id)
+    dataset = service.datasets.get(exported.row.dataset_id)
 
     def write(root: Any) -> None:
         root.dimensions = {"generation": exported.row.generations, "gene": len(genome["genes"])}
         _history(root, service.database, exported.row)
         _genes(root, genome["genes"])
-        _recordings(root, service, exported.row, dataset, gone)
+        if not isinstance(dataset, SeriesDataset):  # the simulation of a rig of the user's own may be elsewhere
+            _recordings(root, service, exported.row, dataset, gone)
 
-    row, model = exported.row, "flexible wing" if exported.row.kind == "tracks" else "blade-element model"
-    of_run = {"title": f"calibration {row.name}", "request": json.dumps(request(views.run(row)))}
+    row = exported.row
+    model = {"tracks": "flexible wing", "forces": "blade-element model"}.get(row.kind) or rig_in_words(row.rig) or ""
+    of_run = {"title": f"calibration {row.name}", "request": json.dumps(request(row))}
     return nc.made(write, nc.provenance(row, exported.dataset, model, exported.at) | of_run)
+
+
+# By kind of run: unit of sums of squares, then name and unit of the misfit.
+MISFITS = {
+    "tracks": ("m2", ("best_mm", "mm")),
+    "forces": ("N2", ("best_mn", "mN")),
+    "series": (nc.NO_UNIT, ("best_percent", "percent")),
+}
 
 
 def _history(root: Any, database: Database, row: RunRow) -> None:
     along = ("generation",)
-    square, misfit = ("m2", ("best_mm", "mm")) if row.kind == "tracks" else ("N2", ("best_mn", "mN"))
+    square, misfit = MISFITS[row.kind]
     counts = {
         "sequence": "number of the generation over all stages",
         "generation": "number of the generation in its stage",
