@@ -9,7 +9,7 @@ from dataclasses import replace
 from importlib.metadata import PackageNotFoundError, version
 
 from wingfit.calibration.evaluator import Evaluator
-from wingfit.calibration.preparation import prepare
+from wingfit.calibration.preparation import prepare, prepare_rig
 from wingfit.calibration.problem import base_genome
 from wingfit.diagnosis.evidence.context import FitContext
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
@@ -25,6 +25,7 @@ from wingfit.inference.noise.series_fit import SeriesReduction
 from wingfit.records import AnyRecording, Dataset, Series, SeriesDataset
 from wingfit.records.blas_threads import one_blas_thread
 from wingfit.rigs.rig import Rig
+from wingfit.rigs.rig_model import RigModel
 
 SEARCH_FRACTION = 0.7  # of the work; the rest locates the missing physics and validates the hypothesis
 
@@ -56,7 +57,8 @@ def diagnose(dataset: Dataset, spec: DiagnosisSpec, evaluator: Evaluator) -> Ite
 def diagnose_rig(rig: Rig, dataset: SeriesDataset, spec: DiagnosisSpec, evaluator: Evaluator) -> Iterator[Progress]:
     """Diagnose ``dataset`` with the user's simulation ``rig``; as :func:`diagnose`.
 
-    Of ``spec.calibration``, the genes, fixed values and recordings count; the rest describes wings and vehicles.
+    Of ``spec.calibration``, the effects, genes, fixed values and recordings count; settings that describe wings and
+    vehicles are refused.
     """
     subject, fitted, held_out, free = _prepare_rig(rig, dataset, spec)
     series = SeriesReduction.of(dataset.recordings, fitted)
@@ -66,13 +68,7 @@ def diagnose_rig(rig: Rig, dataset: SeriesDataset, spec: DiagnosisSpec, evaluato
 @one_blas_thread
 def check_diagnosis_of_rig(rig: Rig, dataset: SeriesDataset, spec: DiagnosisSpec) -> None:
     """Raise ValueError where ``spec`` does not fit ``rig`` and ``dataset``; simulates nothing."""
-    subject, fitted, _, free = _prepare_rig(rig, dataset, spec)
-    known = [gene.name for gene in subject.model.genes]
-    for name in (*spec.calibration.genes, *spec.calibration.fixed):
-        if name not in known:
-            raise ValueError(f"unknown gene {name!r}; there are {', '.join(known)}")
-    if not free:
-        raise ValueError("nothing to fit: every gene is fixed")
+    subject, fitted, _, _ = _prepare_rig(rig, dataset, spec)
     WhitenedData.of(fitted, (), spec.policy, SeriesReduction.of(dataset.recordings, fitted))
     select_suspects(subject, spec)
     base_genome(subject.model, {**spec.start, **spec.calibration.fixed})
@@ -153,14 +149,12 @@ def _prepare_rig(
     rig: Rig, dataset: SeriesDataset, spec: DiagnosisSpec
 ) -> tuple[RigSubject, tuple[Series, ...], tuple[Series, ...], tuple[str, ...]]:
     """Return the rig, the recordings to fit and those held out, and the free genes; as :func:`_prepare`."""
-    subject, chosen = RigSubject.of(rig, dataset), spec.calibration.recordings
-    dataset.select(chosen)
-    fitted = tuple(one for one in dataset.fitted if not chosen or one.name in chosen)
-    wanted = spec.calibration.genes or subject.model.searched
-    elsewhere = {gene.name for one in dataset.recordings if one not in fitted for gene in subject.model.genes_of(one)}
-    fixed = {*spec.calibration.fixed, *elsewhere}
-    free = tuple(name for name in subject.model.searched if name in wanted and name not in fixed)
-    return subject, fitted, dataset.select(dataset.held_out), free
+    ready = prepare_rig(spec.calibration, rig, dataset)
+    (stage,) = ready.stages
+    if not isinstance(ready.model, RigModel):
+        raise TypeError("a rig has a model of its own")
+    fitted = dataset.select(one.name for one in stage.recordings)
+    return RigSubject(ready.model), fitted, dataset.select(dataset.held_out), stage.free
 
 
 def _axes(dataset: Dataset, spec: DiagnosisSpec) -> tuple[str, ...]:

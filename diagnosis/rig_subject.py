@@ -5,10 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from wingfit.records import SeriesDataset
 from wingfit.records.array_types import Array, Float
-from wingfit.rigs.dataset_model import model_of
-from wingfit.rigs.rig import Rig
 from wingfit.rigs.rig_model import RigModel
 from wingfit.rigs.suspect import Suspect
 from wingfit.sim.model import Model
@@ -19,11 +16,6 @@ class RigSubject:
     """A rig that the user simulates; ``model`` is nominal."""
 
     model: RigModel
-
-    @classmethod
-    def of(cls, rig: Rig, dataset: SeriesDataset) -> RigSubject:
-        """Return ``rig`` for the recordings of ``dataset``; ValueError where they do not fit together."""
-        return cls(model_of(rig, dataset))
 
     @property
     def suspects(self) -> tuple[Suspect, ...]:

@@ -23,14 +23,15 @@ def checked_rig(
     dataset: SeriesDataset,
     rig: Rig,
     diagnoser: Diagnoser,
+    of_run: CalibrationSpec | None = None,
     genome: Mapping[str, float] | None = None,
 ) -> DiagnosisSpec:
     """Return the specification of a diagnosis of series with their simulation ``rig``; raise a 422 if it does not fit.
 
-    ``genome``: values by gene name from which to start.
+    ``of_run`` and ``genome`` as in :func:`checked`.
     """
     spec_views.refuse_foreign(body, dataset)
-    calibration = CalibrationSpec(genes=tuple(body.genes), fixed=body.fixed, recordings=tuple(body.recordings))
+    calibration = spec_views.calibration_spec(body, of_run or CalibrationSpec())
     start = dict(genome or {})
     spec = DiagnosisSpec(calibration, start, tuple(body.suspects), refits=body.refits)
     try:

@@ -83,4 +83,5 @@ def _run_json(row: tuple[Any, ...]) -> bytes:
     """Return a run as JSON; ``row``: the columns named in RUN. Equal rows give equal JSON, so it is cached."""
     values = dict(zip(RUN, row, strict=True))
     values["spec"] = json.loads(values["spec"])
+    values["rig"] = values["rig"] and json.loads(values["rig"])
     return to_json(views.run_of(values))

@@ -65,7 +65,7 @@ def submit(
         given = given_rig(run.rig) if body.rig is None and run and run.rig else body.rig
         rig, of_run = requested_rig(given, dataset), store.spec(run) if run else None
         if isinstance(dataset, SeriesDataset) and rig:
-            spec = checks.checked_rig(body, dataset, rig, service.diagnoser, _genome(run))
+            spec = checks.checked_rig(body, dataset, rig, service.diagnoser, of_run, _genome(run))
         else:
             known = wing_or_vehicle(dataset)
             spec = checks.checked(body, known, service.engine, service.diagnoser, of_run, _genome(run))

@@ -101,6 +101,17 @@ def test_it_waits_for_a_driver_and_survives_the_death_of_either_side(tmp_path: P
         assert without_time(api.get(f"/v1/diagnoses/{one}/finding")) == alone
 
 
+def drive_here(api: Api, kind: str, job: str, until: Callable[[Json], bool]) -> None:
+    """Simulate for a job until its answer is as wanted."""
+    deadline = time.monotonic() + 20.0
+    while not until(api.get(f"/v1/{kind}/{job}")):
+        assert time.monotonic() < deadline
+        work = api.client.post(f"/v1/drive/{job}/work", json={"driver": "here", "limit": 50, "wait_s": 0.1}).json()
+        results = [_result(call) for call in work["simulations"]]
+        if results:
+            api.client.post(f"/v1/drive/{job}/results", json={"driver": "here", "results": results})
+
+
 def _result(simulation: Json) -> Json:
     recording = decay_rig.dataset().recording(simulation["recording"])
     genes = {"leak.size": 0.0} | simulation["genes"]
