@@ -83,7 +83,7 @@ def _schema_errors(url: str, name: str, text: str) -> list[str]:
 
 @pytest.mark.parametrize("block", CHECKED, ids=lambda block: block.place)
 def test_the_commands_of_a_block_that_is_not_run_exist(block: Any) -> None:
-    assert block.language in ("sh", "console", "python", "yaml", "text", "")
+    assert block.language in ("sh", "console", "python", "yaml", "toml", "text", "")
     named = [
         command for command, _ in commands(block) if block.language in ("sh", "console") or OWN.match(command.strip())
     ]
