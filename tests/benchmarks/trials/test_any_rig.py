@@ -12,7 +12,7 @@ from benchmarks.any_rig.rigs import RIGS
 from benchmarks.any_rig.suite import Mark, counted, covered
 from benchmarks.any_rig.timings import overhead_ms_per_call, readme_commands
 from benchmarks.any_rig.trials import Answer, Trial, sizes_in_model
-from wingfit.records import Channel, Series, SeriesDataset
+from wingfit.records import Channel, Quantity, Series, SeriesDataset
 from wingfit.rigs.rig_model import RigModel
 
 LISTED = [(rig, name) for rig, plant in PLANTS.items() for name in plant.listed]
@@ -33,7 +33,8 @@ def recorded(rig: str, hidden: str, size: float) -> tuple[SeriesDataset, dict[st
     channels = tuple(Channel(name, unit) for name, unit in description.channels.items())
     one = Series("run-0", times, channels, values, {next(iter(description.inputs)): push})
     genes = {f"{g.name}[run-0]": v for g, v in zip(description.recording_genes, plant.start, strict=True)}
-    return SeriesDataset("d", rig, (one,), channels), {**plant.nominal, **genes}
+    inputs = tuple(Quantity(name, unit) for name, unit in description.inputs.items())
+    return SeriesDataset("d", rig, (one,), channels, inputs), {**plant.nominal, **genes}
 
 
 @pytest.mark.parametrize(("rig", "hidden"), [one for one in LISTED if not one[1].startswith("saturation")])
