@@ -11,6 +11,7 @@ import numpy as np
 
 from wingfit.records.array_types import Array, Bool, Float, Mask
 from wingfit.records.recorded import Recorded
+from wingfit.records.series_checks import check_recording, check_recordings
 
 SAME_TIMES = 1e-6  # of the duration: largest difference of the times of repeats
 SAME_INPUTS = 1e-3  # largest relative difference of their inputs
@@ -58,6 +59,8 @@ class Channel:
 class Series:
     """One recording of a rig: ``values`` [T, C] of C channels at T increasing ``times`` (s); NaN if not recorded.
 
+    DatasetError if shapes do not fit, times do not increase, or a number other than a missing value is not finite.
+
     Attributes:
         name: identifier within its dataset.
         times: [T], s; not necessarily even.
@@ -79,6 +82,9 @@ class Series:
     estimates: Mapping[str, float] = field(default_factory=dict)
     repeats: str = ""
     period: float | None = None
+
+    def __post_init__(self) -> None:
+        check_recording(self)
 
     @property
     def kind(self) -> Literal["series"]:
@@ -129,6 +135,8 @@ def belongs_to(gene: str, recording: str) -> bool:
 class SeriesDataset(Recorded[Series]):
     """Recordings of one rig that the user simulates.
 
+    DatasetError if a name is used twice or is unknown, or if a recording does not hold what the dataset lists.
+
     Attributes:
         name: of the dataset.
         rig: name of the rig.
@@ -146,6 +154,9 @@ class SeriesDataset(Recorded[Series]):
     settings: tuple[Quantity, ...] = ()
     held_out: tuple[str, ...] = ()
     description: str = ""
+
+    def __post_init__(self) -> None:
+        check_recordings(self)
 
     @property
     def kind(self) -> Literal["series"]:

@@ -1,4 +1,7 @@
-"""Blind trials of the diagnosis on small rigs of other fields; ``--json`` prints one JSON object as its last line."""
+"""Blind trials of the diagnosis on small rigs of other fields, and times of the tool itself.
+
+``--json`` prints one JSON object as its last line.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +11,7 @@ import tempfile
 from pathlib import Path
 
 from benchmarks.any_rig.suite import Outcome, conduct, counted
+from benchmarks.any_rig.timings import first_finding_minutes, overhead_ms_per_call
 from benchmarks.any_rig.trials import plan
 from benchmarks.common.machine import commit, cpu
 
@@ -30,6 +34,7 @@ def main() -> None:
     for outcome in outcomes:
         print(line(outcome))
     rates = counted(outcomes)
+    rates |= {"overhead_ms_per_call": overhead_ms_per_call(), "first_finding_minutes": first_finding_minutes()}
     print("\n".join(f"{name}: {value}" for name, value in rates.items()))
     if chosen.json:
         print(json.dumps({**rates, "seed": chosen.seed, "commit": commit(), "cpu": cpu()}))

@@ -7,7 +7,7 @@ import pickle
 import time
 from collections.abc import Iterable
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -17,14 +17,19 @@ from benchmarks.any_rig.trials import Answer, Trial, recorded
 from benchmarks.common.progress import show_count
 from benchmarks.concealed.seal import digest
 from wingfit import Finding, SeriesDataset, diagnose
+from wingfit.diagnosis.finding import Interval
 
 Outcome = tuple["Mark", Answer]
+NAMING = ("named", "measurement fault")
 VISIBLE = 1.6  # strength from which a hidden thing counts, as in benchmarks.concealed
 
 
 @dataclass(frozen=True)
 class Mark:
-    """What a diagnosis said: verdict, names, most probable effects, held-out misfits before and after, and seconds."""
+    """What a diagnosis reported: verdict, names, most probable effects, held-out misfits before and after, and seconds.
+
+    ``intervals``: 90 % interval of each gene of the best model by name, where both its ends are known.
+    """
 
     verdict: str
     names: tuple[str, ...]
@@ -34,6 +39,7 @@ class Mark:
     after: float | None
     seconds: float
     remarks: tuple[str, ...] = ()
+    intervals: dict[str, tuple[float, float]] = field(default_factory=dict)
 
 
 def record(trial: Trial, folder: Path) -> str:
@@ -67,7 +73,12 @@ def mark(finding: Finding, seconds: float) -> Mark:
         proof.after.value if proof else None,
         seconds,
         finding.remarks,
+        {one.name: ends for one in finding.genes if (ends := _ends(one.value)) is not None},
     )
+
+
+def _ends(interval: Interval) -> tuple[float, float] | None:
+    return None if interval.low is None or interval.high is None else (interval.low, interval.high)
 
 
 def conduct(trials: list[Trial], folder: Path, jobs: int) -> list[Outcome]:
@@ -103,7 +114,14 @@ def _opened(trial: Trial, folder: Path, sealed: str) -> Answer:
     if digest(text) != sealed:
         raise ValueError(f"the answer of {trial.name} has changed since it was sealed; run it again")
     known = json.loads(text)["answer"]
-    return Answer(Trial(**known["trial"]), known["parameters"], known["size"], known["noise"], known["strength"])
+    return Answer(
+        Trial(**known["trial"]),
+        known["parameters"],
+        known["size"],
+        known["noise"],
+        known["strength"],
+        known.get("sizes", {}),
+    )
 
 
 def percent(marks: Iterable[bool]) -> float | None:
@@ -112,22 +130,35 @@ def percent(marks: Iterable[bool]) -> float | None:
     return round(100.0 * sum(every) / len(every), 1) if every else None
 
 
+def covered(mark: Mark, answer: Answer) -> list[bool]:
+    """Return whether each 90 % interval holds the true size, if the right effect is named; as benchmarks.concealed.
+
+    Intervals that are open at an end, and sizes that the model does not have, are not counted.
+    """
+    if mark.verdict not in NAMING or answer.trial.hidden not in mark.names:
+        return []
+    known = ((mark.intervals[name], size) for name, size in answer.sizes.items() if name in mark.intervals)
+    return [low <= size <= high for (low, high), size in known]
+
+
 def counted(outcomes: list[Outcome]) -> dict[str, object]:
     """Return the rates of ``outcomes`` as the benchmark prints them."""
     nulls = [m for m, a in outcomes if a.trial.group == "null"]
     seen = [(m, a) for m, a in outcomes if a.trial.group == "listed" and a.strength >= VISIBLE]
     others = [(m, a) for m, a in outcomes if a.trial.group == "unlisted" and a.strength >= VISIBLE]
-    named = ("named", "measurement fault")
-    wrong = [m.verdict in named and any(n != a.trial.hidden for n in m.names) for m, a in outcomes]
+    intervals = [one for m, a in outcomes for one in covered(m, a)]
+    wrong = [m.verdict in NAMING and any(n != a.trial.hidden for n in m.names) for m, a in outcomes]
     return {
         "null": len(nulls),
         "null_false_alarms_percent": percent(m.verdict != "adequate" for m in nulls),
         "listed": len(seen),
         "top1_percent": percent(tuple(m.first) == (a.trial.hidden,) for m, a in seen),
-        "exact_percent": percent(m.verdict in named and tuple(m.names) == (a.trial.hidden,) for m, a in seen),
+        "exact_percent": percent(m.verdict in NAMING and tuple(m.names) == (a.trial.hidden,) for m, a in seen),
         "unlisted": len(others),
         "unnamed_percent": percent(m.verdict == "unnamed" for m, _ in others),
         "detected_percent": percent(m.verdict != "adequate" for m, _ in others),
         "wrong_percent": percent(wrong),
+        "intervals": len(intervals),
+        "coverage_percent": percent(intervals),
         "median_seconds": round(float(np.median([m.seconds for m, _ in outcomes])), 1),
     }

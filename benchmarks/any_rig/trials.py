@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -43,7 +43,8 @@ class Trial:
 class Answer:
     """The truth of a trial: parameters, size of what is hidden, noise (relative to the range), and strength.
 
-    ``strength``: residual of the refitted nominal model without noise, divided by the noise.
+    ``strength``: residual of the refitted nominal model without noise, divided by the noise. ``sizes``: value of each
+    gene that the model would have for what is hidden; empty where it has none (:func:`sizes_in_model`).
     """
 
     trial: Trial
@@ -51,6 +52,7 @@ class Answer:
     size: float
     noise: float
     strength: float
+    sizes: dict[str, float] = field(default_factory=dict)
 
     def as_json(self) -> dict[str, Any]:
         """Return the answer as JSON."""
@@ -84,7 +86,28 @@ def recorded(trial: Trial) -> tuple[SeriesDataset, Answer]:
     held_out = tuple(one.name for one in noisy if int(one.name.split("-")[1]) >= EXPERIMENTS)
     inputs = tuple(Quantity(name, RIGS[trial.rig].inputs[name]) for name in clean[0].inputs)
     dataset = SeriesDataset(trial.name, trial.rig, tuple(noisy), noisy[0].quantities, inputs, (), held_out)
-    return dataset, Answer(trial, parameters, size, level, left / level)
+    return dataset, Answer(trial, parameters, size, level, left / level, sizes_in_model(trial, size, dataset))
+
+
+def sizes_in_model(trial: Trial, size: float, dataset: SeriesDataset) -> dict[str, float]:
+    """Return the values that the genes of the hidden thing would have in the model, by name.
+
+    Empty for what the model does not know, and for saturation: the plant limits each recording to a part of its own
+    largest value, the model all of them to one value.
+    """
+    if trial.group != "listed" or trial.hidden.startswith("saturation"):
+        return {}
+    model = RigModel(RIGS[trial.rig], dataset.recordings)
+    (suspect,) = (one for one in model.suspects if one.name == trial.hidden)
+    (gene,) = suspect.genes
+    if not trial.hidden.startswith("crosstalk"):
+        return {gene.name: size}
+    _, name, other = trial.hidden.split(".")  # the model's is relative to the ranges of the channels
+    spans = {
+        channel: max(float(np.ptp(one.values[:, one.channels.index(channel)])) for one in dataset.recordings)
+        for channel in (name, other)
+    }
+    return {gene.name: size * spans[other] / spans[name]}
 
 
 def _clean(plant: Plant, k: int, parameters: dict[str, float], hidden: dict[str, float], rng: Any) -> Series:

@@ -14,11 +14,11 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.common.machine import commit, cpu
-from benchmarks.real import balls, flutter, pendulum
+from benchmarks.real import balls, flutter, pendulum, yeo
 from benchmarks.real.fetch import fetch
 from benchmarks.real.trial import SIBLING, Trial, data_folder, run
 
-TRIALS: tuple[Trial, ...] = (*balls.TRIALS, *pendulum.TRIALS, *flutter.TRIALS)
+TRIALS: tuple[Trial, ...] = (*balls.TRIALS, *pendulum.TRIALS, *flutter.TRIALS, *yeo.TRIALS)
 
 
 def main() -> None:

@@ -10,6 +10,7 @@ from urllib.parse import quote
 
 RAW = "https://raw.githubusercontent.com"
 TIMEOUT = 60.0  # s
+COLOURS, PLACES = ("blue", "orange", "green"), ("leading", "middle", "trailing")  # of the sensors of yeo2011
 
 # place in the data folder: repository, commit, path in the repository
 FILES = {
@@ -30,6 +31,14 @@ FILES = {
         "c4812e2",
         "src/lee/Linear_system_Identification/Measured_data2.mat",
     ),
+    **{
+        f"yeo2011/{name}.csv": ("camUrban/PteraSoftware", "f4020cd", f"validation/{name}.csv")
+        for name in (
+            "extracted_planform_coordinates",
+            "measured_wing_positions",
+            *(f"{colour}_{place}_point_experimental_pressures" for colour in COLOURS for place in PLACES),
+        )
+    },
 }
 BY_HAND = (
     "balls/Ball_drops_data.xls is a spreadsheet: save it as balls/drops.csv with the columns ball, drop (1 or 2), "

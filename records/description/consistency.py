@@ -15,6 +15,7 @@ from wingfit.records.description.wing_file import StationFile, WingFile
 from wingfit.records.description.yaml_text import Path
 from wingfit.records.errors import nearest
 from wingfit.records.limits import MAX_OPEN_AT_START, PLANFORM_MARGIN
+from wingfit.records.series_checks import not_stated, unknown, unstated, used_twice
 from wingfit.records.vehicle import WINGS
 
 Inconsistency = tuple[Path, object, str]
@@ -81,15 +82,13 @@ def _series(dataset: SeriesDatasetFile) -> Iterator[Inconsistency]:
             seen.setdefault(name, here)
     known = [setting.name for setting in dataset.settings]
     for index, recording in enumerate(dataset.recordings):
-        path = ("recordings", index, "settings")
         for name in recording.settings:
             if name not in known:
                 remedy = f"remove it, or list it under settings with its unit; {nearest(name, known)}"
-                yield (*path, name), name, f"no setting is called {name!r}; {remedy}"
-        for name in known:
-            if name not in recording.settings:
-                message = f"recording {recording.name!r} does not state the setting {name!r}; add its value"
-                yield path, None, message
+                yield ("recordings", index, "settings", name), name, f"no setting is called {name!r}; {remedy}"
+    for index, name in unstated(dataset.recordings, dataset.settings):
+        path = ("recordings", index, "settings")
+        yield path, None, not_stated(dataset.recordings[index].name, name)
 
 
 def _starts_closed(motion: MotionFile, path: Path) -> Iterator[Inconsistency]:
@@ -128,7 +127,7 @@ def _unique(
         folded = name.lower() if ignore_case else name
         here = (*path, index, key) if key else (*path, index)
         if seen.get(folded) == name:
-            yield here, name, f"{name!r} is used a second time here; every name must be unique: rename one"
+            yield here, name, used_twice(name)
         elif folded in seen:
             message = f"{name!r} differs from {seen[folded]!r} only by case, which some file systems ignore: rename one"
             yield here, name, message
@@ -139,7 +138,7 @@ def _references(path: Path, names: Sequence[str], known: Sequence[str], what: st
     yield from _unique(path, names)
     for index, name in enumerate(names):
         if name not in known:
-            yield (*path, index), name, f"no {what} is called {name!r}; {nearest(name, known)}"
+            yield (*path, index), name, unknown(what, name, known)
 
 
 def _markers(wing: WingFile) -> Iterator[Inconsistency]:

@@ -22,7 +22,6 @@ from wingfit.records.errors import DatasetError, Faults, nearest
 from wingfit.records.files.forces import AXES
 from wingfit.records.files.plausibility import check_numbers
 from wingfit.records.files.series_dataset import (
-    check_attributes,
     check_series,
     check_together,
     describe_series,
@@ -51,8 +50,8 @@ def assemble(
     if isinstance(checked, SeriesDatasetFile):
         series = list[Series]()
         for _, one, samples in _read_all(checked.recordings, read, room, faults):
-            series.append(to_series(checked, one, samples))
-            check_series(series[-1], where(one.name), partial(at, one.name, samples), faults)
+            found = to_series(checked, one, samples, where(one.name), partial(at, one.name, samples), faults)
+            series += [found] if found else []
         faults.raise_any()
         check_together(series, document, faults)
         faults.raise_any()
@@ -108,16 +107,14 @@ def checked_description(dataset: AnyDataset) -> dict[str, object]:
 
 
 def _checked_series(dataset: SeriesDataset, faults: Faults) -> dict[str, object]:
-    for recording in dataset.recordings:
-        check_attributes(recording, dataset, faults)
-    faults.raise_any()
     data = describe_series(dataset)
     document = Document(f"dataset {dataset.name!r}", data)
     check_description(document)
     numbers = 0
     for recording in dataset.recordings:
         where = f"recording {recording.name!r}"
-        check_series(recording, where, f"{where}, sample {{}}".format, faults)
+        own = recording.times, recording.values, recording.inputs, recording.period
+        check_series(*own, where, f"{where}, sample {{}}".format, faults)
         numbers += recording.values.size + recording.times.size * (1 + len(recording.inputs))
     if numbers > MAX_VALUES:
         faults.extend(too_much(document.file))

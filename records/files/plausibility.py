@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from wingfit.records import limits
 from wingfit.records.array_types import Array, Float
 from wingfit.records.dataset import STANDARD_GRAVITY, Recording
 from wingfit.records.errors import Faults
+from wingfit.records.series_checks import SHOWN, Locate, check_times
 from wingfit.records.vehicle import Vehicle
 from wingfit.records.wing import Wing
 
-Locate = Callable[[int], str]
-_SHOWN = 3
 ABSURD = 1e6  # weights: in no unit is the weight so large a number
 
 
@@ -31,7 +28,7 @@ def check_numbers(recording: Recording, rig: Wing | Vehicle, where: str, at: Loc
         faults.add(where, markers, f"{markers} markers; it must be 1 to {limits.MAX_MARKERS}: add or remove some")
     increasing = check_times(times, at, faults)
     infinite = np.flatnonzero(np.isinf(values).any(axis=1))
-    for row in infinite[:_SHOWN]:
+    for row in infinite[:SHOWN]:
         faults.add(at(int(row)), "inf", f"a {quantity} is infinite; it must be finite, or missing")
     if infinite.size or not values.size:
         return
@@ -53,22 +50,6 @@ def check_frames(frames: int, where: str, faults: Faults, what: str = "frames") 
         faults.add(where, frames, message)
 
 
-def check_times(times: Float[Array, " T"], at: Locate, faults: Faults) -> bool:
-    """Return whether the times [T] (s) are finite and increase; add faults for the first rows at which not."""
-    bad = np.flatnonzero(~np.isfinite(times))
-    for row in bad[:_SHOWN]:
-        faults.add(at(int(row)), times[row], "time_s is missing or not finite; every row needs its time in seconds")
-    if bad.size:
-        return False
-    back = np.flatnonzero(np.diff(times) <= 0) + 1
-    for row in back[:_SHOWN]:
-        before, here = float(times[row - 1]), float(times[row])
-        how = "the same as" if here == before else "before"
-        message = f"time_s is {here!r} s, {how} the one above, {before!r} s; times must increase: sort the rows"
-        faults.add(at(int(row)), here, message)
-    return not back.size
-
-
 def _check_positions(
     values: Float[Array, "T C"], markers: tuple[str, ...], wing: Wing, where: str, faults: Faults
 ) -> None:
@@ -87,7 +68,7 @@ def _check_positions(
         faults.add(where, f"{distance:.4g}", message)
         return
     each = np.array([_typical(values[:, 3 * k : 3 * k + 3], hinge) for k in range(len(markers))])
-    for k in np.flatnonzero(each > limit)[:_SHOWN]:
+    for k in np.flatnonzero(each > limit)[:SHOWN]:
         message = (
             f"marker {markers[k]} is typically {each[k]:.4g} m from the hinge, the others {distance:.4g} m (limit "
             f"{limit:.4g} m): convert it to metres, in the wing frame, or leave it out"
@@ -158,7 +139,7 @@ def _check_clock(recording: Recording, where: str, at: Locate, faults: Faults) -
     steps = np.diff(times)
     step = float(np.median(steps))
     uneven = np.flatnonzero(np.abs(steps - step) > limits.UNEVEN_STEPS * step) + 1
-    for row in uneven[:_SHOWN]:
+    for row in uneven[:SHOWN]:
         message = (
             f"time_s is {steps[row - 1]:.6g} s after the one above, typically {step:.6g} s; steps must be equal within "
             f"{100 * limits.UNEVEN_STEPS:g} %: write times with more digits, give lost samples a row with empty cells, "

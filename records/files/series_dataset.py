@@ -2,39 +2,52 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from wingfit.records.array_types import Array, Float
 from wingfit.records.description.convert import to_dataclass
 from wingfit.records.description.dataset_file import SeriesDatasetFile
 from wingfit.records.description.series_file import SeriesRecordingFile
 from wingfit.records.description.yaml_text import Document
-from wingfit.records.errors import Faults, nearest
-from wingfit.records.files.plausibility import Locate, check_frames, check_times
+from wingfit.records.errors import Faults
+from wingfit.records.files.plausibility import check_frames
 from wingfit.records.files.table import Samples
 from wingfit.records.limits import FORMAT_VERSION
 from wingfit.records.series import Channel, Quantity, Series, SeriesDataset, difference_of_repeats
+from wingfit.records.series_checks import Locate, check_samples
 from wingfit.records.units import from_si
 
-_SHOWN = 3
 _PERIOD = "check its unit (s), record at least one period, or leave it out"
 
 
-def to_series(checked: SeriesDatasetFile, entry: SeriesRecordingFile, samples: Samples) -> Series:
-    """Return the recording that ``entry`` of the description ``checked`` describes, with its ``samples``."""
+def to_series(
+    checked: SeriesDatasetFile, entry: SeriesRecordingFile, samples: Samples, where: str, at: Locate, faults: Faults
+) -> Series | None:
+    """Return the recording that ``entry`` of the description ``checked`` describes, with its ``samples``.
+
+    None if they have errors, which are added to ``faults`` as in :func:`check_series`.
+    """
     channels = quantities(checked)[0]
     columns = {name: k for k, name in enumerate(samples.quantities)}
+    values = np.ascontiguousarray(samples.values[:, [columns[one.name] for one in channels]])
+    inputs = {one.name: samples.values[:, columns[one.name]].copy() for one in checked.inputs}
+    period = None if entry.period_s is None else float(entry.period_s)
+    before = faults.count
+    check_series(samples.times, values, inputs, period, where, at, faults)
+    if faults.count > before:
+        return None
     return Series(
         name=entry.name,
         times=samples.times,
         quantities=channels,
-        values=np.ascontiguousarray(samples.values[:, [columns[one.name] for one in channels]]),
-        inputs={one.name: samples.values[:, columns[one.name]].copy() for one in checked.inputs},
+        values=values,
+        inputs=inputs,
         settings={name: float(value) for name, value in entry.settings.items()},
         estimates={name: float(value) for name, value in entry.estimates.items()},
         repeats=entry.repeats or "",
-        period=None if entry.period_s is None else float(entry.period_s),
+        period=period,
     )
 
 
@@ -109,56 +122,28 @@ def samples_of(recording: Series) -> Samples:
     return Samples(recording.times, values, np.arange(len(recording.times)), quantities=names)
 
 
-def check_attributes(recording: Series, dataset: SeriesDataset, faults: Faults) -> None:
-    """Add a fault for each attribute of ``recording`` that cannot be stored in files of ``dataset``."""
-    where = f"recording {recording.name!r}"
-    if recording.quantities != dataset.channels:
-        message = "are not the channels of the dataset; all recordings must have these, in the same order"
-        faults.add(f"{where}: quantities", ", ".join(recording.channels), message)
-        return
-    listed = [one.name for one in dataset.inputs]
-    for name in recording.inputs:
-        if name not in listed:
-            message = f"no input of the dataset is called {name!r}; {nearest(name, listed)}"
-            faults.add(f"{where}: inputs", name, message)
-    for name in listed:
-        if name not in recording.inputs:
-            faults.add(f"{where}: inputs", None, f"the input {name!r} of the dataset is missing; add it")
-    times = len(recording.times)
-    wanted: list[tuple[str, object, tuple[int, ...]]] = [
-        ("times", recording.times, (times,)),
-        ("values", recording.values, (times, len(recording.channels))),
-        *((f"inputs[{name!r}]", samples, (times,)) for name, samples in recording.inputs.items()),
-    ]
-    for what, array, shape in wanted:
-        if np.shape(np.asarray(array)) != shape or np.asarray(array).dtype != np.float64:
-            found = f"{np.asarray(array).dtype} {list(np.shape(np.asarray(array)))}"
-            message = f"is {found}; it must be float64 {list(shape)}: convert or transpose it"
-            faults.add(f"{where}: {what}", found, message)
-
-
-def check_series(recording: Series, where: str, at: Locate, faults: Faults) -> None:
-    """Add a fault for each error in the times, values and inputs of ``recording``.
+def check_series(
+    times: Float[Array, " T"],
+    values: Float[Array, "T C"],
+    inputs: Mapping[str, Float[Array, " T"]],
+    period: float | None,
+    where: str,
+    at: Locate,
+    faults: Faults,
+) -> None:
+    """Add a fault for each error in the times (s), channels and inputs of a recording with a ``period`` (s) or none.
 
     In messages, ``where`` is the place of the recording and ``at(row)`` that of one row.
     """
-    check_frames(len(recording.times), where, faults, "samples")
-    increasing = check_times(recording.times, at, faults)
-    for row in np.flatnonzero(np.isinf(recording.values).any(axis=1))[:_SHOWN]:
-        faults.add(at(int(row)), "inf", "a channel is infinite; it must be finite, or missing")
-    for name, samples in recording.inputs.items():
-        for row in np.flatnonzero(~np.isfinite(samples))[:_SHOWN]:
-            message = (
-                f"input {name!r} has no finite value; an input needs one in every row: interpolate, or cut the row"
-            )
-            faults.add(at(int(row)), None, message)
-    if recording.values.size and np.isnan(recording.values).all():
+    check_frames(len(times), where, faults, "samples")
+    increasing = check_samples(times, values, inputs, at, faults)
+    if values.size and np.isnan(values).all():
         faults.add(where, None, "no channel has a value; leave the recording out")
-    if increasing and recording.period is not None and len(recording.times) > 1:
-        covered = float(np.ptp(recording.times) + np.median(np.diff(recording.times)))
-        if recording.period > covered:
-            message = f"period_s is {recording.period:.6g} s, but the recording lasts {covered:.6g} s; {_PERIOD}"
-            faults.add(where, recording.period, message)
+    if increasing and period is not None and len(times) > 1:
+        covered = float(np.ptp(times) + np.median(np.diff(times)))
+        if period > covered:
+            message = f"period_s is {period:.6g} s, but the recording lasts {covered:.6g} s; {_PERIOD}"
+            faults.add(where, period, message)
 
 
 def check_together(recordings: Sequence[Series], document: Document, faults: Faults) -> None:

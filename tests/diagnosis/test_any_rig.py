@@ -14,7 +14,7 @@ from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.rig_check import check_rig
 from wingfit.diagnosis.verdict.weigh_hypotheses import nominal_refuted
 from wingfit.inference.noise.series_fit import SeriesReduction
-from wingfit.records import Channel, Quantity
+from wingfit.records import Channel
 from wingfit.records.array_types import Array
 from wingfit.rigs.load import load_rig
 from wingfit.rigs.rig import Rig
@@ -140,17 +140,16 @@ def test_the_contract_holds(rig: Rig, recorded: SeriesDataset) -> None:
 
 
 @pytest.mark.parametrize(
-    ("changes", "message"),
+    ("channel", "message"),
     [
-        ({"channels": (Channel("angle", "deg"),)}, "'angle' is in 'deg' in dataset 'pendulum', but in 'rad'"),
-        ({"channels": (Channel("speed", "rad/s"),)}, "has a channel 'speed', which rig 'pendulum' does not simulate"),
+        (Channel("angle", "deg"), "'angle' is in 'deg' in dataset 'pendulum', but in 'rad'"),
+        (Channel("speed", "rad/s"), "has a channel 'speed', which rig 'pendulum' does not simulate"),
     ],
 )
-def test_what_does_not_fit_together_is_named(
-    rig: Rig, recorded: SeriesDataset, changes: dict[str, tuple[Channel | Quantity, ...]], message: str
-) -> None:
+def test_what_does_not_fit_together_is_named(rig: Rig, recorded: SeriesDataset, channel: Channel, message: str) -> None:
+    recordings = tuple(replace(one, quantities=(channel,)) for one in recorded.recordings)
     with pytest.raises(ValueError, match=message):
-        diagnose(replace(recorded, **changes), rig=rig)  # type: ignore[arg-type]
+        diagnose(replace(recorded, channels=(channel,), recordings=recordings), rig=rig)
 
 
 def test_an_estimate_of_an_unknown_gene_is_named(rig: Rig, recorded: SeriesDataset) -> None:

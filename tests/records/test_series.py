@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import wingfit
 from tests.records.samples import falcon_dataset
 from tests.records.series_samples import arm_dataset
 from wingfit.client.transport import WingfitError
-from wingfit.records import save_dataset, wing_or_vehicle
+from wingfit.records import Channel, DatasetError, Series, SeriesDataset, save_dataset, wing_or_vehicle
 from wingfit.records.series import SAME_TIMES, difference_of_repeats
 from wingfit.service.diagnoses import local
 
@@ -44,3 +46,44 @@ def test_repeats_have_the_same_times_settings_and_inputs() -> None:
     assert difference_of_repeats(first, replace(other, settings={"mass": 0.2, "gear": 20.0})) == "settings"
     inputs = {"voltage": other.inputs["voltage"] * 1.01}
     assert difference_of_repeats(first, replace(other, inputs=inputs)) == "inputs"
+
+
+def changed(**changes: object) -> Series:
+    return replace(arm_dataset(12).recordings[0], **changes)  # type: ignore[arg-type]
+
+
+def shuffled() -> Series:
+    times = arm_dataset(12).recordings[0].times.copy()
+    times[4], times[5] = times[5], times[4]
+    return changed(times=times)
+
+
+def with_recordings(*recordings: Series) -> SeriesDataset:
+    return replace(arm_dataset(12), recordings=recordings, held_out=())
+
+
+@pytest.mark.parametrize(
+    ("message", "make"),
+    [
+        (r"recording 'light-1', sample 5: time_s is .* times must increase: sort the rows", shuffled),
+        (
+            r"recording 'light-1': settings.mass: is inf; give a finite number",
+            lambda: changed(settings={"mass": np.inf}),
+        ),
+        (r"recording 'light-1': estimates.angle0: is NaN; give", lambda: changed(estimates={"angle0": np.nan})),
+        (r"period: is 0 s; give a positive number of seconds, or None", lambda: changed(period=0.0)),
+        (r"recordings\[1\]: 'light-1' is used a second time here", lambda: with_recordings(changed(), changed())),
+        (r"the input 'voltage' of the dataset is missing; add it", lambda: with_recordings(changed(inputs={}))),
+        (r"does not state the setting 'gear'; add", lambda: with_recordings(changed(settings={"mass": 0.1}))),
+        (r"are not the channels", lambda: with_recordings(changed(quantities=(Channel("angle", "deg"),) * 3))),
+        (r"no recording is called 'heavyest'; did you mean", lambda: replace(arm_dataset(), held_out=("heavyest",))),
+    ],
+)
+def test_a_wrong_series_cannot_be_made(message: str, make: Callable[[], object]) -> None:
+    with pytest.raises(DatasetError, match=message):
+        make()
+
+
+def test_a_series_without_samples_is_a_series() -> None:
+    empty = Series("empty", np.zeros(0), (Channel("x", "m"),), np.zeros((0, 1)))
+    assert SeriesDataset("d", "rig", (empty,), empty.quantities).recordings == (empty,)

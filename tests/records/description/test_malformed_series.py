@@ -271,10 +271,12 @@ UNSAVED: dict[str, Callable[[], SeriesDataset]] = {
     "sample 0: input 'voltage' has no finite value": lambda: _first(inputs={"voltage": VOLTAGE * np.nan}),
     "settings.gear: is NaN": lambda: _first(settings={"mass": 0.1, "gear": np.nan}),
     "does not state the setting 'gear'": lambda: _first(settings={"mass": 0.1}),
-    "period_s: is -1": lambda: _first(period=-1.0),
+    "period: is -1 s": lambda: _first(period=-1.0),
     "repeats: is 'a b'": lambda: _first(repeats="a b"),
     "letters, digits": lambda: _first(name="../x"),
-    r"channels\[0\].unit: is empty": lambda: replace(_first(), channels=(Channel("a", ""),), recordings=()),
+    r"channels\[0\].unit: is empty": lambda: replace(
+        _first(), channels=(Channel("a", ""),), recordings=(), held_out=()
+    ),
     "at least 1 are needed": lambda: replace(_first(), recordings=(), held_out=()),
     "never changes": lambda: replace(arm_dataset(12), recordings=(_still(),), held_out=()),
 }

@@ -1,0 +1,153 @@
+"""Checks of a series in memory, also used where files are read: shapes, order of times, finite numbers, names."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+from wingfit.records.array_types import Array, Float
+from wingfit.records.errors import Faults, nearest
+
+if TYPE_CHECKING:
+    from wingfit.records.series import Series, SeriesDataset
+
+Locate = Callable[[int], str]
+SHOWN = 3
+
+
+class _Named(Protocol):
+    @property
+    def name(self) -> str: ...
+
+
+class _WithSettings(_Named, Protocol):
+    @property
+    def settings(self) -> Mapping[str, object]: ...
+
+
+def check_recording(recording: Series) -> None:
+    """Raise DatasetError unless shapes fit, times increase, and inputs, settings and estimates are finite."""
+    where, faults = f"recording {recording.name!r}", Faults()
+    _check_shapes(recording, where, faults)
+    faults.raise_any()
+    check_samples(recording.times, recording.values, recording.inputs, f"{where}, sample {{}}".format, faults)
+    for what, numbers in (("settings", recording.settings), ("estimates", recording.estimates)):
+        for name, value in numbers.items():
+            if not np.isfinite(value):
+                faults.add(f"{where}: {what}.{name}", value, f"is {_plain(value)}; give a finite number")
+    if recording.period is not None and not 0.0 < recording.period < np.inf:
+        message = f"is {_plain(recording.period)} s; give a positive number of seconds, or None if it is not periodic"
+        faults.add(f"{where}: period", recording.period, message)
+    faults.raise_any()
+
+
+def check_recordings(dataset: SeriesDataset) -> None:
+    """Raise DatasetError unless names are unique, and all recordings hold what ``dataset`` lists."""
+    where, faults = f"dataset {dataset.name!r}", Faults()
+    names = [one.name for one in dataset.recordings]
+    for index, name in enumerate(names):
+        if name in names[:index]:
+            faults.add(f"{where}: recordings[{index}]", name, used_twice(name))
+    for name in dataset.held_out:
+        if name not in names:
+            faults.add(f"{where}: held_out", name, unknown("recording", name, names))
+    for recording in dataset.recordings:
+        _check_quantities(recording, dataset, faults)
+    for index, name in unstated(dataset.recordings, dataset.settings):
+        faults.add(f"{where}: recordings[{index}]", None, not_stated(names[index], name))
+    faults.raise_any()
+
+
+def used_twice(name: str) -> str:
+    """Return the message about a ``name`` that is used before."""
+    return f"{name!r} is used a second time here; every name must be unique: rename one"
+
+
+def unknown(what: str, name: str, known: Sequence[str]) -> str:
+    """Return the message about the ``name`` of a ``what``, such as "recording", that is not among the ``known``."""
+    return f"no {what} is called {name!r}; {nearest(name, known)}"
+
+
+def unstated(recordings: Sequence[_WithSettings], settings: Sequence[_Named]) -> Iterator[tuple[int, str]]:
+    """Yield the index of a recording and the name of a setting, for each of ``settings`` that it does not state."""
+    for index, recording in enumerate(recordings):
+        yield from ((index, one.name) for one in settings if one.name not in recording.settings)
+
+
+def not_stated(recording: str, setting: str) -> str:
+    """Return the message about a ``setting`` that the recording of this name does not state."""
+    return f"recording {recording!r} does not state the setting {setting!r}; add its value"
+
+
+def check_samples(
+    times: Float[Array, " T"],
+    values: Float[Array, "T C"],
+    inputs: Mapping[str, Float[Array, " T"]],
+    at: Locate,
+    faults: Faults,
+) -> bool:
+    """Add faults where times do not increase, a value is infinite or an input is not finite; ``at(row)`` is a place.
+
+    Returns whether the times are finite and increase.
+    """
+    increasing = check_times(times, at, faults)
+    for row in np.flatnonzero(np.isinf(values).any(axis=1))[:SHOWN]:
+        faults.add(at(int(row)), "inf", "a channel is infinite; it must be finite, or missing")
+    for name, samples in inputs.items():
+        for row in np.flatnonzero(~np.isfinite(samples))[:SHOWN]:
+            message = (
+                f"input {name!r} has no finite value; an input needs one in every row: interpolate, or cut the row"
+            )
+            faults.add(at(int(row)), None, message)
+    return increasing
+
+
+def check_times(times: Float[Array, " T"], at: Locate, faults: Faults) -> bool:
+    """Return whether the times [T] (s) are finite and increase; add faults for the first rows at which not."""
+    bad = np.flatnonzero(~np.isfinite(times))
+    for row in bad[:SHOWN]:
+        faults.add(at(int(row)), times[row], "time_s is missing or not finite; every row needs its time in seconds")
+    if bad.size:
+        return False
+    back = np.flatnonzero(np.diff(times) <= 0) + 1
+    for row in back[:SHOWN]:
+        before, here = float(times[row - 1]), float(times[row])
+        how = "the same as" if here == before else "before"
+        message = f"time_s is {here!r} s, {how} the one above, {before!r} s; times must increase: sort the rows"
+        faults.add(at(int(row)), here, message)
+    return not back.size
+
+
+def _check_shapes(recording: Series, where: str, faults: Faults) -> None:
+    times = np.size(recording.times)
+    wanted: list[tuple[str, object, tuple[int, ...]]] = [
+        ("times", recording.times, (times,)),
+        ("values", recording.values, (times, len(recording.quantities))),
+        *((f"inputs[{name!r}]", samples, (times,)) for name, samples in recording.inputs.items()),
+    ]
+    for what, array, shape in wanted:
+        if np.shape(np.asarray(array)) != shape or np.asarray(array).dtype != np.float64:
+            found = f"{np.asarray(array).dtype} {list(np.shape(np.asarray(array)))}"
+            message = f"is {found}; it must be float64 {list(shape)}: convert or transpose it"
+            faults.add(f"{where}: {what}", found, message)
+
+
+def _check_quantities(recording: Series, dataset: SeriesDataset, faults: Faults) -> None:
+    where = f"recording {recording.name!r}"
+    if recording.quantities != dataset.channels:
+        message = "are not the channels of the dataset; all recordings must have these, in the same order"
+        faults.add(f"{where}: quantities", ", ".join(recording.channels), message)
+        return
+    listed = [one.name for one in dataset.inputs]
+    for name in recording.inputs:
+        if name not in listed:
+            faults.add(f"{where}: inputs", name, unknown("input of the dataset", name, listed))
+    for name in listed:
+        if name not in recording.inputs:
+            faults.add(f"{where}: inputs", None, f"the input {name!r} of the dataset is missing; add it")
+
+
+def _plain(value: float) -> str:
+    return "NaN" if np.isnan(value) else f"{value:g}"
