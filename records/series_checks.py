@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
 
 from wingfit.records.array_types import Array, Float
 from wingfit.records.errors import Faults, nearest
-
-if TYPE_CHECKING:
-    from wingfit.records.series import Series, SeriesDataset
 
 Locate = Callable[[int], str]
 SHOWN = 3
@@ -27,7 +24,41 @@ class _WithSettings(_Named, Protocol):
     def settings(self) -> Mapping[str, object]: ...
 
 
-def check_recording(recording: Series) -> None:
+class _Recording(_Named, Protocol):
+    """A :class:`wingfit.records.series.Series`, whose module imports this one."""
+
+    @property
+    def settings(self) -> Mapping[str, float]: ...
+    @property
+    def times(self) -> Float[Array, " T"]: ...
+    @property
+    def values(self) -> Float[Array, "T C"]: ...
+    @property
+    def quantities(self) -> Sequence[_Named]: ...
+    @property
+    def inputs(self) -> Mapping[str, Float[Array, " T"]]: ...
+    @property
+    def estimates(self) -> Mapping[str, float]: ...
+    @property
+    def period(self) -> float | None: ...
+
+
+class _Dataset(_Named, Protocol):
+    """A :class:`wingfit.records.series.SeriesDataset`."""
+
+    @property
+    def recordings(self) -> Sequence[_Recording]: ...
+    @property
+    def channels(self) -> Sequence[_Named]: ...
+    @property
+    def inputs(self) -> Sequence[_Named]: ...
+    @property
+    def settings(self) -> Sequence[_Named]: ...
+    @property
+    def held_out(self) -> Sequence[str]: ...
+
+
+def check_recording(recording: _Recording) -> None:
     """Raise DatasetError unless shapes fit, times increase, and inputs, settings and estimates are finite."""
     where, faults = f"recording {recording.name!r}", Faults()
     _check_shapes(recording, where, faults)
@@ -43,7 +74,7 @@ def check_recording(recording: Series) -> None:
     faults.raise_any()
 
 
-def check_recordings(dataset: SeriesDataset) -> None:
+def check_recordings(dataset: _Dataset) -> None:
     """Raise DatasetError unless names are unique, and all recordings hold what ``dataset`` lists."""
     where, faults = f"dataset {dataset.name!r}", Faults()
     names = [one.name for one in dataset.recordings]
@@ -120,7 +151,7 @@ def check_times(times: Float[Array, " T"], at: Locate, faults: Faults) -> bool:
     return not back.size
 
 
-def _check_shapes(recording: Series, where: str, faults: Faults) -> None:
+def _check_shapes(recording: _Recording, where: str, faults: Faults) -> None:
     times = np.size(recording.times)
     wanted: list[tuple[str, object, tuple[int, ...]]] = [
         ("times", recording.times, (times,)),
@@ -134,11 +165,11 @@ def _check_shapes(recording: Series, where: str, faults: Faults) -> None:
             faults.add(f"{where}: {what}", found, message)
 
 
-def _check_quantities(recording: Series, dataset: SeriesDataset, faults: Faults) -> None:
+def _check_quantities(recording: _Recording, dataset: _Dataset, faults: Faults) -> None:
     where = f"recording {recording.name!r}"
     if recording.quantities != dataset.channels:
         message = "are not the channels of the dataset; all recordings must have these, in the same order"
-        faults.add(f"{where}: quantities", ", ".join(recording.channels), message)
+        faults.add(f"{where}: quantities", ", ".join(one.name for one in recording.quantities), message)
         return
     listed = [one.name for one in dataset.inputs]
     for name in recording.inputs:

@@ -29,7 +29,7 @@ from wingfit.records.series import Series, difference_of_repeats
 Source = Literal["repeats", "period", "stated", "highest frequencies", "resolution", "other recordings"]
 SOURCES: tuple[Source, ...] = ("highest frequencies", "resolution", "stated", "period", "repeats")  # least sure first
 
-EVEN = 0.02  # of an interval: largest deviation of one that counts as even
+EVEN = 0.1  # of an interval: largest deviation of one that counts as even
 LEAST_PERIODS = 3.0
 BANDS_PER_OCTAVE = 2.0
 LEAST_PER_BAND = 6  # coefficients
@@ -198,7 +198,20 @@ def _even_run(recording: Series, column: int) -> slice:
 def _shown(recording: Series, column: int, stated: float | None = None) -> VisibleNoise | None:
     """Return the noise that the highest frequencies of a channel show, of the ``stated`` deviation if it is known."""
     run = _even_run(recording, column)
-    return visible_noise(recording.values[run, column], stated, [one[run] for one in recording.inputs.values()])
+    values = at_even_times(recording.times[run], recording.values[run, column])
+    return visible_noise(values, stated, [one[run] for one in recording.inputs.values()])
+
+
+def at_even_times(times: Float[Array, " T"], values: Float[Array, " T"]) -> Float[Array, " T"]:
+    """Return ``values`` [T] at evenly spaced times near ``times`` [T], to first order of their differences.
+
+    Else the motion times these differences would look like noise. The noise itself changes by at most EVEN.
+    """
+    if len(times) < 3:
+        return values
+    count = np.arange(len(times))
+    even = np.polynomial.Polynomial.fit(count, times, 1)(count)
+    return np.asarray(values - np.gradient(values, times) * (times - even))
 
 
 def _deviations(shown: Sequence[VisibleNoise | None]) -> Array:

@@ -48,6 +48,18 @@ def test_white_noise_is_estimated_beside_any_slow_motion(motion: str) -> None:
     assert {one.source for one in found} == {"highest frequencies"}
 
 
+def test_times_that_are_not_quite_even_do_not_look_like_noise() -> None:
+    """Here the speed times the differences from even times is as large as the noise."""
+    ratio = []
+    for seed in range(10):
+        step = TIMES[1]
+        times = TIMES + 0.045 * step * np.random.default_rng(seed).uniform(-1.0, 1.0, COUNT)
+        values = 2.0 * np.sin(13.0 * times) + coloured(seed, 0.0)
+        one = Series("one", times, (Channel("y", "m"),), values[:, None])
+        ratio.append(float(noise_of([one])["one"].standard_deviation[0]) / SIGMA)
+    assert np.mean(ratio) == pytest.approx(1.0, abs=0.1)
+
+
 def test_the_colour_of_noise_is_estimated_where_it_is_visible() -> None:
     """At rest, noise is visible at all frequencies: its density is that of the first-order process."""
     frequency = np.array([0.01, 0.05, 0.2, 0.45])
