@@ -15,7 +15,10 @@ from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.finding import Advice, Finding, Floors, GeneValue, Proof, RecordingMisfit, amount
 from wingfit.diagnosis.location.in_series import channel_misfits, series_location, series_overlays
 from wingfit.diagnosis.location.located import Located
+from wingfit.diagnosis.location.series_law import series_law
+from wingfit.diagnosis.rig_subject import RigSubject
 from wingfit.diagnosis.search_state import SearchState
+from wingfit.diagnosis.subject import Subject
 from wingfit.diagnosis.verdict.locate_in_beat import locate_in_beat
 from wingfit.diagnosis.verdict.next_experiment import rank_conditions, separations
 from wingfit.diagnosis.verdict.noise_remarks import drift_sentence, noise_remarks
@@ -71,13 +74,19 @@ def _locate(
     if state.data.kind != "series":
         yield from locate_in_beat(state, decision, best, fitted, held_out)
         return
-    data, coefficients = state.data, state.fitted_nominal.refit.fit.coefficients
+    data, nominal = state.data, state.fitted_nominal.refit.fit
+    coefficients = nominal.coefficients
     shown = list(series_overlays(data, fitted.before, fitted.after, held_out=False))
     if held_out is not None:
         shown += series_overlays(held_out.data, held_out.before, held_out.after, held_out=True)
     where = series_location(data, coefficients, fitted.before)
     channels = channel_misfits(data, coefficients, best.fit.coefficients)
-    yield 1.0, "locating the misfit", Located(where, tuple(shown), channels=channels)
+    law = series_law(data, nominal, _input_units(state.subject)) if decision.verdict == "unnamed" else None
+    yield 1.0, "locating the misfit", Located(where, tuple(shown), law=law, channels=channels)
+
+
+def _input_units(subject: Subject) -> Mapping[str, str]:
+    return subject.model.rig.inputs if isinstance(subject, RigSubject) else {}
 
 
 def _finding(
