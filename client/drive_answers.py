@@ -20,12 +20,16 @@ class Simulation(TypedDict):
 
     ``id`` identifies it in the answer; ``recording`` is one of the dataset; ``effects`` are the suspects that are added
     to the rig; ``genes`` has the value of every gene by its name in the rig, in its unit, also of those effects.
+    ``settings`` has settings that differ from those of the recording, ``input_factors`` what inputs are multiplied by;
+    both are empty but where experiments are compared that were not recorded.
     """
 
     id: str
     recording: str
     effects: list[str]
     genes: dict[str, float]
+    settings: dict[str, float]
+    input_factors: dict[str, float]
 
 
 class Work(TypedDict):

@@ -273,22 +273,32 @@ class FreeLaw:
 
 
 @dataclass(frozen=True)
-class Advice:
-    """A condition to record next, because predictions of the hypotheses ``between`` differ there.
+class AdvisedCondition:
+    """A condition of a flapping rig to record; ``airspeed`` in m/s."""
 
-    ``separation``: root mean square difference of the predictions in standard deviations of the noise; ``resolves``:
-    estimated probability that the recording decides between the hypotheses; ``airspeed`` in m/s.
-    """
-
-    words: str
     flap_frequency_hz: float
     phase_lag_deg: float
     pressure_mbar: float
     airspeed: float
     angle_of_attack_deg: float
+
+
+@dataclass(frozen=True)
+class Advice:
+    """What to record next, because predictions of the hypotheses ``between`` differ there.
+
+    ``separation``: root mean square difference of the predictions in standard deviations of the noise; ``resolves``:
+    estimated probability that the recording decides between the hypotheses. Of a flapping rig the ``condition`` is
+    given; of any other the ``recording`` that is made again, and the ``change``. The rest is None.
+    """
+
+    words: str
     separation: float
     resolves: float
     between: tuple[str, ...]
+    condition: AdvisedCondition | None = None
+    recording: str | None = None
+    change: str | None = None
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ from wingfit.client.answers import FINAL
 from wingfit.client.client import Client
 from wingfit.client.drive_answers import Simulation, Work
 from wingfit.client.transport import WingfitError, is_passing
-from wingfit.records import SeriesDataset, load_dataset
+from wingfit.records import Series, SeriesDataset, load_dataset
 from wingfit.rigs.declaration import declaration
 from wingfit.rigs.rig import Rig
 from wingfit.rigs.rig_model import RigModel
@@ -113,7 +113,7 @@ class _Simulator:
         effects = tuple(simulation["effects"])
         if effects not in self._models:
             self._models[effects] = self._model.with_effects(*effects)
-        recording = self._dataset.recording(simulation["recording"])
+        recording = _changed(self._dataset.recording(simulation["recording"]), simulation)
         channels, reason = self._models[effects].simulated(simulation["genes"], recording)
         if reason is None and not np.isfinite(channels).all():
             reason = "a simulated channel is not finite"
@@ -121,6 +121,15 @@ class _Simulator:
             return {"id": simulation["id"], "reason": reason[:2000]}
         columns = zip(recording.channels, channels.T.tolist(), strict=True)
         return {"id": simulation["id"], "channels": dict(columns)}
+
+
+def _changed(recording: Series, simulation: Simulation) -> Series:
+    """Return ``recording`` with the settings and inputs of ``simulation``."""
+    settings, factors = simulation["settings"], simulation["input_factors"]
+    if not settings and not factors:
+        return recording
+    inputs = {name: factors.get(name, 1.0) * values for name, values in recording.inputs.items()}
+    return replace(recording, settings={**recording.settings, **settings}, inputs=inputs)
 
 
 _HERE: list[_Simulator] = []  # in a worker process

@@ -291,7 +291,9 @@ def _advice(outcome: Outcome) -> Condition | None:
     """The first condition that a finding recommends; None if it recommends none."""
     if outcome.finding is None or not outcome.finding.advice:
         return None
-    best = outcome.finding.advice[0]
+    best = outcome.finding.advice[0].condition
+    if best is None:
+        return None
     return Condition(
         flap_frequency=best.flap_frequency_hz,
         phase_lag=float(np.radians(best.phase_lag_deg)),

@@ -21,6 +21,7 @@ from wingfit.diagnosis.search_state import SearchState
 from wingfit.diagnosis.subject import Subject
 from wingfit.diagnosis.verdict.locate_in_beat import locate_in_beat
 from wingfit.diagnosis.verdict.next_experiment import rank_conditions, separations
+from wingfit.diagnosis.verdict.next_series import Candidate, rank_recordings, series_separations
 from wingfit.diagnosis.verdict.noise_remarks import drift_sentence, noise_remarks
 from wingfit.diagnosis.verdict.proof import ResidualPair, predict_held_out, proof, recording_misfits
 from wingfit.diagnosis.verdict.reservations import (
@@ -31,7 +32,7 @@ from wingfit.diagnosis.verdict.reservations import (
 )
 from wingfit.diagnosis.verdict.series_remarks import series_remarks
 from wingfit.diagnosis.verdict.verdict import Decision, decide, hypotheses, summary
-from wingfit.records import AnyRecording
+from wingfit.records import AnyRecording, Condition
 
 Step = tuple[float, str, Finding | None]
 
@@ -58,14 +59,27 @@ def build_finding(state: SearchState, name: str, held_out: Sequence[AnyRecording
     if located is None:
         raise ValueError("the misfit was not located")
     advice: tuple[Advice, ...] = ()
-    if decision.verdict != "adequate" and state.data.kind != "series":
-        apart = []
-        for part, one in separations(state.context, weights):
-            apart += [one] if one else []
-            yield 0.75 + 0.2 * part, "comparing conditions to record next", None
-        advice = rank_conditions(state.data, weights, apart)
+    if decision.verdict != "adequate":
+        for part, ranked in _advice(state):
+            advice = ranked
+            yield 0.75 + 0.2 * part, "comparing what to record next", None
     finding = _finding(state, name, decision, best, own, validation, advice, located)
     yield 1.0, "done", replace(finding, remarks=(*finding.remarks, *failed))
+
+
+def _advice(state: SearchState) -> Iterator[tuple[float, tuple[Advice, ...]]]:
+    """Compare what could be recorded next; yields the fraction done and the advice so far."""
+    context, weights = state.context, state.final_weights
+    if state.data.kind == "series":
+        tried = list[tuple[float, Candidate]]()
+        for part, candidate in series_separations(context, weights):
+            tried += [candidate] if candidate else []
+            yield part, rank_recordings(context, weights, tried)
+        return
+    apart = list[tuple[float, Condition]]()
+    for part, condition in separations(context, weights):
+        apart += [condition] if condition else []
+        yield part, rank_conditions(state.data, weights, apart)
 
 
 def _locate(

@@ -12,12 +12,12 @@ from wingfit.diagnosis.evidence.context import FitContext
 from wingfit.diagnosis.evidence.fit import PRIOR_SD, Fit
 from wingfit.diagnosis.evidence.refit import Refit
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
-from wingfit.diagnosis.finding import Advice
+from wingfit.diagnosis.finding import Advice, AdvisedCondition
 from wingfit.diagnosis.subject import beat_subject
 from wingfit.diagnosis.verdict.weigh_hypotheses import HypothesisWeights, tolerated_excess
 from wingfit.inference.differences import Outputs, differences
 from wingfit.records import Condition, Recording
-from wingfit.records.array_types import Array, Float
+from wingfit.records.array_types import Array, Bool, Float, Mask
 
 MIN_PROBABILITY = 0.02  # of a hypothesis that is compared
 MAX_RIVALS = 3  # hypotheses that are compared
@@ -111,48 +111,68 @@ def separation(
     white, slopes = found.outputs[0][seen] / data.noise, found.slopes[0][seen].T / data.noise
     whole = float(white @ white)
     if adapt:
-        whole -= _explained_by_genes(data, rival, white, slopes)
+        lag1 = float(np.mean([beat_fit.lag1 for beat_fit in data.beat_fits]))
+        whole -= explained_by_genes(data, rival, white, slopes, lag1=lag1)
     return float(np.sqrt(max(whole, 0.0) / len(white)))
 
 
-def _explained_by_genes(data: WhitenedData, rival: Fit, difference: Array, slopes: Array) -> float:
+def explained_by_genes(
+    data: WhitenedData,
+    rival: Fit,
+    difference: Float[Array, " n"],
+    slopes: Float[Array, "F n"],
+    *,
+    lag1: float,
+    unknown: Bool[Mask, " F"] | None = None,
+) -> float:
     """Return the part of the square of ``difference`` [n] that the rival's genes explain, minus the penalty for that.
 
     ``difference`` is divided by the noise, as are the ``slopes`` [F, n], its derivatives with respect to the genes.
+    ``lag1``: correlation of successive samples of the noise; ``unknown`` [F]: genes about which the existing recordings
+    say nothing, such as the start of a new one.
     """
-    lag1 = float(np.clip(np.mean([beat_fit.lag1 for beat_fit in data.beat_fits]), 0.0, 0.99))
+    lag1 = float(np.clip(lag1, 0.0, 0.99))
     weight = data.likelihood_weight(rival.coefficients)
     counts = weight * (1.0 - lag1) / (1.0 + lag1)  # weight of a sample, less for correlated noise
     known = rival.jacobian / data.scale[:, None]
+    if unknown is not None:
+        known = np.where(unknown, 0.0, known)
     information = weight * known.T @ known + np.eye(len(rival.unit)) / PRIOR_SD**2
     score = slopes @ difference
     return float(counts * score @ np.linalg.solve(information + counts * slopes @ slopes.T, score))
 
 
-def _advice(
-    data: WhitenedData, weights: HypothesisWeights, rivals: Sequence[Refit], apart: float, condition: Condition
-) -> Advice:
+def resolving_probability(data: WhitenedData, weights: HypothesisWeights, apart: float) -> float:
+    """Estimate the probability that a further recording, with predictions ``apart`` by so much, decides."""
     share = 1.0 / (len(data.recordings) + 1.0)
     noise_variance = data.noise**2
     tau = tolerated_excess(data, weights.excess[0] * noise_variance, 0.0) / noise_variance + float(weights.excess.min())
     gain = 0.5 * data.effective_samples / (1.0 - share) * np.log1p(share * apart**2 / tau)
     odds = np.log(data.policy.single / (1.0 - data.policy.single))
-    resolves = float(1.0 / (1.0 + np.exp(-(gain - odds))))
+    return float(1.0 / (1.0 + np.exp(-(gain - odds))))
+
+
+def rivals_in_words(rivals: Sequence[Refit]) -> tuple[tuple[str, ...], str]:
+    """Return the names of the hypotheses that are compared, and their titles as text."""
+    between = tuple(" and ".join(one.names) or "no missing physics" for one in rivals)
+    suspects = [[trial.suspect.title.lower() for trial in one.trials] for one in rivals]
+    return between, " and ".join(" with ".join(names) or "no missing physics" for names in suspects)
+
+
+def _advice(
+    data: WhitenedData, weights: HypothesisWeights, rivals: Sequence[Refit], apart: float, condition: Condition
+) -> Advice:
     lag, incidence = float(np.degrees(condition.phase_lag)), float(np.degrees(condition.angle_of_attack))
     where = f"{condition.flap_frequency:.3g} Hz, {lag:.3g} deg of lag, {condition.pressure / 100.0:.4g} mbar"
     if condition.airspeed > 0:
         where += f", {condition.airspeed:.3g} m/s at {incidence:.3g} deg"
-    between = tuple(" and ".join(one.names) or "no missing physics" for one in rivals)
-    suspects = [[trial.suspect.title.lower() for trial in one.trials] for one in rivals]
-    titles = [" with ".join(names) or "no missing physics" for names in suspects]
+    between, titles = rivals_in_words(rivals)
     return Advice(
-        f"record {where}: there the predictions of {' and '.join(titles)} differ by {apart:.2g} sigma",
-        condition.flap_frequency,
-        lag,
-        condition.pressure / 100.0,
-        condition.airspeed,
-        incidence,
-        apart,
-        resolves,
-        between,
+        words=f"record {where}: there the predictions of {titles} differ by {apart:.2g} sigma",
+        separation=apart,
+        resolves=resolving_probability(data, weights, apart),
+        between=between,
+        condition=AdvisedCondition(
+            condition.flap_frequency, lag, condition.pressure / 100.0, condition.airspeed, incidence
+        ),
     )

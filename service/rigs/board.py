@@ -25,16 +25,22 @@ POLL_SECONDS = 0.2
 
 @dataclass(frozen=True)
 class Call:
-    """One simulation: values of the ``genes`` by name, ``effects`` that are added, and the name of the recording."""
+    """One simulation: values of the ``genes`` by name, ``effects`` that are added, and the name of the recording.
+
+    ``settings``: those that differ from the recording's; ``input_factors``: of inputs that are scaled.
+    """
 
     recording: str
     effects: tuple[str, ...]
     genes: Mapping[str, float]
+    settings: Mapping[str, float] = field(default_factory=dict)
+    input_factors: Mapping[str, float] = field(default_factory=dict)
 
     @cached_property
     def key(self) -> str:
         """Hash of the contents; equal calls have equal keys, on any server."""
-        text = json.dumps([self.recording, self.effects, list(self.genes.items())])
+        changes = [sorted(self.settings.items()), sorted(self.input_factors.items())]
+        text = json.dumps([self.recording, self.effects, list(self.genes.items()), *changes])
         return hashlib.sha256(text.encode()).hexdigest()[:32]
 
     def simulation(self) -> Simulation:
@@ -44,6 +50,8 @@ class Call:
             "recording": self.recording,
             "effects": list(self.effects),
             "genes": dict(self.genes),
+            "settings": dict(self.settings),
+            "input_factors": dict(self.input_factors),
         }
 
 

@@ -7,7 +7,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
+import numpy as np
+
 from wingfit.calibration.problem import Misfit, Problem
+from wingfit.diagnosis.verdict.next_series import STEPS
 from wingfit.records import Gene, Series
 from wingfit.records.array_types import ArrayLike
 from wingfit.rigs.rig_model import RigModel, Simulated, observation
@@ -94,12 +97,34 @@ class _DrivenUnit:
         if not isinstance(recording, Series):
             raise TypeError(f"a driver simulates series, not {recording.kind}")
         values, place = model.calls(problem.genomes(task.values), recording)
-        calls = [Call(recording.name, model.effects, one) for one in values]
+        settings, factors = _changes(recording, model)
+        calls = [Call(recording.name, model.effects, one, settings, factors) for one in values]
         return cls(task, calls, place, recording.values.shape)
 
     def misfit(self, problem: Problem, results: dict[str, Simulated], *, residuals: bool) -> Misfit:
         seen = observation([results[call.key] for call in self.calls], self.place)
         return self.task.run(replace(problem, model=_Answered(problem.model.genes, seen)), residuals=residuals)
+
+
+def _changes(recording: Series, model: RigModel) -> tuple[dict[str, float], dict[str, float]]:
+    """Return in which settings and by which factors of inputs ``recording`` differs from that of the same name.
+
+    Factors are multiples of 1 / STEPS (:func:`wingfit.diagnosis.verdict.next_series.candidates`).
+    """
+    (recorded,) = [one for one in model.all_recordings if one.name == recording.name]
+    settings = {name: value for name, value in recording.settings.items() if value != recorded.settings[name]}
+    factors = {}
+    for name, values in recording.inputs.items():
+        largest = int(np.argmax(np.abs(recorded.inputs[name])))
+        before = float(recorded.inputs[name][largest])
+        factor = round(STEPS * float(values[largest]) / before) / STEPS if before else 1.0
+        if not np.array_equal(values, factor * recorded.inputs[name]):
+            raise ValueError(f"recording {recording.name!r}: a driver cannot simulate another input {name!r}")
+        if factor != 1.0:
+            factors[name] = factor
+    if not np.array_equal(recording.times, recorded.times):
+        raise ValueError(f"recording {recording.name!r}: a driver cannot simulate other times")
+    return settings, factors
 
 
 @dataclass(frozen=True)

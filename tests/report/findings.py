@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from wingfit.diagnosis.finding import (
     Advice,
+    AdvisedCondition,
     Exponent,
     Finding,
     Floors,
@@ -30,6 +31,7 @@ SPAN_M, CHORD_M = 0.5, 0.21
 LEADING = ((-0.06, 0.0), (-0.055, 0.15), (-0.03, 0.33), (0.0, 0.46), (0.04, 0.5))
 TRAILING = ((0.07, 0.49), (0.10, 0.4), (0.12, 0.25), (0.15, 0.12), (0.15, 0.0))
 BOTH = ("hinge_offset", "drive_harmonics")
+VACUUM = AdvisedCondition(5.0, 14.0, 10.0, 0.0, 0.0)
 OPEN = ("hinge_offset", "stroke_amplitude")
 WEAK = ("added_mass", "tip_loss", "dynamic_stall", "wake_capture", "induced_inflow", "plate_drag")
 NAMES = ("adequate", "named", "ambiguous", "unnamed", "measurement fault")
@@ -219,8 +221,14 @@ def wing_finding() -> Finding:
         genes=genes,
         law=None,
         advice=(
-            Advice("Record at 5 Hz in vacuum, with a lag of 14°.", 5.0, 14.0, 10.0, 0.0, 0.0, 6.3, 0.97, OPEN),
-            Advice("Record at 5 Hz in still air.", 5.0, 0.0, 1013.25, 0.0, 0.0, 3.2, 0.81, OPEN),
+            Advice(
+                "Record at 5 Hz in vacuum, with a lag of 14°.",
+                6.3,
+                0.97,
+                OPEN,
+                AdvisedCondition(5.0, 14.0, 10.0, 0.0, 0.0),
+            ),
+            Advice("Record at 5 Hz in still air.", 3.2, 0.81, OPEN, AdvisedCondition(5.0, 0.0, 1013.25, 0.0, 0.0)),
         ),
         outline=(*LEADING, *TRAILING),
         remarks=("Noise rests on 6 beats only.", "Marker m17 was seen in two recordings only."),

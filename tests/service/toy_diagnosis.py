@@ -17,6 +17,7 @@ from wingfit import report
 from wingfit.calibration.evaluator import Evaluator
 from wingfit.diagnosis.finding import (
     Advice,
+    AdvisedCondition,
     Exponent,
     Finding,
     Floors,
@@ -131,8 +132,8 @@ def finding(spec: DiagnosisSpec, dataset: Dataset) -> Finding:
         law=None,
         advice=(
             Advice(
-                "record at 4 Hz: hinge offset or camera shift would differ by 5 times the noise", 4.0, 45.0, 100.0, 0.0,
-                0.0, 5.0, 0.9, ("hinge_offset", "camera_shift"),
+                "record at 4 Hz: hinge offset or camera shift would differ by 5 times the noise", 5.0, 0.9,
+                ("hinge_offset", "camera_shift"), AdvisedCondition(4.0, 45.0, 100.0, 0.0, 0.0),
             ),
         ),
         outline=((0.0, 0.0), (0.0, 0.5), (0.1, 0.5), (0.1, 0.0)),

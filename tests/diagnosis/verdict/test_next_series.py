@@ -1,0 +1,80 @@
+"""What to record next with a rig that the user simulates: what distinguishes the hypotheses that remain."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import wingfit
+from tests.rigs.oscillator import UNFORCED, blank
+from wingfit.diagnosis.finding import Finding
+from wingfit.diagnosis.verdict.next_series import candidates
+from wingfit.records import Channel, Quantity, Series, SeriesDataset
+from wingfit.rigs.rig_model import RigModel
+
+NOISE = 0.002  # m
+SMALL = 0.075  # N: dry friction that these recordings hardly show
+RIG = replace(UNFORCED, faults=False)
+
+
+def recorded(name: str, start: float, mass: float, seed: int) -> Series:
+    empty = blank(
+        name,
+        quantities=(Channel("position", "m", NOISE),),
+        values=np.zeros((160, 1)),
+        settings={"mass": mass},
+        estimates={"start": start},
+    )
+    model = RigModel(RIG, (empty,)).with_effects("dry_friction.slide")
+    genes = {"stiffness": 45.0, "damping": 0.25, "start": start, "speed": 0.0, "dry_friction.slide.size": SMALL}
+    noise = NOISE * np.random.default_rng(seed).standard_normal((160, 1))
+    return replace(empty, values=model.simulated(genes, empty).channels + noise)
+
+
+@pytest.fixture(scope="module")
+def finding() -> Finding:
+    recordings = (recorded("a", 0.05, 1.0, 3), recorded("b", 0.06, 1.5, 4), recorded("c", 0.055, 1.0, 5))
+    channel, mass = recordings[0].quantities[0], Quantity("mass", "kg")
+    dataset = SeriesDataset("d", RIG.name, recordings, (channel,), (), (mass,), ("c",))
+    suspects = ("dry_friction.slide", "square_drag.slide", "cubic_stiffness.slide")
+    return wingfit.diagnose(dataset, wingfit.DiagnosisSpec(suspects=suspects), rig=RIG)
+
+
+def test_the_advice_names_recording_and_change(finding: Finding) -> None:
+    assert finding.verdict == "ambiguous"
+    assert len(finding.advice) >= 3
+    apart = [one.separation for one in finding.advice]
+    assert apart == sorted(apart, reverse=True)
+    assert 0.0 < finding.advice[0].resolves < 1.0
+    by_change = {(one.recording, one.change): one.separation for one in finding.advice}
+    again = by_change["a", "as it was"]
+    # Dry friction is a larger part of the forces where the motion is small.
+    assert by_change["a", "with a start 0.5 times as large"] > 1.2 * again
+    assert {recording for recording, _ in by_change} <= {"a", "b"}  # what is held out is not simulated
+    assert "record a again" in finding.advice[0].words
+    assert "Next recording" in wingfit.html(finding)
+
+
+def test_candidates_change_one_thing_within_what_was_recorded() -> None:
+    push = np.ones(160)
+    a = blank("a", settings={"mass": 1.0}, inputs={"push": 2.0 * push}, repeats="one")
+    again = replace(a, name="again")
+    b = blank("b", settings={"mass": 1.5}, inputs={"push": 3.0 * push})
+    found = [(one.recording.name, one.change) for one in candidates([a, again, b])]
+    assert found == [
+        ("a", "as it was"),
+        ("b", "as it was"),
+        ("a", "with a start 0.5 times as large"),
+        ("a", "with a start 2 times as large"),
+        ("b", "with a start 0.5 times as large"),
+        ("b", "with a start 2 times as large"),
+        ("a", "with mass 1.5"),
+        ("a", "with inputs 0.5 times as large"),
+        ("a", "with inputs 1.5 times as large"),
+        ("b", "with mass 1"),
+        ("b", "with inputs 0.5 times as large"),
+    ]
+    largest = next(one for one in candidates([a, again, b]) if "1.5 times" in one.change)
+    np.testing.assert_array_equal(largest.recording.inputs["push"], 3.0 * push)
