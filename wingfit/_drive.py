@@ -35,6 +35,7 @@ MOST_AT_ONCE = 500
 MOST_NUMBERS = 500_000  # in one message with results
 WAIT_SECONDS = 20.0  # that a request for simulations may take, where nothing is computed
 RETRY_SECONDS = 1.0  # after which a request is repeated that the server did not answer
+DISK_FULL = 507
 LEAST_SECONDS = 1e-4  # of one simulation
 BROKEN = 3  # times that a process ended with a simulation, after which this counts as failed
 
@@ -257,7 +258,8 @@ class _Driver:
             try:
                 return send()
             except WingfitError as error:
-                if not is_passing(error) or time.monotonic() - since > self._patience:
+                passing = is_passing(error) or error.status == DISK_FULL
+                if not passing or time.monotonic() - since > self._patience:
                     raise
             time.sleep(RETRY_SECONDS)
 

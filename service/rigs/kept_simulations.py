@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from sqlalchemy import func, select
+from sqlalchemy import func, insert, select
 
 from wingfit.rigs.rig_model import Simulated
 from wingfit.service.storage.database import Database
@@ -42,8 +42,9 @@ class KeptSimulations:
                 held = session.scalar(stored) or 0
             if held + size > MOST_BYTES:
                 return
-            for key, one in results.items():
-                session.merge(_row(job_id, key, one))
+            rows = [_row(job_id, key, one) for key, one in results.items()]
+            if rows:
+                session.execute(insert(SimulatedRow).prefix_with("OR IGNORE"), rows)
         self._bytes[job_id] = held + size
 
     def forget(self, job_id: str) -> None:
@@ -57,6 +58,6 @@ def _result(row: SimulatedRow, shape: tuple[int, ...]) -> Simulated:
     return Simulated(np.frombuffer(row.channels, "<f8").astype(float).reshape(shape), None)
 
 
-def _row(job_id: str, key: str, result: Simulated) -> SimulatedRow:
+def _row(job_id: str, key: str, result: Simulated) -> dict[str, object]:
     channels = None if result.reason is not None else np.ascontiguousarray(result.channels, "<f8").tobytes()
-    return SimulatedRow(job_id=job_id, key=key, channels=channels, reason=result.reason)
+    return {"job_id": job_id, "key": key, "channels": channels, "reason": result.reason}

@@ -49,6 +49,8 @@ async def work(service: ServiceDep, body: WorkIn, job_id: str) -> a.Work:
     with board.changes.watch(job_id) as changed:
         while True:
             changed.clear()
+            if State(row.state).final:
+                board.forget(job_id)
             if State(row.state).final or board.changes.closed:
                 return _work(row, [])
             if calls := board.take(job_id, body.driver, body.limit, body.holding):
@@ -74,6 +76,8 @@ def results(service: ServiceDep, body: ResultsIn, job_id: str) -> a.Settled:
     Nothing is taken if one of the results is malformed.
     """
     row, board = _row(service, job_id), service.driving.board
+    if State(row.state).final:
+        return {"taken": 0, "unknown": len(body.results)}
     board.hear(job_id, body.driver)
     dataset = service.datasets.get(row.dataset_id)
     if not isinstance(dataset, SeriesDataset):

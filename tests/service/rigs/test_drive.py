@@ -6,6 +6,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from importlib.metadata import EntryPoint, EntryPoints
 from pathlib import Path
 from typing import Any
 
@@ -19,11 +20,13 @@ from tests.service.rigs import decay_rig
 from wingfit.client.client import Client, WingfitError
 from wingfit.records.files.archive import write_zip
 from wingfit.records.files.netcdf import write_netcdf
+from wingfit.rigs import load
 from wingfit.rigs.declaration import declaration
 from wingfit.service.app import create_app
 from wingfit.service.settings import Settings
 from wingfit.workers.in_process import InProcessEvaluator
 
+NOTHING = {"id": "none", "reason": "late"}
 DECLARED = declaration(decay_rig.rig)
 
 
@@ -78,6 +81,13 @@ def test_a_driven_diagnosis_finds_what_one_process_finds(real: Api, alone: Json)
     assert without_time(found) == alone
     report = real.client.get(f"/v1/diagnoses/{one['id']}/report").text
     assert "leak" in report
+    for kind, start in (("csv", b"rank,effects,"), ("netcdf", b"\x89HDF"), ("json", b"{")):
+        exported = real.client.get(f"/v1/diagnoses/{one['id']}/export?format={kind}")
+        assert (exported.status_code, exported.content[: len(start)]) == (200, start)
+    assert real.client.post(f"/v1/drive/{one['id']}/results", json={"driver": "late", "results": [NOTHING]}).json() == {
+        "taken": 0,
+        "unknown": 1,
+    }
 
 
 def test_it_waits_for_a_driver_and_survives_the_death_of_either_side(tmp_path: Path, alone: Json) -> None:
@@ -265,3 +275,22 @@ def test_the_values_of_a_series_can_be_looked_at(api: Api) -> None:
     assert api.client.get(f"/v1/datasets/{dataset}/series?recording=none").status_code == 422
     assert api.client.get(f"/v1/datasets/{api.upload()['id']}/series").status_code == 409
     assert api.client.post("/v1/runs", json={"dataset_id": dataset}).status_code == 422
+
+
+def test_an_installed_rig_is_simulated_by_the_server(real: Api, alone: Json, monkeypatch: pytest.MonkeyPatch) -> None:
+    point = EntryPoint("decay", "tests.service.rigs.decay_rig:rig", "wingfit.rigs")
+    monkeypatch.setattr(load, "entry_points", lambda group: EntryPoints([point]).select(group=group))
+    assert real.get("/v1/rigs") == {"rigs": ["decay"]}
+    dataset = upload(real)
+    one = real.diagnose(dataset, rig="decay")
+    assert (one["rig"], one["driven"]) == ("decay", False)
+    assert real.diagnosed(one["id"])["state"] == "SUCCEEDED"
+    assert without_time(real.get(f"/v1/diagnoses/{one['id']}/finding")) == alone
+    run = real.submit(dataset, rig="decay", method="gauss_newton")
+    assert real.finish(run["id"])["state"] == "SUCCEEDED"
+    again = real.diagnose(None, run_id=run["id"])  # with the rig of the run
+    assert again["rig"] == "decay"
+    assert real.diagnosed(again["id"])["verdict"] == "named"
+    monkeypatch.setattr(load, "entry_points", lambda group: EntryPoints([]).select(group=group))
+    late = real.client.post("/v1/diagnoses", json={"run_id": run["id"]})
+    assert "no rig 'decay' is installed on the server; it has none" in late.json()["errors"][0]["message"]
