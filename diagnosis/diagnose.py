@@ -107,7 +107,7 @@ def diagnose_subject(
     if finding is None:
         raise ValueError("the diagnosis ended without a finding")
     spent, evaluations = time.monotonic() - began, counted.evaluations
-    remarks = (*finding.remarks, *copies)
+    remarks = (*finding.remarks, *copies, *_repeated(fitted, held_out))
     finding = replace(finding, remarks=remarks, seconds=spent, evaluations=evaluations, versions=_versions())
     yield Progress(1.0, "done", evaluations, finding)
 
@@ -123,6 +123,17 @@ def _without_copies(
         for name, other in copies.items()
     ]
     return tuple(one for one in held_out if one.name not in copies), tuple(remarks)
+
+
+def _repeated(fitted: Sequence[AnyRecording], held_out: Sequence[AnyRecording]) -> tuple[str, ...]:
+    """Return a remark on held-out series that repeat fitted experiments; empty if there are none."""
+    known = {one.repeats for one in fitted if isinstance(one, Series) and one.repeats}
+    names = [one.name for one in held_out if isinstance(one, Series) and one.repeats in known]
+    remark = (
+        f"held out, but repeats of fitted experiments: {', '.join(names)}; they test the noise and hardly the model: "
+        "hold out all repeats of an experiment"
+    )
+    return (remark,) if names else ()
 
 
 def _versions() -> dict[str, str]:

@@ -65,14 +65,14 @@ def make_refit(data: WhitenedData, fit: Fit, trials: Sequence[Trial] = ()) -> Re
 
 
 def cross_validated_excess(data: WhitenedData, fit: Fit) -> float | None:
-    """Return the mean square beyond the noise (m^2 or N^2) of recordings that are each predicted from the others.
+    """Return the mean square beyond the noise (m^2 or N^2) of experiments that are each predicted from the others.
 
-    Each prediction is that of the linearised model, fitted to the other recordings. A prior limits how far genes move,
-    so that a gene that only one recording identifies does not count against the hypothesis; nor does the move that
-    noise in the other recordings makes. Genes that belong to the recording alone (an initial state) are fitted to it
-    again. None for a single recording.
+    Each prediction is that of the linearised model, fitted to the recordings of other experiments. A prior limits how
+    far genes move, so that a gene that only one recording identifies does not count against the hypothesis; nor does
+    the move that noise in the other recordings makes. Genes that belong to the recording alone (an initial state) are
+    fitted to it again. None for a single experiment.
     """
-    if len(data.recordings) < 2:
+    if len(data.experiments) < 2:
         return None
     white, slopes = fit.coefficients / data.scale, fit.jacobian / data.scale[:, None]
     grams = [slopes[part].T @ slopes[part] for part in data.recording_slices]
@@ -81,29 +81,33 @@ def cross_validated_excess(data: WhitenedData, fit: Fit) -> float | None:
     gram = likelihood_weight * sum(grams) + np.eye(len(fit.unit)) * (data.policy.gene_freedom**-2 + PRIOR_SD**-2)
     score = likelihood_weight * sum(scores) + prior
     total = 0.0
-    for r, part in enumerate(data.recording_slices):
-        others, spread = sum(grams) - grams[r], np.linalg.inv(gram - likelihood_weight * grams[r])
-        move = np.clip(fit.unit - spread @ (score - likelihood_weight * scores[r]), 0.0, 1.0) - fit.unit
-        here, own = fit.coefficients[part], fit.jacobian[part]
-        weight = data.weight[part]
-        there = _refitted_alone(data, fit, r, here + own @ move)
-        worse = float(weight @ (there**2 - here**2))
+    for experiment in data.experiments:
+        left_gram, left_score = sum(grams[r] for r in experiment), sum(scores[r] for r in experiment)
+        others, spread = sum(grams) - left_gram, np.linalg.inv(gram - likelihood_weight * left_gram)
+        move = np.clip(fit.unit - spread @ (score - likelihood_weight * left_score), 0.0, 1.0) - fit.unit
         noisy = likelihood_weight**2 * spread @ others @ spread
-        by_noise = float(weight @ np.einsum("df,fg,dg->d", own, noisy, own, optimize=True))
-        total += float(weight @ (here**2 - data.variance[part])) + max(
-            worse - data.policy.prediction_noise * by_noise, 0.0
-        )
+        for r in experiment:
+            part = data.recording_slices[r]
+            here, slope, weight = fit.coefficients[part], fit.jacobian[part], data.weight[part]
+            there = _refitted_alone(data, fit, r, here + slope @ move)
+            worse = float(weight @ (there**2 - here**2))
+            own = _refitted_alone(data, fit, r, slope)
+            by_noise = float(weight @ np.einsum("df,fg,dg->d", own, noisy, own, optimize=True))
+            total += float(weight @ (here**2 - data.variance[part])) + max(
+                worse - data.policy.prediction_noise * by_noise, 0.0
+            )
     return total
 
 
 def _refitted_alone(data: WhitenedData, fit: Fit, r: int, coefficients: Array) -> Array:
-    """Return ``coefficients`` of recording ``r`` after the genes that belong to it alone are fitted to them."""
+    """Return ``coefficients`` [D, ...] of recording ``r`` after the genes of it alone are fitted to them."""
     recording, part = data.recordings[r], data.recording_slices[r]
     own = [k for k, name in enumerate(fit.problem.free) if belongs_to(name, recording.name)]
     if not own:
         return coefficients
     slopes, scale = fit.jacobian[part][:, own], data.scale[part]
-    move, *_ = np.linalg.lstsq(slopes / scale[:, None], coefficients / scale, rcond=None)
+    white = (coefficients.T / scale).T
+    move, *_ = np.linalg.lstsq(slopes / scale[:, None], white, rcond=None)
     return np.asarray(coefficients - slopes @ move)
 
 

@@ -188,15 +188,21 @@ class WhitenedData:
         return float(np.sum((coefficients / self.scale) ** 2))
 
     @cached_property
+    def experiments(self) -> tuple[tuple[int, ...], ...]:
+        """Numbers of the recordings of each experiment: repeats of a series belong together, others are single."""
+        groups: dict[str, list[int]] = {}
+        for r, one in enumerate(self.recordings):
+            repeats = one.repeats if isinstance(one, Series) else ""
+            groups.setdefault(f"repeats {repeats}" if repeats else f"recording {r}", []).append(r)
+        return tuple(tuple(group) for group in groups.values())
+
+    @cached_property
     def effective_samples(self) -> float:
         """Number of independent samples of a model's error: a few for each recording, however long it is."""
         most = self.policy.effective_samples
-        every: dict[str, float] = {}  # repeats of one experiment repeat the same error of the model
-        for one, fit in zip(self.recordings, self.reduced, strict=True):
-            own = min(fit.features, most) if isinstance(fit, SeriesFit) else most
-            experiment = f"repeats {one.repeats}" if isinstance(one, Series) and one.repeats else one.name
-            every[experiment] = max(own, every.get(experiment, 0.0))
-        return min(sum(every.values()), self.policy.max_effective_samples)
+        own = [min(fit.features, most) if isinstance(fit, SeriesFit) else most for fit in self.reduced]
+        every = [max(own[r] for r in group) for group in self.experiments]  # repeats repeat the error of the model
+        return min(sum(every), self.policy.max_effective_samples)
 
     @cached_property
     def gene_cost(self) -> float:

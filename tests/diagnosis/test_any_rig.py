@@ -184,3 +184,20 @@ def test_repeats_are_one_sample_of_a_models_error() -> None:
     repeated = WhitenedData.of(together, series=SeriesReduction(noises, SeriesReduction.of(alone).scale))
     assert repeated.effective_samples == pytest.approx(samples[0])
     assert samples[1] > 2.0 * samples[0]
+
+
+def test_repeats_are_left_out_together_and_do_not_validate_each_other(rig: Rig) -> None:
+    """A second recording of the same experiment tests no prediction."""
+    first, second, third = swings(3, deviation=0.004).recordings
+    again = replace(
+        first, name="again", values=first.values + 0.004 * np.random.default_rng(9).standard_normal((100, 1))
+    )
+    pair = replace(first, repeats="one"), replace(again, repeats="one")
+    series = SeriesReduction.of((*pair, second))
+    assert WhitenedData.of((*pair, second), series=series).experiments == ((0, 1), (2,))
+    held_out = SeriesDataset("swings", "pendulum", (*pair, second, third), first.quantities, held_out=("again",))
+    found = diagnose(held_out, DiagnosisSpec(suspects=SUSPECTS[:1]), rig=rig)
+    assert any(one.startswith("held out, but repeats of fitted experiments: again") for one in found.remarks)
+    alone = SeriesDataset("swings", "pendulum", pair, first.quantities)
+    by_name = {one.effects: one for one in diagnose(alone, DiagnosisSpec(suspects=SUSPECTS[:1]), rig=rig).hypotheses}
+    assert by_name[()].predicted in (None, 0.0)
