@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+import threading
 import time
 import uuid
 from collections import Counter, deque
@@ -35,6 +36,7 @@ MOST_AT_ONCE = 500
 MOST_NUMBERS = 500_000  # in one message with results
 WAIT_SECONDS = 20.0  # that a request for simulations may take, where nothing is computed
 RETRY_SECONDS = 1.0  # after which a request is repeated that the server did not answer
+HEARD_SECONDS = 20.0  # between signs of life
 DISK_FULL = 507
 LEAST_SECONDS = 1e-4  # of one simulation
 BROKEN = 3  # times that a process ended with a simulation, after which this counts as failed
@@ -154,6 +156,7 @@ class _Computing:
     def __init__(self, simulator: _Simulator, workers: int) -> None:
         self._simulator, self._workers = simulator, workers
         self._queue: deque[Simulation] = deque()
+        self._present: list[Simulation] = []  # in this process
         self._under_way: dict[Future[dict[str, Any]], Simulation] = {}
         self._broken: Counter[str] = Counter()
         self._pool = self._new_pool()
@@ -168,8 +171,8 @@ class _Computing:
 
     @property
     def holding(self) -> list[str]:
-        """Ids of the simulations that are not finished."""
-        return [one["id"] for one in (*self._queue, *self._under_way.values())]
+        """Ids of the simulations that are not finished; may be called in another thread."""
+        return [one["id"] for one in (*self._present, *self._queue.copy(), *self._under_way.copy().values())]
 
     @property
     def room(self) -> int:
@@ -185,10 +188,17 @@ class _Computing:
         """Compute for about BATCH_SECONDS, less if nothing is queued any more, and return the results."""
         began, results = time.monotonic(), list[dict[str, Any]]()
         while self.holding and time.monotonic() - began < BATCH_SECONDS:
-            results += self._some() if self._pool else [self._simulator.compute(self._queue.popleft())]
+            results += self._some() if self._pool else [self._next()]
         if results:
             self._seconds = max((time.monotonic() - began) * self._workers / len(results), LEAST_SECONDS)
         return results
+
+    def _next(self) -> dict[str, Any]:
+        """Compute a simulation in this process."""
+        self._present = [self._queue.popleft()]
+        result = self._simulator.compute(self._present[0])
+        self._present = []
+        return result
 
     def _some(self) -> list[dict[str, Any]]:
         """Keep the processes busy, and return what they finish within BATCH_SECONDS."""
@@ -232,6 +242,8 @@ class _Driver:
         self._name = f"driver-{uuid.uuid4().hex[:12]}"
 
     def run(self) -> Work:
+        over = threading.Event()
+        threading.Thread(target=self._stay_heard, args=(over,), name="wingfit-drive", daemon=True).start()
         try:
             while True:
                 work = self._patiently(self._take)
@@ -242,8 +254,15 @@ class _Driver:
                 for message in _messages(self._computing.finished()):
                     self._patiently(partial(self._client.return_results, self._job, self._name, message))
         finally:
+            over.set()
             with suppress(WingfitError):
                 self._client.take_work(self._job, self._name, limit=0, leaving=True)
+
+    def _stay_heard(self, over: threading.Event) -> None:
+        """Let the server know of this driver while a long simulation is computed."""
+        while not over.wait(HEARD_SECONDS):
+            with suppress(WingfitError):
+                self._client.take_work(self._job, self._name, limit=0, holding=self._computing.holding)
 
     def _take(self) -> Work:
         holding = self._computing.holding

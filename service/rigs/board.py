@@ -66,11 +66,16 @@ class _Open:
 
 @dataclass
 class _Desk:
-    """What one job waits for, by key, what was computed for it, and when each of its drivers was last heard of."""
+    """What one job waits for, by key, what was computed for it, and when each of its drivers was last heard of.
+
+    ``given``: calls that drivers took and have not settled, also those for which the job no longer waits: it may have
+    gone back to the queue because a driver was silent while it computed.
+    """
 
     open: dict[str, _Open] = field(default_factory=dict)
     done: dict[str, Simulated] = field(default_factory=dict)
     heard: dict[str, float] = field(default_factory=dict)
+    given: dict[str, Call] = field(default_factory=dict)
 
 
 class Board:
@@ -141,20 +146,21 @@ class Board:
             ]
             for one in free[:limit]:
                 one.driver = driver
+                desk.given[one.call.key] = one.call
             return [one.call for one in free[:limit]]
 
-    def open_call(self, job_id: str, key: str) -> Call | None:
-        """Return the open call with this ``key``; None if the job does not wait for it, or has its result."""
+    def given_call(self, job_id: str, key: str) -> Call | None:
+        """Return the call with this ``key`` that a driver took; None if there is none, or it has a result."""
         with self._changed:
             desk = self._desks.get(job_id)
-            one = desk.open.get(key) if desk and key not in desk.done else None
-            return one.call if one else None
+            return desk.given.get(key) if desk else None
 
     def settle(self, job_id: str, results: Mapping[str, Simulated]) -> None:
-        """Store the ``results`` of open calls by key; those for which no batch waits are dropped."""
+        """Store the ``results`` of calls by key; those for which no batch waits are dropped."""
         with self._changed:
             desk = self._desk(job_id)
             for key, result in results.items():
+                desk.given.pop(key, None)
                 if key in desk.open:
                     desk.done.setdefault(key, result)
             self._changed.notify_all()
@@ -166,11 +172,17 @@ class Board:
             desk.heard.pop(driver, None)
         self.changes.publish(job_id)
 
+    def clear(self, job_id: str) -> None:
+        """Drop what is open for a job that no longer runs; drivers may still return what they took."""
+        with self._changed:
+            if job_id in self._desks:
+                self._desks[job_id] = _Desk(given=self._desks[job_id].given)
+        self.changes.publish(job_id)
+
     def forget(self, job_id: str) -> None:
-        """Drop all that is known of a job, because it has ended."""
+        """Drop all that is known of a job that has ended."""
         with self._changed:
             self._desks.pop(job_id, None)
-        self.changes.publish(job_id)
 
     def _desk(self, job_id: str) -> _Desk:
         return self._desks.setdefault(job_id, _Desk())

@@ -32,5 +32,5 @@ class Driving:
 
     def left(self, job_id: str) -> None:
         """Drop what is open for a job that no longer runs; waiting drivers are woken, and learn its state."""
-        self.board.forget(job_id)
+        self.board.clear(job_id)
         self._kept.forget(job_id)

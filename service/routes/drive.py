@@ -84,7 +84,7 @@ def results(service: ServiceDep, body: ResultsIn, job_id: str) -> a.Settled:
         raise not_found("driven job", job_id)
     taken, faults = dict[str, Simulated](), []
     for place, result in enumerate(body.results):
-        call = board.open_call(job_id, result.id)
+        call = board.given_call(job_id, result.id)
         if call is None:
             continue
         try:

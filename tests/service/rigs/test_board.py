@@ -67,8 +67,9 @@ def test_a_driver_that_leaves_gives_back_what_it_took(board: Board) -> None:
 def test_a_call_that_two_batches_need_is_computed_once(board: Board) -> None:
     board.put("run_1", [ONE])
     assert len(board.take("run_1", "ann", 9)) == 3
+    assert board.given_call("run_1", ONE.key) == ONE
     board.settle("run_1", {ONE.key: DONE})
-    assert board.open_call("run_1", ONE.key) is None
+    assert board.given_call("run_1", ONE.key) is None
     assert board.results("run_1", [ONE.key]) == {ONE.key: DONE}
     board.withdraw("run_1", [ONE.key])
     assert board.results("run_1", [ONE.key]) == {ONE.key: DONE}
@@ -81,8 +82,13 @@ def test_results_for_which_nothing_waits_are_dropped(board: Board) -> None:
     board.withdraw("run_1", [ONE.key])
     board.settle("run_1", {ONE.key: DONE})
     assert board.results("run_1", [ONE.key]) is None
+    assert board.take("run_1", "ann", 1) == [TWO]
+    board.clear("run_1")  # the job went back to the queue
+    assert not board.attended("run_1")
+    assert board.take("run_1", "ann", 9) == []
+    assert board.given_call("run_1", TWO.key) == TWO  # its result is still wanted
     board.forget("run_1")
-    assert board.open_call("run_1", TWO.key) is None
+    assert board.given_call("run_1", TWO.key) is None
 
 
 def test_a_batch_waits_for_its_last_result(board: Board) -> None:
