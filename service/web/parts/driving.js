@@ -1,0 +1,45 @@
+// Rigs of the user's own: what a job waits for, and the ways to give a dataset of series its simulation.
+
+import { get } from "../base/api.js";
+import { command, copyable, pythonWithRig } from "../base/copying.js";
+import { $, el, toast } from "../base/format.js";
+
+let installed = null;
+
+// Say in ``box`` what a job waits for that its user simulates; hide it for others.
+export function showWaiting(box, job) {
+  const waits = job.driven && job.state === "QUEUED";
+  box.hidden = !waits;
+  const text = waits ? command(`wingfit drive ${job.id} my_rig.py`) : "";
+  if (box.dataset.shown === text) return;
+  box.dataset.shown = text;
+  box.replaceChildren(...(waits ? [
+    el("p", {}, "Waits for its simulation. Run this where your rig is, with the file that defines it:"),
+    copyable(text, "command that simulates the rig for this job"),
+  ] : []));
+}
+
+// ``onStart(kind, rig)`` submits a job, "runs" or "diagnoses", with a rig that is installed on the server.
+export function setUpSimulation(onStart) {
+  $("installed-run").addEventListener("click", () => onStart("runs", $("installed-rig").value));
+  $("installed-diagnose").addEventListener("click", () => onStart("diagnoses", $("installed-rig").value));
+}
+
+// Show how to simulate and diagnose a dataset of series.
+export async function showSimulation(dataset) {
+  $("own-rig").replaceChildren(
+    copyable(command(`wingfit diagnose ${dataset.id} --rig my_rig.py`), "command that diagnoses this dataset"),
+    copyable(command(`wingfit runs submit ${dataset.id} --rig my_rig.py`), "command that calibrates a rig to this dataset"),
+    copyable(pythonWithRig(dataset.id), "Python program that diagnoses this dataset"));
+  $("installed").hidden = true;
+  try {
+    installed ??= (await get("rigs")).rigs;
+  } catch (error) {
+    toast(error.message);
+    return;
+  }
+  $("installed").hidden = !installed.length;
+  $("own-rig-title").textContent = installed.length ? "With a rig of your own" : "Your rig simulates; no rig is installed on this server";
+  $("installed-rig").replaceChildren(...installed.map((name) => new Option(name, name)));
+  if (installed.includes(dataset.rig.name)) $("installed-rig").value = dataset.rig.name;
+}
