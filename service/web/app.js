@@ -11,7 +11,7 @@ import { isSeries } from "./base/labels.js";
 import { refreshListing, setUpListing, showListing } from "./pages/table_page.js";
 import { drawDatasets, drawDiagnoses, drawRuns } from "./parts/sidebar.js";
 import { redraw, selectRun, setUpRun } from "./pages/run.js";
-import { openSubmit, remove, setUpSubmit, submitRun } from "./pages/submit.js";
+import { openSubmit, remove, setUpSubmit } from "./pages/submit.js";
 
 const POLL_MS = 2500;
 const SHOWN = 50;
@@ -124,13 +124,6 @@ async function startDiagnosis(body) {
   poll();
 }
 
-async function startRun(body) {
-  const run = await submitRun(body);
-  if (!run) return;
-  go(run.id);
-  poll();
-}
-
 function onDeleted() {
   go(null);
   poll();
@@ -153,7 +146,10 @@ setUpRun({ ...common("run"), onChange: onChange("runs"), onDiagnose: (run) => st
 setUpDiagnosis({ ...common("diagnosis"), onChange: onChange("diagnoses") });
 setUpDataset({
   ...common("dataset"), ...starting,
-  onStart: (kind, body) => (kind === "runs" ? startRun : startDiagnosis)(body),
+  onStarted(kind, job) {
+    go(job.id, kind === "runs" ? "run" : "diagnosis");
+    poll();
+  },
 });
 setUpListing();
 setUpCompare();

@@ -20,5 +20,7 @@ export function showErrors(form, box, error) {
 
 export function showRemarks(list, remarks) {
   list.hidden = !remarks.length;
-  list.replaceChildren(...remarks.map((remark) => el("li", {}, `${remark[0].toUpperCase()}${remark.slice(1)}.`)));
+  // A remark may begin with the name of a gene, which stays as it is: "angle0[first], speed: ...".
+  const sentence = (remark) => (/^[a-z]+ /.test(remark) ? `${remark[0].toUpperCase()}${remark.slice(1)}.` : `${remark}.`);
+  list.replaceChildren(...remarks.map((remark) => el("li", {}, sentence(remark))));
 }

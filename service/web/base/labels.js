@@ -41,6 +41,8 @@ export function modelOf(run) {
   return isForces(run) ? SHORT[run.spec.preset] ?? spoken(run.spec.preset) : `${run.spec.division} bodies`;
 }
 
+export const modelInWords = (job) => (isSeries(job) ? `rig ${job.rig}` : modelOf(job));
+
 // The misfit of a run: a number and its unit.
 export function misfit(run) {
   if (isSeries(run)) return { value: rounded(run.best_percent), unit: OF_RANGE };
@@ -73,11 +75,14 @@ export function setup(run) {
   const how = `${spec.mode}, ${method}${spec.finish && search ? " finished by Gauss-Newton" : ""}`;
   const wing = run.kind === "tracks"
     ? [spec.search_division ? `searched with division ${spec.search_division}` : null, `solved to ${spec.accuracy_mm} mm`] : [];
-  return [modelOf(run), withEffects(spec), ...(isForces(run) ? forceSetup(spec) : []), how, search, ...wing].filter(Boolean);
+  return [modelInWords(run), withEffects(run), ...(isForces(run) ? forceSetup(spec) : []), how, search, ...wing].filter(Boolean);
 }
 
-// Runs of earlier versions have no effects.
-export const withEffects = (spec) => (spec.effects?.length ? `with ${spec.effects.map(spoken).join(", ")}` : null);
+// Runs of earlier versions have no effects. Those of series are named by the user's own rig.
+export function withEffects(job) {
+  const { effects } = job.spec;
+  return effects?.length ? `with ${(isSeries(job) ? effects : effects.map(spoken)).join(", ")}` : null;
+}
 
 export function forceSetup(spec) {
   const cut = spec.low_pass_hz;

@@ -75,7 +75,8 @@ function outcome(run, result, key) {
 }
 
 function drawOutcome() {
-  const heads = ["Run", "Dataset", "State", "Before", "After", "Before, held out", "After, held out", "Noise floor", "Evaluations", "Computing time"];
+  const floors = shown.some(({ run }) => run.kind === "tracks");
+  const heads = ["Run", "Dataset", "State", "Before", "After", "Before, held out", "After, held out", ...(floors ? ["Noise floor"] : []), "Evaluations", "Computing time"];
   head("compare-outcome", ...heads.map((text, i) => el("th", { scope: "col", className: i > 2 ? "n" : "" }, text)));
   body("compare-outcome", shown.map(({ run, dataset, result, past }, k) => {
     const { suffix, unit } = KINDS[run.kind];
@@ -83,7 +84,7 @@ function drawOutcome() {
     return el("tr", {}, el("td", {}, swatch(k), el("a", { href: `#run=${part(run.id)}` }, runName(run))),
       el("td", {}, el("a", { href: `#dataset=${part(dataset.id)}` }, dataset.name)), el("td", {}, badge(run)),
       of("before"), result ? of("after") : number(withUnit(run[`best${suffix}`], unit)), of("held_out_before"), of("held_out_after"),
-      of("noise"), number(run.evaluations.toLocaleString("en")), number(duration(past.at(-1)?.elapsed_seconds) ?? DASH));
+      ...(floors ? [of("noise")] : []), number(run.evaluations.toLocaleString("en")), number(duration(past.at(-1)?.elapsed_seconds) ?? DASH));
   }));
   const datasets = new Set(shown.map(({ dataset }) => dataset.id));
   const kinds = new Set(shown.map(({ run }) => run.kind));
@@ -96,11 +97,11 @@ function drawOutcome() {
 function drawSetup() {
   const specs = shown.map(({ run }) => ({ ...request(run) }));
   const names = [...new Set(specs.flatMap(Object.keys))];
-  const text = (value) => {
+  const text = (value, k) => {
     if (value === undefined || value === null) return DASH;
-    return Array.isArray(value) ? value.map((one) => spoken(String(one))).join(", ") || "none" : String(value);
+    return Array.isArray(value) ? value.map((one) => (isSeries(shown[k].run) ? one : spoken(String(one)))).join(", ") || "none" : String(value);
   };
-  const rows = names.map((name) => ({ name, values: specs.map((spec) => text(spec[name])) }));
+  const rows = names.map((name) => ({ name, values: specs.map((spec, k) => text(spec[name], k)) }));
   const visible = rows.filter(({ values }) => $("compare-all").checked || new Set(values).size > 1);
   head("compare-setup", el("th", { scope: "col" }, "Setting"), ...shown.map(heading));
   body("compare-setup", visible.map(({ name, values }) => el("tr", {}, el("th", { scope: "row" }, spoken(name)), ...values.map(number))));
@@ -135,7 +136,8 @@ function drawGenes() {
 
 function geneCell(gene) {
   if (!gene) return number(DASH);
-  const error = gene.standard_error_percent === null ? "" : ` ± ${significant(gene.standard_error_percent, 2)} %`;
+  const { standard_error_percent: percent, standard_error: absolute } = gene;
+  const error = percent === null ? "" : gene.nominal === 0 && absolute ? ` ± ${significant(absolute, 2)}` : ` ± ${significant(percent, 2)} %`;
   const about = !gene.searched ? " fixed" : gene.identifiable === false ? " not identifiable" : error;
   return el("td", { className: "n" }, significant(gene.best), el("small", {}, about));
 }

@@ -1,12 +1,12 @@
 // The selected dataset: recordings, conditions or values over time, and its runs and diagnoses.
 
-import { get, part } from "../base/api.js";
+import { get, part, postJson } from "../base/api.js";
 import { $, el, plain, plural, significant, size, toast, when } from "../base/format.js";
 import { setUpSimulation, showSimulation } from "../parts/driving.js";
 import { hideSeries, redrawSeries, seriesRecordings, setUpSeries, showSeries } from "../parts/series.js";
 import { badge, runName } from "../parts/sidebar.js";
 import { axis, draw } from "../base/plots.js";
-import { remove } from "./submit.js";
+import { randomKey, remove } from "./submit.js";
 import { isForces, isSeries, misfit } from "../base/labels.js";
 
 const LISTED = 10;
@@ -22,7 +22,10 @@ let simulating = null; // id of the dataset whose ways to simulate are to be sho
 export function setUpDataset(given) {
   hooks = given;
   setUpSeries();
-  setUpSimulation((kind, rig) => hooks.onStart(kind, { dataset_id: dataset.id, rig }));
+  setUpSimulation(async (kind, rig) => {
+    const body = { dataset_id: dataset.id, rig };
+    hooks.onStarted(kind, await postJson(kind, body, { "Idempotency-Key": randomKey() }));
+  });
   $("dataset-run").addEventListener("click", () => hooks.onRun(dataset));
   $("dataset-diagnose").addEventListener("click", () => hooks.onDiagnose(dataset));
   $("dataset-delete").addEventListener("click", async () => {

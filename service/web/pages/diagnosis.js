@@ -5,7 +5,7 @@ import { $, plural, toast, when } from "../base/format.js";
 import { showWaiting } from "../parts/driving.js";
 import { badge, setBar, timeLeft } from "../parts/sidebar.js";
 import { randomKey, remove } from "./submit.js";
-import { forceSetup, isForces, modelOf, withEffects } from "../base/labels.js";
+import { forceSetup, isForces, modelInWords, withEffects } from "../base/labels.js";
 
 let diagnosis = null;
 let stopFollowing = () => {};
@@ -73,7 +73,7 @@ function update() {
   const done = diagnosis.state === "SUCCEEDED";
   document.title = `${diagnosis.name} · wingfit`;
   $("diagnosis-name").replaceChildren(diagnosis.name, " ", badge(diagnosis));
-  $("diagnosis-about").textContent = [modelOf(diagnosis), withEffects(diagnosis.spec), ...(isForces(diagnosis) ? forceSetup(diagnosis.spec) : []),
+  $("diagnosis-about").textContent = [modelInWords(diagnosis), withEffects(diagnosis), ...(isForces(diagnosis) ? forceSetup(diagnosis.spec) : []),
     diagnosis.run_id ? "from the best genome of a run" : null, when(diagnosis.created_at)].filter(Boolean).join(" · ");
   $("diagnosis-error").hidden = !diagnosis.error;
   $("diagnosis-error").textContent = diagnosis.error ?? "";

@@ -59,16 +59,6 @@ export function setUpSubmit({ onSubmitted, onUploaded }) {
   $("file").addEventListener("change", () => upload($("file").files[0], onUploaded));
 }
 
-// Submit a run without the form; null, after an error message, if it is refused.
-export async function submitRun(body) {
-  try {
-    return await postJson("runs", body, { "Idempotency-Key": randomKey() });
-  } catch (error) {
-    toast(error.text);
-    return null;
-  }
-}
-
 // ``dataset`` is preselected; it may be older than those of the lists. Runs of series start on the page of their dataset.
 export function openSubmit(all, dataset = all.find((one) => !isSeries(one))) {
   const known = all.filter((one) => !isSeries(one));

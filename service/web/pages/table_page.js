@@ -153,13 +153,13 @@ function runRow(run) {
   const method = [METHODS[run.spec.method] ?? run.spec.method, run.spec.mode].filter(Boolean).join(", ");
   return el("tr", {}, cell(choice(run)), cell(open("run", run.id, runName(run))), cell(open("dataset", run.dataset_id, datasetName(run.dataset_id), run.id)),
     cell(badge(run), el("small", {}, timeLeft(run) ? ` ${timeLeft(run)}` : "")), cell(value === DASH ? DASH : `${value} ${unit}`),
-    cell([modelOf(run), withEffects(run.spec)].filter(Boolean).join(" ")), cell(method), cell(run.generations.toLocaleString("en")), cell(when(run.created_at)));
+    cell([modelOf(run), withEffects(run)].filter(Boolean).join(" ")), cell(method), cell(run.generations.toLocaleString("en")), cell(when(run.created_at)));
 }
 
 function diagnosisRow(diagnosis) {
   return el("tr", {}, cell(open("diagnosis", diagnosis.id, diagnosis.name)), cell(open("dataset", diagnosis.dataset_id, datasetName(diagnosis.dataset_id), diagnosis.id)),
     cell(badge(diagnosis), el("small", {}, timeLeft(diagnosis) ? ` ${timeLeft(diagnosis)}` : "")), cell(diagnosis.verdict ?? DASH),
-    cell([modelOf(diagnosis), withEffects(diagnosis.spec)].filter(Boolean).join(" ")), cell(when(diagnosis.created_at)));
+    cell([modelOf(diagnosis), withEffects(diagnosis)].filter(Boolean).join(" ")), cell(when(diagnosis.created_at)));
 }
 
 function kindOf(dataset) {

@@ -2,6 +2,7 @@
 
 import { get } from "../base/api.js";
 import { command, copyable, pythonWithRig } from "../base/copying.js";
+import { showErrors } from "../base/form_errors.js";
 import { $, el, toast } from "../base/format.js";
 
 let installed = null;
@@ -19,10 +20,21 @@ export function showWaiting(box, job) {
   ] : []));
 }
 
-// ``onStart(kind, rig)`` submits a job, "runs" or "diagnoses", with a rig that is installed on the server.
-export function setUpSimulation(onStart) {
-  $("installed-run").addEventListener("click", () => onStart("runs", $("installed-rig").value));
-  $("installed-diagnose").addEventListener("click", () => onStart("diagnoses", $("installed-rig").value));
+// ``submit(kind, rig)`` submits a job, "runs" or "diagnoses", with a rig that is installed on the server.
+export function setUpSimulation(submit) {
+  const form = $("installed-form");
+  form.addEventListener("submit", async (event) => {
+    event.preventDefault();
+    const buttons = form.querySelectorAll("button");
+    showErrors(form, $("installed-errors"), null);
+    for (const button of buttons) button.disabled = true;
+    try {
+      await submit(event.submitter.value, form.rig.value);
+    } catch (error) {
+      showErrors(form, $("installed-errors"), error);
+    }
+    for (const button of buttons) button.disabled = false;
+  });
 }
 
 // Show how to simulate and diagnose a dataset of series.
@@ -31,7 +43,9 @@ export async function showSimulation(dataset) {
     copyable(command(`wingfit diagnose ${dataset.id} --rig my_rig.py`), "command that diagnoses this dataset"),
     copyable(command(`wingfit runs submit ${dataset.id} --rig my_rig.py`), "command that calibrates a rig to this dataset"),
     copyable(pythonWithRig(dataset.id), "Python program that diagnoses this dataset"));
+  const form = $("installed-form");
   $("installed").hidden = true;
+  showErrors(form, $("installed-errors"), null);
   try {
     installed ??= (await get("rigs")).rigs;
   } catch (error) {
@@ -40,6 +54,6 @@ export async function showSimulation(dataset) {
   }
   $("installed").hidden = !installed.length;
   $("own-rig-title").textContent = installed.length ? "With a rig of your own" : "Your rig simulates; no rig is installed on this server";
-  $("installed-rig").replaceChildren(...installed.map((name) => new Option(name, name)));
-  if (installed.includes(dataset.rig.name)) $("installed-rig").value = dataset.rig.name;
+  form.rig.replaceChildren(...installed.map((name) => new Option(name, name)));
+  if (installed.includes(dataset.rig.name)) form.rig.value = dataset.rig.name;
 }

@@ -182,9 +182,9 @@ def _here(command: list[str], folder: Path) -> subprocess.CompletedProcess[str]:
 
 def test_an_installed_rig_is_calibrated_and_diagnosed(seen: Seen, api: Api, decay: str) -> None:
     seen.show(f"dataset={decay}")
-    seen.page.wait_for_selector("#installed-run")
-    assert seen.page.locator("#installed-rig option").all_inner_texts() == ["decay"]
-    seen.page.click("#installed-run")
+    seen.page.wait_for_selector("#installed-form")
+    assert seen.page.locator("#installed-form option").all_inner_texts() == ["decay"]
+    seen.page.click("#installed-form [value=runs]")
     seen.wait("location.hash.startsWith('#run=')")
     made = seen.page.evaluate("location.hash").removeprefix("#run=")
     seen.wait("document.querySelector('#run-name .badge')?.textContent === 'done'", 60)
@@ -195,9 +195,17 @@ def test_an_installed_rig_is_calibrated_and_diagnosed(seen: Seen, api: Api, deca
     checked = api.client.post("/v1/runs?validate_only=true", json=json.loads(curl[curl.index("-d") + 1]))
     assert (checked.status_code, checked.json().get("spec")) == (200, api.run(made)["spec"])
     assert 'rig="decay"' in program
+    arm = upload(api, arm_dataset(), write_netcdf)
+    seen.show(f"dataset={arm}")
+    seen.wait(f"{TEXT.format('dataset-name')} === 'arm'")
+    seen.page.click("#installed-form [value=runs]")
+    seen.wait("!document.getElementById('installed-errors').hidden")
+    assert "'decay' does not simulate" in seen.page.inner_text("#installed-errors")
+    seen.errors.clear()  # the browser reports the refusal
     seen.show(f"dataset={decay}")
-    seen.page.wait_for_selector("#installed-diagnose")
-    seen.page.click("#installed-diagnose")
+    seen.wait(f"{TEXT.format('dataset-name')} === 'decay'")
+    assert seen.page.is_hidden("#installed-errors")
+    seen.page.click("#installed-form [value=diagnoses]")
     seen.wait("location.hash.startsWith('#diagnosis=')")
     seen.wait("document.getElementById('report').shadowRoot?.querySelector('h1')", 60)
     assert "leak" in str(seen.page.evaluate(REPORT))
@@ -242,7 +250,7 @@ def test_a_driven_diagnosis_waits_then_shows_its_report(seen: Seen, api: Api, ru
     made = seen.page.evaluate("location.hash").removeprefix("#diagnosis=")
     seen.wait("!document.getElementById('diagnosis-waiting').hidden")
     assert f"wingfit drive {made} my_rig.py" in seen.page.inner_text("#diagnosis-waiting")
-    assert seen.page.inner_text("#diagnosis-about").startswith("decay · with leak")
+    assert seen.page.inner_text("#diagnosis-about").startswith("rig decay · with leak · ")
     with driver(api, made):
         seen.wait("document.getElementById('report').shadowRoot?.querySelector('h1')", 60)
     assert seen.page.is_hidden("#diagnosis-waiting")
