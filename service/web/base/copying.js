@@ -4,7 +4,7 @@ import { $, el, toast } from "./format.js";
 
 const quote = (text) => `'${text.replaceAll("'", "'\\''")}'`;
 
-const DEFAULT_SERVER = "http://127.0.0.1:8321"; // of the command line
+const DEFAULT_HOST = "127.0.0.1:8321"; // of the command line, over http
 
 const server = () => new URL(".", document.baseURI).href.replace(/\/$/, "");
 
@@ -49,7 +49,8 @@ export const pythonWithRig = (dataset) => [
 // ``text``, a command of wingfit, with the address of this server if it is not the usual one.
 export function command(text) {
   const url = server();
-  if (url === DEFAULT_SERVER) return text;
+  const { protocol, host, pathname } = new URL(url);
+  if (protocol === "http:" && host === DEFAULT_HOST && pathname === "/") return text;
   return `${text} --url ${/^[\w:/.-]+$/.test(url) ? url : quote(url)}`;
 }
 

@@ -18,9 +18,9 @@ export function showErrors(form, box, error) {
   box.replaceChildren(el("p", {}, error.message), ...(items.length ? [el("ul", {}, ...items)] : []));
 }
 
-export function showRemarks(list, remarks) {
+// A remark that begins with one of ``names``, those of genes, keeps its first letter.
+export function showRemarks(list, remarks, names = []) {
   list.hidden = !remarks.length;
-  // A remark may begin with the name of a gene, which stays as it is: "angle0[first], speed: ...".
-  const sentence = (remark) => (/^[a-z]+ /.test(remark) ? `${remark[0].toUpperCase()}${remark.slice(1)}.` : `${remark}.`);
-  list.replaceChildren(...remarks.map((remark) => el("li", {}, sentence(remark))));
+  const first = (remark) => (names.includes(remark.match(/^[^ ,:]*/)[0]) ? remark[0] : remark[0].toUpperCase());
+  list.replaceChildren(...remarks.map((remark) => el("li", {}, `${first(remark)}${remark.slice(1)}.`)));
 }

@@ -152,7 +152,7 @@ function showResult() {
   if (isForces(run)) showForces(run, dataset, result);
   else if (!isSeries(run)) drawMisfit(result);
   else {
-    showRemarks($("remarks"), result.remarks);
+    showRemarks($("remarks"), result.remarks, result.genes.map((gene) => gene.name));
     drawSeriesMisfit(result);
   }
 }
