@@ -37,6 +37,7 @@ export async function selectDataset(id) {
   dataset = null;
   $("dataset").hidden = true;
   hideSeries();
+  if (simulating !== id) simulating = null;
   if (!id) return;
   try {
     const found = await get(`datasets/${part(id)}`);
@@ -52,9 +53,13 @@ export async function selectDataset(id) {
   const series = isSeries(dataset);
   $("series-part").hidden = !series;
   $("conditions-part").hidden = series;
-  if (series) showSimulation(dataset);
-  if (simulating === id) reveal();
-  await Promise.all([series ? showSeries(dataset) : drawConditions(), listWork(id)]);
+  await Promise.all([series ? showRig() : drawConditions(), listWork(id)]);
+}
+
+async function showRig() {
+  const { id } = dataset;
+  await Promise.all([showSimulation(dataset), showSeries(dataset)]);
+  if (simulating === id && dataset?.id === id) reveal(); // after the charts, which move what is below them
 }
 
 // Show how a dataset of series is simulated and diagnosed, on its page.

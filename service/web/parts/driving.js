@@ -53,7 +53,7 @@ export async function showSimulation(dataset) {
     return;
   }
   $("installed").hidden = !installed.length;
-  $("own-rig-title").textContent = installed.length ? "With a rig of your own" : "Your rig simulates; no rig is installed on this server";
+  $("own-rig-title").textContent = installed.length ? "With a rig of your own" : "With a rig of your own; none is installed on this server";
   form.rig.replaceChildren(...installed.map((name) => new Option(name, name)));
   if (installed.includes(dataset.rig.name)) form.rig.value = dataset.rig.name;
 }

@@ -149,6 +149,9 @@ def test_the_panel_says_how_to_simulate(seen: Seen, api: Api, decay: str) -> Non
         seen.page.click(f"[data-key={button}-{decay}]")
         seen.wait(f"location.hash === '#dataset={decay}' && document.activeElement.id === 'simulate-title'")
         assert not seen.page.evaluate("document.getElementById('submit-dialog').open")
+        assert seen.page.evaluate(
+            "document.getElementById('simulate-title').getBoundingClientRect().bottom < innerHeight"
+        )
         seen.page.focus("#dataset-archive")
     seen.page.click("#dataset-run")
     seen.wait("document.activeElement.id === 'simulate-title'")
