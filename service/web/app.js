@@ -3,10 +3,11 @@
 import { askForKey, isRefused, setUpAccess } from "./parts/access.js";
 import { get } from "./base/api.js";
 import { redrawComparison, setUpCompare, showComparison } from "./pages/compare.js";
-import { redrawDataset, selectDataset, setUpDataset } from "./pages/dataset.js";
+import { redrawDataset, selectDataset, setUpDataset, simulate } from "./pages/dataset.js";
 import { diagnose, selectDiagnosis, setUpDiagnosis } from "./pages/diagnosis.js";
 import { showEffects } from "./pages/effects.js";
 import { $, plural, toast } from "./base/format.js";
+import { isSeries } from "./base/labels.js";
 import { refreshListing, setUpListing, showListing } from "./pages/table_page.js";
 import { drawDatasets, drawDiagnoses, drawRuns } from "./parts/sidebar.js";
 import { redraw, selectRun, setUpRun } from "./pages/run.js";
@@ -25,12 +26,17 @@ let polling = null;
 const parameters = () => new URLSearchParams(location.hash.slice(1));
 const current = (page) => parameters().get(page);
 
+// Series need a simulation: their page has the ways to give one.
+const starting = {
+  onRun: (dataset) => (isSeries(dataset) ? simulate(dataset.id) : openSubmit(lists.datasets, dataset)),
+  onDiagnose: (dataset) => (isSeries(dataset) ? simulate(dataset.id) : startDiagnosis({ dataset_id: dataset.id })),
+};
+
 function drawLists() {
   drawRuns(lists.runs, current("run"));
   drawDiagnoses(lists.diagnoses, current("diagnosis"));
   drawDatasets(lists.datasets, {
-    onRun: (dataset) => openSubmit(lists.datasets, dataset),
-    onDiagnose: (dataset) => startDiagnosis({ dataset_id: dataset.id }),
+    ...starting,
     onDelete: async (dataset) => (await remove("datasets", dataset.id, dataset.name)) && poll(),
   });
 }
@@ -139,9 +145,11 @@ const common = (page) => ({ currentId: () => current(page), onAway: setAway, onD
 setUpRun({ ...common("run"), onChange: onChange("runs"), onDiagnose: (run) => startDiagnosis({ run_id: run.id }) });
 setUpDiagnosis({ ...common("diagnosis"), onChange: onChange("diagnoses") });
 setUpDataset({
-  ...common("dataset"),
-  onRun: (dataset) => openSubmit(lists.datasets, dataset),
-  onDiagnose: (dataset) => startDiagnosis({ dataset_id: dataset.id }),
+  ...common("dataset"), ...starting,
+  onStarted(kind, job) {
+    go(job.id, kind === "runs" ? "run" : "diagnosis");
+    poll();
+  },
 });
 setUpListing();
 setUpCompare();
@@ -151,7 +159,7 @@ setUpSubmit({
     poll();
   },
   onUploaded(dataset) {
-    poll().then(() => openSubmit(lists.datasets, dataset));
+    poll().then(() => starting.onRun(dataset));
   },
 });
 $("skip").addEventListener("click", (event) => {

@@ -18,7 +18,9 @@ export function showErrors(form, box, error) {
   box.replaceChildren(el("p", {}, error.message), ...(items.length ? [el("ul", {}, ...items)] : []));
 }
 
-export function showRemarks(list, remarks) {
+// A remark that begins with one of ``names``, those of genes, keeps its first letter.
+export function showRemarks(list, remarks, names = []) {
   list.hidden = !remarks.length;
-  list.replaceChildren(...remarks.map((remark) => el("li", {}, `${remark[0].toUpperCase()}${remark.slice(1)}.`)));
+  const first = (remark) => (names.includes(remark.match(/^[^ ,:]*/)[0]) ? remark[0] : remark[0].toUpperCase());
+  list.replaceChildren(...remarks.map((remark) => el("li", {}, `${first(remark)}${remark.slice(1)}.`)));
 }

@@ -81,7 +81,7 @@ export function el(tag, properties = {}, ...children) {
 
 // A key number with its label and unit, for a list of class "numbers"; a ``main`` one is emphasised.
 export const keyNumber = (label, value, unit = "", main = false) =>
-  el("div", { className: main ? "main" : "" }, el("dt", {}, label), el("dd", {}, value, unit && el("small", {}, ` ${unit}`)));
+  el("div", { className: main ? "main" : "" }, el("dt", {}, label), el("dd", {}, value, unit && value !== DASH ? el("small", {}, ` ${unit}`) : ""));
 
 export const $ = (id) => document.getElementById(id);
 

@@ -1,8 +1,14 @@
-// Labels of settings, and differences between runs on tracked markers and on forces.
+// Labels of settings, and differences between runs on tracked markers, on forces, and on series of a rig of the user's own.
 
-import { forceUnit, mm, significant } from "./format.js";
+import { forceUnit, mm, rounded, significant } from "./format.js";
 
 export const isForces = (thing) => thing?.kind === "forces";
+export const isSeries = (thing) => thing?.kind === "series";
+
+export const OF_RANGE = "% of range";
+
+// What the recordings of a dataset hold.
+export const contents = (dataset) => ({ tracks: "markers", forces: "forces", series: `rig ${dataset.rig?.name}` })[dataset.kind];
 
 export const METHODS = { genetic: "genetic", cma_es: "CMA-ES", gauss_newton: "Gauss-Newton", auto: "auto" };
 export const MODES = {
@@ -30,24 +36,36 @@ export const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
 export const recordingOptions = ({ recordings }) =>
   recordings.map(({ name, held_out: heldOut }) => new Option(`${name}${heldOut ? " (held out)" : ""}`, name));
 
-export const modelOf = (run) => (isForces(run)
-  ? SHORT[run.spec.preset] ?? spoken(run.spec.preset)
-  : `${run.spec.division} bodies`);
+export function modelOf(run) {
+  if (isSeries(run)) return run.rig;
+  return isForces(run) ? SHORT[run.spec.preset] ?? spoken(run.spec.preset) : `${run.spec.division} bodies`;
+}
+
+export const modelInWords = (job) => (isSeries(job) ? `rig ${job.rig}` : modelOf(job));
 
 // The misfit of a run: a number and its unit.
 export function misfit(run) {
+  if (isSeries(run)) return { value: rounded(run.best_percent), unit: OF_RANGE };
   if (!isForces(run)) return { value: mm(run.best_mm), unit: "mm" };
   const best = newtons(run.best_mn);
   const { unit, show } = forceUnit([best]);
   return { value: show(best), unit };
 }
 
+// A misfit of the result of a run on series, relative to what the result says.
+export const relativeMisfit = ({ relative_to: relativeTo }, value) => (relativeTo === "noise"
+  ? { value: rounded(value), unit: "× noise" }
+  : { value: rounded(value === null ? null : 100 * value), unit: OF_RANGE });
+
 export const newtons = (mn) => (mn === null || mn === undefined ? null : mn / 1e3);
+
+const FOREIGN = { tracks: VEHICLE_ONLY, forces: WING_ONLY, series: [...WING_ONLY, ...VEHICLE_ONLY] };
 
 // The settings of a run as a request, without those that its kind of dataset or its method does not use.
 export function request(run) {
-  const idle = [...(isForces(run) ? WING_ONLY : VEHICLE_ONLY), ...(IDLE[run.spec.method] ?? [])];
-  return Object.fromEntries(Object.entries(run.spec).filter(([name]) => !idle.includes(name)));
+  const idle = [...FOREIGN[run.kind], ...(IDLE[run.spec.method] ?? [])];
+  const settings = Object.entries(run.spec).filter(([name]) => !idle.includes(name));
+  return { ...(isSeries(run) ? { rig: run.rig } : {}), ...Object.fromEntries(settings) };
 }
 
 export function setup(run) {
@@ -55,13 +73,16 @@ export function setup(run) {
   const method = METHODS[spec.method] ?? spec.method ?? "genetic";
   const search = spec.method === "gauss_newton" ? null : `population ${spec.population}, seed ${spec.seed}`;
   const how = `${spec.mode}, ${method}${spec.finish && search ? " finished by Gauss-Newton" : ""}`;
-  const coarse = spec.search_division ? `searched with division ${spec.search_division}` : null;
-  return [modelOf(run), withEffects(spec), ...(isForces(run) ? forceSetup(spec) : []), how, search, coarse,
-    isForces(run) ? null : `solved to ${spec.accuracy_mm} mm`].filter(Boolean);
+  const wing = run.kind === "tracks"
+    ? [spec.search_division ? `searched with division ${spec.search_division}` : null, `solved to ${spec.accuracy_mm} mm`] : [];
+  return [modelInWords(run), withEffects(run), ...(isForces(run) ? forceSetup(spec) : []), how, search, ...wing].filter(Boolean);
 }
 
-// Runs of earlier versions have no effects.
-export const withEffects = (spec) => (spec.effects?.length ? `with ${spec.effects.map(spoken).join(", ")}` : null);
+// Runs of earlier versions have no effects. Those of series are named by the user's own rig.
+export function withEffects(job) {
+  const { effects } = job.spec;
+  return effects?.length ? `with ${(isSeries(job) ? effects : effects.map(spoken)).join(", ")}` : null;
+}
 
 export function forceSetup(spec) {
   const cut = spec.low_pass_hz;

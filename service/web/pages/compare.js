@@ -5,7 +5,7 @@ import { $, DASH, duration, el, rounded, plain, significant, toast } from "../ba
 import { badge, runName } from "../parts/sidebar.js";
 import { MOST_COMPARED } from "./table_page.js";
 import { axis, draw } from "../base/plots.js";
-import { isForces, request, spoken } from "../base/labels.js";
+import { isSeries, OF_RANGE, relativeMisfit, request, spoken } from "../base/labels.js";
 
 let shown = [];
 let requested = "";
@@ -55,39 +55,53 @@ const number = (text) => el("td", { className: "n" }, text);
 const head = (id, ...cells) => $(id).tHead.replaceChildren(el("tr", {}, ...cells));
 const body = (id, rows) => $(id).tBodies[0].replaceChildren(...rows);
 
-// A misfit with its unit: runs on markers and on forces can be compared.
-function misfit(forces, value) {
-  if (value === null || value === undefined) return DASH;
-  return `${rounded(value, 3)} ${forces ? "mN" : "mm"}`;
+// By kind of run: the names of its misfits in results and histories, and how it is drawn. A page may have several kinds.
+const KINDS = {
+  tracks: { suffix: "_mm", unit: "mm", axis: "mean distance per marker, mm", runs: "runs on tracked markers" },
+  forces: { suffix: "_mn", unit: "mN", axis: "RMS difference, mN", runs: "runs on forces" },
+  series: { suffix: "_percent", unit: OF_RANGE, axis: `RMS difference, ${OF_RANGE}`, runs: "runs on series" },
+};
+// The kind of the convergence chart.
+const drawn = () => ["forces", "series", "tracks"].find((kind) => shown.some(({ run }) => run.kind === kind));
+
+const withUnit = (value, unit) => (value === null || value === undefined ? DASH : `${rounded(value, 3)} ${unit}`);
+
+// A misfit of a result with its unit; ``key``: before, after, held_out_before, held_out_after, noise.
+function outcome(run, result, key) {
+  if (!result) return DASH;
+  if (!isSeries(run)) return withUnit(result[`${key}${KINDS[run.kind].suffix}`], KINDS[run.kind].unit);
+  const { value, unit } = relativeMisfit(result, result[key] ?? null);
+  return value === DASH ? DASH : `${value} ${unit}`;
 }
 
 function drawOutcome() {
-  const heads = ["Run", "Dataset", "State", "Before", "After", "Before, held out", "After, held out", "Noise floor", "Evaluations", "Computing time"];
+  const floors = shown.some(({ run }) => run.kind === "tracks");
+  const heads = ["Run", "Dataset", "State", "Before", "After", "Before, held out", "After, held out", ...(floors ? ["Noise floor"] : []), "Evaluations", "Computing time"];
   head("compare-outcome", ...heads.map((text, i) => el("th", { scope: "col", className: i > 2 ? "n" : "" }, text)));
   body("compare-outcome", shown.map(({ run, dataset, result, past }, k) => {
-    const forces = isForces(run);
-    const of = (key) => number(misfit(forces, result?.[`${key}_${forces ? "mn" : "mm"}`]));
+    const { suffix, unit } = KINDS[run.kind];
+    const of = (key) => number(outcome(run, result, key));
     return el("tr", {}, el("td", {}, swatch(k), el("a", { href: `#run=${part(run.id)}` }, runName(run))),
       el("td", {}, el("a", { href: `#dataset=${part(dataset.id)}` }, dataset.name)), el("td", {}, badge(run)),
-      of("before"), result ? of("after") : number(misfit(forces, forces ? run.best_mn : run.best_mm)), of("held_out_before"), of("held_out_after"),
-      forces ? number(DASH) : of("noise"), number(run.evaluations.toLocaleString("en")), number(duration(past.at(-1)?.elapsed_seconds) ?? DASH));
+      of("before"), result ? of("after") : number(withUnit(run[`best${suffix}`], unit)), of("held_out_before"), of("held_out_after"),
+      ...(floors ? [of("noise")] : []), number(run.evaluations.toLocaleString("en")), number(duration(past.at(-1)?.elapsed_seconds) ?? DASH));
   }));
   const datasets = new Set(shown.map(({ dataset }) => dataset.id));
   const kinds = new Set(shown.map(({ run }) => run.kind));
   $("compare-note").textContent = [
     datasets.size > 1 ? "These runs are fitted to different datasets: their misfits are not comparable." : null,
-    kinds.size > 1 ? "The convergence chart shows only the runs on forces." : null,
+    kinds.size > 1 ? `The convergence chart shows only the ${KINDS[drawn()].runs}.` : null,
   ].filter(Boolean).join(" ");
 }
 
 function drawSetup() {
   const specs = shown.map(({ run }) => ({ ...request(run) }));
   const names = [...new Set(specs.flatMap(Object.keys))];
-  const text = (value) => {
+  const text = (value, k) => {
     if (value === undefined || value === null) return DASH;
-    return Array.isArray(value) ? value.map((one) => spoken(String(one))).join(", ") || "none" : String(value);
+    return Array.isArray(value) ? value.map((one) => (isSeries(shown[k].run) ? one : spoken(String(one)))).join(", ") || "none" : String(value);
   };
-  const rows = names.map((name) => ({ name, values: specs.map((spec) => text(spec[name])) }));
+  const rows = names.map((name) => ({ name, values: specs.map((spec, k) => text(spec[name], k)) }));
   const visible = rows.filter(({ values }) => $("compare-all").checked || new Set(values).size > 1);
   head("compare-setup", el("th", { scope: "col" }, "Setting"), ...shown.map(heading));
   body("compare-setup", visible.map(({ name, values }) => el("tr", {}, el("th", { scope: "row" }, spoken(name)), ...values.map(number))));
@@ -96,15 +110,19 @@ function drawSetup() {
 }
 
 function drawRecordings() {
-  const tracked = shown.filter(({ result }) => result?.kind === "tracks");
-  $("compare-recordings-part").hidden = !tracked.length;
-  const names = [...new Set(tracked.flatMap(({ result }) => result.recordings.map((one) => one.name)))];
+  const kinds = new Set(shown.flatMap(({ result }) => result?.kind ?? []).filter((kind) => kind !== "forces"));
+  $("compare-recordings-part").hidden = !kinds.size;
+  $("compare-recordings-title").textContent = `${kinds.has("series") ? "Misfit" : "Distance per marker"} by recording, after`;
+  const all = shown.map(({ run, result }) => new Map((kinds.has(result?.kind) ? result.recordings : []).map((one) => [one.name, {
+    value: isSeries(run) ? one.after : one.after_mm, text: outcome(run, { ...result, ...one }, "after"), heldOut: one.held_out,
+  }])));
+  const names = [...new Set(all.flatMap((those) => [...those.keys()]))];
   head("compare-recordings", el("th", { scope: "col" }, "Recording"), ...shown.map(heading));
   body("compare-recordings", names.map((name) => {
-    const values = shown.map(({ result }) => result?.recordings?.find((one) => one.name === name));
-    const best = Math.min(...values.map((one) => one?.after_mm ?? Infinity));
-    return el("tr", {}, el("th", { scope: "row" }, name), ...values.map((one) => el("td", { className: one?.after_mm === best ? "n least" : "n" },
-      misfit(false, one?.after_mm), one?.held_out ? el("small", {}, " held out") : null)));
+    const values = all.map((those) => those.get(name));
+    const best = kinds.size > 1 ? null : Math.min(...values.map((one) => one?.value ?? Infinity));
+    return el("tr", {}, el("th", { scope: "row" }, name), ...values.map((one) => el("td", { className: one && one.value === best ? "n least" : "n" },
+      one?.text ?? DASH, one?.heldOut ? el("small", {}, " held out") : null)));
   }));
 }
 
@@ -118,7 +136,8 @@ function drawGenes() {
 
 function geneCell(gene) {
   if (!gene) return number(DASH);
-  const error = gene.standard_error_percent === null ? "" : ` ± ${significant(gene.standard_error_percent, 2)} %`;
+  const { standard_error_percent: percent, standard_error: absolute } = gene;
+  const error = percent === null ? "" : gene.nominal === 0 && absolute ? ` ± ${significant(absolute, 2)}` : ` ± ${significant(percent, 2)} %`;
   const about = !gene.searched ? " fixed" : gene.identifiable === false ? " not identifiable" : error;
   return el("td", { className: "n" }, significant(gene.best), el("small", {}, about));
 }
@@ -126,16 +145,16 @@ function geneCell(gene) {
 // Best misfit so far against the number of simulated individuals.
 export async function redrawComparison() {
   if ($("comparison").hidden) return;
-  const forces = shown.some(({ run }) => isForces(run));
-  const unit = forces ? "mN" : "mm";
-  const curves = shown.map((one, k) => ({ ...one, k })).filter(({ run }) => isForces(run) === forces);
+  const kind = drawn();
+  const { suffix, unit, axis: title } = KINDS[kind];
+  const curves = shown.map((one, k) => ({ ...one, k })).filter(({ run }) => run.kind === kind);
   await draw($("compare-plot"), (look) => ({
     traces: curves.map(({ run, past, k }) => ({
       type: "scatter", mode: past.length < 3 ? "lines+markers" : "lines", name: plain(runName(run)), x: past.map((item) => item.evaluations),
-      y: past.map((item) => (forces ? item.best_mn : item.best_mm)), text: past.map((item) => plain(item.stage)), line: { color: look.series[k], width: 2 },
+      y: past.map((item) => item[`best${suffix}`]), text: past.map((item) => plain(item.stage)), line: { color: look.series[k], width: 2 },
       hovertemplate: `%{y:.4g} ${unit}, %{text}<extra>%{fullData.name}</extra>`,
     })),
     showlegend: true, xaxis: axis(look, "simulated individuals", { showgrid: false }),
-    yaxis: axis(look, forces ? "RMS difference, mN" : "mean distance per marker, mm", { type: "log", nticks: 6 }),
+    yaxis: axis(look, title, { type: "log", nticks: 6 }),
   })).catch((error) => toast(error.message));
 }

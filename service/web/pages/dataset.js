@@ -1,11 +1,13 @@
-// The selected dataset: recordings, conditions, and its runs and diagnoses.
+// The selected dataset: recordings, conditions or values over time, and its runs and diagnoses.
 
-import { get, part } from "../base/api.js";
+import { get, part, postJson } from "../base/api.js";
 import { $, el, plain, plural, significant, size, toast, when } from "../base/format.js";
+import { setUpSimulation, showSimulation } from "../parts/driving.js";
+import { hideSeries, redrawSeries, seriesRecordings, setUpSeries, showSeries } from "../parts/series.js";
 import { badge, runName } from "../parts/sidebar.js";
 import { axis, draw } from "../base/plots.js";
-import { remove } from "./submit.js";
-import { isForces, misfit } from "../base/labels.js";
+import { randomKey, remove } from "./submit.js";
+import { isForces, isSeries, misfit } from "../base/labels.js";
 
 const LISTED = 10;
 const WAYS = [
@@ -15,9 +17,15 @@ const WAYS = [
 
 let dataset = null;
 let hooks = {};
+let simulating = null; // id of the dataset whose ways to simulate are to be shown
 
 export function setUpDataset(given) {
   hooks = given;
+  setUpSeries();
+  setUpSimulation(async (kind, rig) => {
+    const body = { dataset_id: dataset.id, rig };
+    hooks.onStarted(kind, await postJson(kind, body, { "Idempotency-Key": randomKey() }));
+  });
   $("dataset-run").addEventListener("click", () => hooks.onRun(dataset));
   $("dataset-diagnose").addEventListener("click", () => hooks.onDiagnose(dataset));
   $("dataset-delete").addEventListener("click", async () => {
@@ -28,6 +36,8 @@ export function setUpDataset(given) {
 export async function selectDataset(id) {
   dataset = null;
   $("dataset").hidden = true;
+  hideSeries();
+  if (simulating !== id) simulating = null;
   if (!id) return;
   try {
     const found = await get(`datasets/${part(id)}`);
@@ -40,13 +50,37 @@ export async function selectDataset(id) {
   $("dataset").hidden = false;
   drawHead();
   drawRecordings();
-  await Promise.all([redrawDataset(), listWork(id)]);
+  const series = isSeries(dataset);
+  $("series-part").hidden = !series;
+  $("conditions-part").hidden = series;
+  await Promise.all([series ? showRig() : drawConditions(), listWork(id)]);
+}
+
+async function showRig() {
+  const { id } = dataset;
+  await Promise.all([showSimulation(dataset), showSeries(dataset)]);
+  if (simulating === id && dataset?.id === id) reveal(); // after the charts, which move what is below them
+}
+
+// Show how a dataset of series is simulated and diagnosed, on its page.
+export function simulate(id) {
+  simulating = id;
+  if (dataset?.id === id) reveal();
+  else location.hash = `dataset=${part(id)}`;
+}
+
+function reveal() {
+  simulating = null;
+  $("simulate-title").scrollIntoView({ block: "start" });
+  $("simulate-title").focus({ preventScroll: true });
 }
 
 function drawHead() {
   document.title = `${dataset.name} · wingfit`;
   $("dataset-name").textContent = dataset.name;
-  $("dataset-about").textContent = [isForces(dataset) ? "forces" : plural(dataset.markers, "tracked marker"),
+  const held = { tracks: () => [plural(dataset.markers, "tracked marker")], forces: () => ["forces"],
+    series: () => [`series of rig ${dataset.rig.name}`, plural(dataset.rig.channels.length, "channel")] }[dataset.kind]();
+  $("dataset-about").textContent = [...held,
     plural(dataset.recordings.length, "recording"), size(dataset.size_bytes), when(dataset.created_at)].join(" · ");
   $("dataset-description").textContent = dataset.description;
   $("dataset-sha").textContent = `SHA-256 of the archive: ${dataset.sha256}`;
@@ -54,6 +88,12 @@ function drawHead() {
 }
 
 function drawRecordings() {
+  if (isSeries(dataset)) {
+    const { head, rows } = seriesRecordings(dataset);
+    $("recordings").tHead.replaceChildren(head);
+    $("recordings").tBodies[0].replaceChildren(...rows);
+    return;
+  }
   const forces = isForces(dataset);
   const heads = ["Recording", "Use", forces ? "Samples" : "Frames", forces ? "Channels" : "Markers", "Missing, %", "Flap, Hz", "Lag, °", "Pressure, mbar",
     "Temperature, °C", "Airspeed, m/s", "Angle of attack, °"];
@@ -68,10 +108,15 @@ function drawRecordings() {
     number(one.temperature_c), number(one.airspeed_m_s), number(one.angle_of_attack_deg))));
 }
 
+export function redrawDataset() {
+  if (!dataset) return;
+  if (isSeries(dataset)) redrawSeries();
+  else drawConditions();
+}
+
 // Chart of the conditions: flap frequency against the other quantity with the most values.
-export async function redrawDataset() {
+async function drawConditions() {
   const shown = dataset;
-  if (!shown) return;
   const varied = WAYS.map(([name, title]) => ({ name, title, count: new Set(shown.recordings.map((one) => one[name])).size }));
   const { name, title } = varied.reduce((most, one) => (one.count > most.count ? one : most));
   const dots = (look, held, label, symbol) => {

@@ -2,9 +2,10 @@
 
 import { call, follow, get, getText, isFinal, part, postJson } from "../base/api.js";
 import { $, plural, toast, when } from "../base/format.js";
+import { showWaiting } from "../parts/driving.js";
 import { badge, setBar, timeLeft } from "../parts/sidebar.js";
 import { randomKey, remove } from "./submit.js";
-import { forceSetup, isForces, modelOf, withEffects } from "../base/labels.js";
+import { forceSetup, isForces, modelInWords, withEffects } from "../base/labels.js";
 
 let diagnosis = null;
 let stopFollowing = () => {};
@@ -72,10 +73,11 @@ function update() {
   const done = diagnosis.state === "SUCCEEDED";
   document.title = `${diagnosis.name} · wingfit`;
   $("diagnosis-name").replaceChildren(diagnosis.name, " ", badge(diagnosis));
-  $("diagnosis-about").textContent = [modelOf(diagnosis), withEffects(diagnosis.spec), ...(isForces(diagnosis) ? forceSetup(diagnosis.spec) : []),
+  $("diagnosis-about").textContent = [modelInWords(diagnosis), withEffects(diagnosis), ...(isForces(diagnosis) ? forceSetup(diagnosis.spec) : []),
     diagnosis.run_id ? "from the best genome of a run" : null, when(diagnosis.created_at)].filter(Boolean).join(" · ");
   $("diagnosis-error").hidden = !diagnosis.error;
   $("diagnosis-error").textContent = diagnosis.error ?? "";
+  showWaiting($("diagnosis-waiting"), diagnosis);
   setBar($("diagnosis-bar"), diagnosis);
   $("diagnosis-bar").hidden = done;
   $("diagnosis-progress").textContent = [done ? null : `${Math.round(100 * diagnosis.progress)} %`, timeLeft(diagnosis),

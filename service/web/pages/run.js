@@ -4,13 +4,15 @@ import { call, follow, get, history, isFinal, part } from "../base/api.js";
 import { copy, curl, python } from "../base/copying.js";
 import { $, plural, toast, when } from "../base/format.js";
 import { hideForces, redrawForces, setUpForces, showForces } from "./forces.js";
+import { showWaiting } from "../parts/driving.js";
 import { aboutHistory, drawHistory } from "../parts/history.js";
 import { badge, runName, setBar, timeLeft } from "../parts/sidebar.js";
 import { redrawLoads } from "../parts/loads.js";
 import { remove } from "./submit.js";
-import { drawGenes, drawMisfit, drawNumbers } from "../parts/tables.js";
+import { drawGenes, drawMisfit, drawNumbers, drawSeriesMisfit } from "../parts/tables.js";
 import { hideWing, redrawWing, setUpViewer, showWing } from "../parts/viewer.js";
-import { isForces, request, setup } from "../base/labels.js";
+import { showRemarks } from "../base/form_errors.js";
+import { isForces, isSeries, request, setup } from "../base/labels.js";
 
 const ALLOWED = {
   pause: ["QUEUED", "RUNNING"], resume: ["PAUSED"], cancel: ["QUEUED", "RUNNING", "PAUSED"],
@@ -49,6 +51,7 @@ export async function selectRun(id) {
   [run, dataset, result, items, genesAt] = [null, null, null, new Map(), 0];
   drawGenes(null);
   drawMisfit(null);
+  drawSeriesMisfit(null);
   $("run").hidden = true;
   if (!id) return;
   try {
@@ -71,21 +74,26 @@ export async function selectRun(id) {
 export function redraw() {
   if (!run) return;
   drawFitness();
-  if (isForces(run)) {
-    redrawForces();
-    return;
-  }
+  if (isForces(run)) redrawForces();
+  if (run.kind !== "tracks") return;
   redrawWing();
   redrawLoads();
 }
 
-// Show the sections of a run on tracked markers, or of one on forces.
+// Show the sections of the kind of run: on tracked markers, on forces, or on series.
 function showSections() {
-  const forces = isForces(run);
-  (forces ? hideWing : hideForces)();
-  $("tracks-part").hidden = forces;
-  $("forces-part").hidden = !forces;
-  $("history-about").textContent = aboutHistory(forces);
+  const tracks = run.kind === "tracks";
+  if (!tracks) hideWing();
+  if (!isForces(run)) hideForces();
+  $("tracks-part").hidden = !tracks;
+  $("forces-part").hidden = !isForces(run);
+  showRemarks($("remarks"), []);
+  $("history-about").textContent = aboutHistory(run.kind);
+}
+
+function showParts() {
+  if (isForces(run)) showForces(run, dataset, result);
+  else if (!isSeries(run)) showWing(run, dataset);
 }
 
 function listen() {
@@ -97,7 +105,7 @@ function listen() {
       if (item.sequence > run.generations) {
         run = {
           ...run, stage: item.stage, generations: item.sequence, evaluations: item.evaluations,
-          best_mm: item.best_mm, best_mn: item.best_mn, progress: item.progress, eta_seconds: item.eta_seconds,
+          best_mm: item.best_mm, best_mn: item.best_mn, best_percent: item.best_percent, progress: item.progress, eta_seconds: item.eta_seconds,
         };
       }
       schedule();
@@ -124,21 +132,28 @@ function schedule() {
 async function update() {
   drawHead();
   drawFitness();
-  if (isForces(run)) showForces(run, dataset, result);
-  else showWing(run, dataset);
+  showParts();
   const id = run.id;
   if (run.state === "SUCCEEDED" && !result) {
     await get(`runs/${part(id)}/result`).then((answer) => {
       if (run?.id !== id) return;
       result = answer;
       drawNumbers(run, result);
-      if (isForces(run)) showForces(run, dataset, result);
-      else drawMisfit(result);
+      showResult();
       drawGenes({ genes: result.genes, final: true }, isForces(run));
     }, (error) => toast(error.message));
   } else if (!result && run.generations > 0 && (isFinal(run) || Date.now() - genesAt > GENES_MS)) {
     genesAt = Date.now();
     await get(`runs/${part(id)}/genome`).then((answer) => run?.id === id && !result && drawGenes(answer), () => {});
+  }
+}
+
+function showResult() {
+  if (isForces(run)) showForces(run, dataset, result);
+  else if (!isSeries(run)) drawMisfit(result);
+  else {
+    showRemarks($("remarks"), result.remarks, result.genes.map((gene) => gene.name));
+    drawSeriesMisfit(result);
   }
 }
 
@@ -148,12 +163,15 @@ function drawHead() {
   $("run-about").textContent = [dataset.name, ...setup(run), when(run.created_at)].join(" · ");
   $("run-error").hidden = !run.error;
   $("run-error").textContent = run.error ?? "";
+  showWaiting($("run-waiting"), run);
   setBar($("run-bar"), run);
   $("run-bar").hidden = run.state === "SUCCEEDED";
   const percent = `${Math.round(100 * run.progress)} %`;
-  const parts = [run.state === "SUCCEEDED" ? null : percent, timeLeft(run), run.state === "RUNNING" ? run.stage && (isForces(run) ? run.stage : `${run.stage} stage`) : null,
+  const parts = [run.state === "SUCCEEDED" ? null : percent, timeLeft(run), run.state === "RUNNING" ? run.stage && (run.kind === "tracks" ? `${run.stage} stage` : run.stage) : null,
     plural(run.generations, "generation"), `${run.evaluations.toLocaleString("en")} evaluations`];
   $("run-progress").textContent = parts.filter(Boolean).join(" · ");
+  // The request contains the declaration of the rig, which only its user has.
+  for (const id of ["copy-curl", "copy-python"]) $(id).hidden = run.driven;
   $("diagnose-run").hidden = run.generations === 0;
   $("run-exports").hidden = run.generations === 0;
   for (const format of ["csv", "netcdf", "json"]) $(`export-${format}`).href = `v1/runs/${part(run.id)}/export?format=${format}`;
@@ -169,9 +187,9 @@ function drawFitness() {
   $("history").hidden = !sorted.length;
   $("history-note").hidden = sorted.length > 0;
   $("history-note").textContent = {
-    QUEUED: "The run waits for its turn.", RUNNING: "The first generation is being computed.",
+    QUEUED: run.driven ? "The run waits for its simulation." : "The run waits for its turn.", RUNNING: "The first generation is being computed.",
   }[run.state] ?? "The run ended before its first generation.";
-  if (sorted.length) drawHistory($("history"), sorted, isForces(run)).catch((error) => toast(error.message));
+  if (sorted.length) drawHistory($("history"), sorted, run.kind).catch((error) => toast(error.message));
 }
 
 async function act(action) {

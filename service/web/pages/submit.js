@@ -4,7 +4,7 @@ import { ApiError, call, get, part, postJson } from "../base/api.js";
 import { copy, curl, python } from "../base/copying.js";
 import { $, el, size, toast } from "../base/format.js";
 import { showErrors } from "../base/form_errors.js";
-import { isForces, METHODS, MODES, PRESETS, setup, spoken } from "../base/labels.js";
+import { isForces, isSeries, METHODS, MODES, PRESETS, setup, spoken } from "../base/labels.js";
 
 const TYPED_MS = 350;
 const CHOICES = { ...METHODS, auto: "auto, recommended" };
@@ -59,11 +59,12 @@ export function setUpSubmit({ onSubmitted, onUploaded }) {
   $("file").addEventListener("change", () => upload($("file").files[0], onUploaded));
 }
 
-// ``dataset`` is preselected; it may be older than those of the lists.
-export function openSubmit(known, dataset = known[0]) {
+// ``dataset`` is preselected; it may be older than those of the lists. Runs of series start on the page of their dataset.
+export function openSubmit(all, dataset = all.find((one) => !isSeries(one))) {
+  const known = all.filter((one) => !isSeries(one));
   datasets = known.some((one) => one.id === dataset?.id) || !dataset ? known : [dataset, ...known];
   if (!datasets.length) {
-    toast("Upload a dataset first");
+    toast(all.length ? "Open a dataset of series to start its runs" : "Upload a dataset first");
     return;
   }
   const form = $("submit-form");

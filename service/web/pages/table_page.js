@@ -3,7 +3,7 @@
 import { get, part } from "../base/api.js";
 import { $, DASH, el, plural, size, toast, when } from "../base/format.js";
 import { badge, runName, stateWord, timeLeft } from "../parts/sidebar.js";
-import { isForces, METHODS, misfit, modelOf, withEffects } from "../base/labels.js";
+import { isForces, isSeries, METHODS, misfit, modelOf, withEffects } from "../base/labels.js";
 
 const SHOWN = 100;
 export const MOST_COMPARED = 6;
@@ -153,17 +153,22 @@ function runRow(run) {
   const method = [METHODS[run.spec.method] ?? run.spec.method, run.spec.mode].filter(Boolean).join(", ");
   return el("tr", {}, cell(choice(run)), cell(open("run", run.id, runName(run))), cell(open("dataset", run.dataset_id, datasetName(run.dataset_id), run.id)),
     cell(badge(run), el("small", {}, timeLeft(run) ? ` ${timeLeft(run)}` : "")), cell(value === DASH ? DASH : `${value} ${unit}`),
-    cell([modelOf(run), withEffects(run.spec)].filter(Boolean).join(" ")), cell(method), cell(run.generations.toLocaleString("en")), cell(when(run.created_at)));
+    cell([modelOf(run), withEffects(run)].filter(Boolean).join(" ")), cell(method), cell(run.generations.toLocaleString("en")), cell(when(run.created_at)));
 }
 
 function diagnosisRow(diagnosis) {
   return el("tr", {}, cell(open("diagnosis", diagnosis.id, diagnosis.name)), cell(open("dataset", diagnosis.dataset_id, datasetName(diagnosis.dataset_id), diagnosis.id)),
     cell(badge(diagnosis), el("small", {}, timeLeft(diagnosis) ? ` ${timeLeft(diagnosis)}` : "")), cell(diagnosis.verdict ?? DASH),
-    cell(modelOf(diagnosis)), cell(when(diagnosis.created_at)));
+    cell([modelOf(diagnosis), withEffects(diagnosis)].filter(Boolean).join(" ")), cell(when(diagnosis.created_at)));
+}
+
+function kindOf(dataset) {
+  if (isSeries(dataset)) return `series of rig ${dataset.rig.name}`;
+  return isForces(dataset) ? "forces" : "tracked markers";
 }
 
 function datasetRow(dataset) {
   const held = dataset.recordings.filter((recording) => recording.held_out).length;
-  return el("tr", {}, cell(open("dataset", dataset.id, dataset.name)), cell(isForces(dataset) ? "forces" : "tracked markers"),
+  return el("tr", {}, cell(open("dataset", dataset.id, dataset.name)), cell(kindOf(dataset)),
     cell(String(dataset.recordings.length)), cell(String(held)), cell(size(dataset.size_bytes)), cell(when(dataset.created_at)));
 }

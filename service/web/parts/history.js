@@ -1,8 +1,9 @@
 // Chart of the fitness by generation: best, mean and present start on a log axis, with the boundaries of the stages.
+// The values are sums of squares; of series, root mean squares in percent of the range.
 
 import { mm, plain, significant, withForceUnit } from "../base/format.js";
 import { axis, draw } from "../base/plots.js";
-import { newtons } from "../base/labels.js";
+import { newtons, OF_RANGE } from "../base/labels.js";
 
 const GAP = { sequence: null, best: null, mean: null };
 const SIDE_BY_SIDE = 3; // stages whose names fit above the chart; more are written vertically
@@ -24,28 +25,35 @@ function stageLabel(name, stages, upright) {
   return base.length > LONGEST_UPRIGHT ? `${base.slice(0, LONGEST_UPRIGHT - 1)}…` : base;
 }
 
-const MARKERS = {
-  unit: "m²", hover: (item) => `, ${mm(item.best_mm)} mm per marker`,
+const TRACKS = {
+  unit: "m²", value: (item, name) => item[name], hover: (item) => `, ${mm(item.best_mm)} mm per marker`,
   about: "Sum of squared distances between simulated and recorded markers; lower is better.",
 };
 const FORCES = {
-  unit: "N²", hover: (item) => `, RMS ${withForceUnit(newtons(item.best_mn))}, ${plain(item.stage)}: genes moved by ${significant(item.diversity, 2)} of their range`,
+  unit: "N²", value: (item, name) => item[name], hover: (item) => `, RMS ${withForceUnit(newtons(item.best_mn))}, ${plain(item.stage)}: genes moved by ${significant(item.diversity, 2)} of their range`,
   about: "Sum of squared differences between modelled and recorded forces; lower is better. Gauss-Newton weights recordings and axes by their noise, so this sum can rise.",
 };
 
-export const aboutHistory = (forces) => (forces ? FORCES : MARKERS).about;
+// The sums of squares are converted by the ratio that the best individual has.
+const percent = (item, name) => (item[name] === null || !item.best ? null : item.best_percent * Math.sqrt(item[name] / item.best));
+const SERIES = {
+  unit: OF_RANGE, value: percent, hover: () => "",
+  about: "Root mean square difference between simulated and recorded values, relative to the range of each channel; lower is better.",
+};
+const KINDS = { tracks: TRACKS, forces: FORCES, series: SERIES };
 
-export const drawHistory = (node, items, forces = false) => draw(node, (look) => chart(look, items, forces));
+export const aboutHistory = (kind) => KINDS[kind].about;
 
-function chart(look, items, forces) {
-  const shown = forces ? FORCES : MARKERS;
+export const drawHistory = (node, items, kind) => draw(node, (look) => chart(look, items, KINDS[kind]));
+
+function chart(look, items, shown) {
   const x = items.map((item) => item.sequence);
   // Stages sum over different recordings, so their values are not comparable: no line joins them.
   const points = items.flatMap((item, i) => (i && items[i - 1].stage !== item.stage ? [GAP, item] : [item]));
   const boundaries = items.filter((item, i) => i === 0 || items[i - 1].stage !== item.stage);
   const stages = new Set(boundaries.map((item) => item.stage));
   const upright = boundaries.length > SIDE_BY_SIDE;
-  const dots = items.length < 3 || (forces && items.length < FEW * boundaries.length);
+  const dots = items.length < 3 || (shown !== TRACKS && items.length < FEW * boundaries.length);
   const line = (name, value, colour, width, labels) => ({
     x: points.map((item) => item.sequence), y: points.map(value), name, mode: dots ? "lines+markers" : "lines", type: "scatter",
     line: { color: colour, width }, marker: { color: colour, size: 6 }, text: labels,
@@ -53,9 +61,9 @@ function chart(look, items, forces) {
   });
   const traces = [
     // A Gauss-Newton iteration has one individual and no mean; from a second start, it may lie above the best.
-    line("mean", (item) => (item.stage?.endsWith(NEWTON) || item.mean === item.best ? null : item.mean), look.faint, 1.5),
-    line("best", (item) => item.best, look.accent, 2.5, points.map((item) => (item === GAP ? "" : shown.hover(item)))),
-    line("this start", (item) => (item.stage?.endsWith(NEWTON) && item.mean !== item.best ? item.mean : null), look.quiet, 1.5),
+    line("mean", (item) => (item.stage?.endsWith(NEWTON) || item.mean === item.best ? null : shown.value(item, "mean")), look.faint, 1.5),
+    line("best", (item) => shown.value(item, "best"), look.accent, 2.5, points.map((item) => (item === GAP ? "" : shown.hover(item)))),
+    line("this start", (item) => (item.stage?.endsWith(NEWTON) && item.mean !== item.best ? shown.value(item, "mean") : null), look.quiet, 1.5),
   ].filter((trace) => trace.name !== "this start" || trace.y.some((value) => value !== null));
   return {
     traces, margin: { l: 10, r: 52, t: 26, b: 10 }, hovermode: "x unified",

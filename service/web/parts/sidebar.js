@@ -2,7 +2,7 @@
 
 import { isFinal } from "../base/api.js";
 import { $, DASH, duration, el, plural, size, when } from "../base/format.js";
-import { isForces, misfit, modelOf } from "../base/labels.js";
+import { contents, misfit, modelOf } from "../base/labels.js";
 
 const WORDS = {
   QUEUED: "waiting", RUNNING: "running", PAUSED: "paused", SUCCEEDED: "done", FAILED: "failed", CANCELLED: "cancelled",
@@ -76,7 +76,7 @@ export function drawDiagnoses(diagnoses, currentId) {
 export function drawDatasets(datasets, { onRun, onDiagnose, onDelete }) {
   const items = datasets.map((dataset) => {
     const held = dataset.recordings.filter((recording) => recording.held_out).length;
-    const about = `${plural(dataset.recordings.length, "recording")} of ${isForces(dataset) ? "forces" : "markers"}${held ? `, ${held} held out` : ""}`;
+    const about = `${plural(dataset.recordings.length, "recording")} of ${contents(dataset)}${held ? `, ${held} held out` : ""}`;
     const button = (text, action, key) => keyed(el("button", { type: "button", onclick: () => action(dataset) }, text), `${key}-${dataset.id}`);
     return el("li", {}, el("div", { className: "card" },
       el("a", { href: `#dataset=${encodeURIComponent(dataset.id)}`, title: dataset.description }, el("strong", {}, dataset.name)),

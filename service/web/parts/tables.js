@@ -1,12 +1,12 @@
 // Tables of a run: key numbers, misfit by recording, genes.
 
-import { $, el, forceUnit, keyNumber, rounded, mm, plural, significant } from "../base/format.js";
-import { isForces, misfit, newtons } from "../base/labels.js";
+import { $, DASH, el, forceUnit, keyNumber, rounded, mm, plural, significant } from "../base/format.js";
+import { misfit, newtons, relativeMisfit } from "../base/labels.js";
 
 export function drawNumbers(run, result) {
   const { value, unit } = misfit(run);
-  const what = isForces(run) ? "best so far, RMS difference" : "best so far, mean distance per marker";
-  const cells = result ? (isForces(result) ? forceOutcome : outcome)(result) : [
+  const what = run.kind === "tracks" ? "best so far, mean distance per marker" : "best so far, RMS difference";
+  const cells = result ? OUTCOMES[run.kind](result) : [
     keyNumber(what, value, unit, true),
     keyNumber("stage", run.stage ?? "–"),
     keyNumber("generations", String(run.generations)),
@@ -47,28 +47,46 @@ function forceOutcome(result) {
   return cells;
 }
 
+function seriesOutcome(result) {
+  const number = (label, value, main = false) => {
+    const shown = relativeMisfit(result, value);
+    return keyNumber(label, shown.value, shown.unit, main);
+  };
+  return [
+    number("before, RMS of the fitted recordings", result.before), number("after, RMS of the fitted recordings", result.after, true),
+    ...(result.held_out_after === null ? []
+      : [number("before, held out", result.held_out_before), number("after, held out, predicted", result.held_out_after, true)]),
+  ];
+}
+
+const OUTCOMES = { tracks: outcome, forces: forceOutcome, series: seriesOutcome };
+
+// Bars of the values before and after, as fractions of the widest bar; dotted, unless it is null, the floor.
+function twin(before, after, floor) {
+  const percent = (fraction) => `${100 * (fraction || 0)}%`;
+  const bars = el("div", { className: "twin", ariaHidden: "true" }, el("i"), el("i"));
+  [before, after].forEach((value, i) => { bars.children[i].style.width = percent(value); });
+  if (floor) {
+    const line = el("span", { className: "floor" });
+    line.style.left = percent(floor);
+    bars.append(line);
+  }
+  return bars;
+}
+
+const use = (recording, fitted) => el("span", { className: recording.held_out ? "badge held" : "badge" },
+  recording.held_out ? "held out" : fitted ? "fitted" : "not fitted");
+
 export function drawMisfit(result) {
   $("misfit-section").hidden = !result;
   if (!result) return;
   const all = result.recordings.flatMap((r) => [r.before_mm, r.after_mm]).filter((value) => value !== null);
   const largest = Math.max(...all, result.noise_mm ?? 0) || 1;
-  const share = (value) => `${(100 * (value ?? 0)) / largest}%`;
-  const bars = (before, after) => {
-    const twin = el("div", { className: "twin", ariaHidden: "true" }, el("i"), el("i"));
-    [before, after].forEach((value, i) => { twin.children[i].style.width = share(value); });
-    if (result.noise_mm) {
-      const floor = el("span", { className: "floor" });
-      floor.style.left = share(result.noise_mm);
-      twin.append(floor);
-    }
-    return twin;
-  };
+  const bars = (before, after) => twin(before / largest, after / largest, result.noise_mm / largest);
   const row = (name, badge, before, after, className = "") => el("tr", { className },
     el("td", {}, name), el("td", {}, badge), el("td", { className: "n" }, mm(before)),
     el("td", { className: "n" }, mm(after)), el("td", { className: "wide" }, bars(before, after)));
-  const use = (r) => el("span", { className: r.held_out ? "badge held" : "badge" },
-    r.held_out ? "held out" : r.stage === null ? "not fitted" : "fitted");
-  const rows = result.recordings.map((r) => row(r.name, use(r), r.before_mm, r.after_mm));
+  const rows = result.recordings.map((r) => row(r.name, use(r, r.stage !== null), r.before_mm, r.after_mm));
   rows.push(row("All fitted", "", result.before_mm, result.after_mm, "total"));
   if (result.held_out_after_mm !== null) {
     rows.push(row("All held out", "", result.held_out_before_mm, result.held_out_after_mm, "total"));
@@ -77,6 +95,28 @@ export function drawMisfit(result) {
   $("misfit-note").textContent = "Grey: nominal genome. Coloured: best genome."
     + (result.noise_mm ? ` Dotted: expected from tracking noise alone, ${mm(result.noise_mm)} mm.` : "")
     + result.remarks.map((remark) => ` Note: ${remark}.`).join("");
+}
+
+// A row for each channel of each recording, in the unit of the channel.
+export function drawSeriesMisfit(result) {
+  $("series-misfit-section").hidden = !result;
+  if (!result) return;
+  const largest = new Map();
+  for (const { name, before, after, noise } of result.recordings.flatMap((one) => one.channels)) {
+    largest.set(name, Math.max(largest.get(name) ?? 0, before ?? 0, after ?? 0, noise ?? 0));
+  }
+  const number = (text) => el("td", { className: "n" }, text);
+  $("series-misfit").tBodies[0].replaceChildren(...result.recordings.flatMap((recording) => recording.channels.map((channel, k) => {
+    const { name, unit, before, after, noise, samples } = channel;
+    const top = largest.get(name) || 1;
+    const first = k ? [] : [el("th", { scope: "rowgroup", rowSpan: recording.channels.length }, recording.name),
+      el("td", { rowSpan: recording.channels.length }, use(recording, recording.fitted))];
+    return el("tr", {}, ...first, el("td", { title: plural(samples, "sample") }, name), number(rounded(before)), number(rounded(after)), number(rounded(noise)),
+      el("td", {}, unit === "1" ? DASH : unit), el("td", { className: "wide" }, twin(before / top, after / top, noise / top)));
+  })));
+  const relative = result.relative_to === "noise" ? "the standard deviation of its noise" : "its range, because the noise of some channel is not known";
+  $("series-misfit-note").textContent = "Root mean square of the differences. Grey: nominal genome. Coloured: best genome. Dotted: noise of one sample. "
+    + `The numbers at the top are relative: each channel is divided by ${relative}.`;
 }
 
 // ``means``: for a finished run on forces, whose values are the means of its estimates.
