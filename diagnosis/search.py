@@ -37,6 +37,7 @@ from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.search_state import SearchState
 from wingfit.diagnosis.spec import DiagnosisSpec
 from wingfit.diagnosis.subject import Subject
+from wingfit.diagnosis.verdict.noise_doubt import judged_noise
 from wingfit.diagnosis.verdict.verdict import decide
 from wingfit.diagnosis.verdict.weigh_hypotheses import HypothesisWeights, nominal_suffices, tolerated_excess, weigh
 from wingfit.rigs.suspect import Suspect
@@ -60,6 +61,7 @@ def run_search(state: SearchState, free: tuple[str, ...]) -> Steps:
     for k, fit in enumerate(fit_nominal(state.context, free, {**spec.start, **spec.calibration.fixed})):
         state.initial_fit = state.initial_fit or (state.context, fit)
         yield 0.25 * (1.0 - 0.85 ** (k + 1)), "fitting the nominal model"
+    state.context = replace(state.context, data=judged_noise(state.data, fit))
     yield 0.25, "comparing with a finer discretisation"
     suspects = select_suspects(state.subject, spec)
     for fraction, stage in _search_coarse_first(state, fit, suspects):

@@ -14,6 +14,7 @@ from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.problem import Problem, compared
 from wingfit.diagnosis.policy import POLICY, Policy
 from wingfit.inference.noise.harmonic import HarmonicFit, harmonic_fit, whole_markers
+from wingfit.inference.noise.series import MEASURED_ERROR
 from wingfit.inference.noise.series_fit import SeriesFit, SeriesReduction
 from wingfit.records import AnyRecording, Recording, Series
 from wingfit.records.array_types import Array, Float
@@ -46,6 +47,8 @@ class WhitenedData:
         tolerance: root mean square (m or N) that any model may differ from the truth.
         policy: thresholds.
         series: reduces recordings without a beat, with their noise; None for tracks and forces.
+        is_steady: of series: whether the residual of the nominal model may be slow noise. If not, because its power
+            differs as that of no stationary noise does, the noise is what is visible of it.
     """
 
     recordings: tuple[AnyRecording, ...]
@@ -54,6 +57,7 @@ class WhitenedData:
     tolerance: float
     policy: Policy = POLICY
     series: SeriesReduction | None = None
+    is_steady: bool = True
 
     @classmethod
     def of(
@@ -77,7 +81,7 @@ class WhitenedData:
 
     def like(self, recordings: Sequence[AnyRecording]) -> WhitenedData:
         """Reduce other ``recordings`` of the same dataset in the same way."""
-        return WhitenedData.of(recordings, self.axes, self.policy, self.series)
+        return replace(WhitenedData.of(recordings, self.axes, self.policy, self.series), is_steady=self.is_steady)
 
     @property
     def kind(self) -> AnyKind:
@@ -264,7 +268,8 @@ class WhitenedData:
         """
         every = self.weight * self.variance
         if self.kind == "series":
-            error = max(one.relative_error for one in self.reduced if isinstance(one, SeriesFit))
+            known = max(one.relative_error for one in self.reduced if isinstance(one, SeriesFit))
+            error = known if self.is_steady else MEASURED_ERROR
             return float(error * every.sum() + self.excess_standard_error_of_samples)
         independent = sum(
             1.0 if recording.kind == "forces" else fit.used.sum() / 3.0

@@ -45,11 +45,11 @@ class _Feature(NamedTuple):
 def series_law(data: WhitenedData, nominal: Fit, units: Mapping[str, str]) -> FreeLaw | None:
     """Return a law of the misfit of the fitted ``nominal`` model, whose inputs have ``units`` by name.
 
-    None for fewer than three recordings, or without a misfit beyond the noise. A law without terms means that none
+    None for fewer than three experiments, or without a misfit beyond the noise. A law without terms means that none
     predicts left-out recordings.
     """
     recordings = [one for one in data.recordings if isinstance(one, Series)]
-    if len(recordings) < MIN_RECORDINGS:
+    if len(data.experiments) < MIN_RECORDINGS:
         return None
     variables = _variables(recordings[0], units)
     features, channels = list(_features(variables)), recordings[0].quantities
@@ -64,8 +64,13 @@ def series_law(data: WhitenedData, nominal: Fit, units: Mapping[str, str]) -> Fr
         for c in channels
         for f in features
     ]
-    count = np.array([float(part.stop - part.start) for part in data.recording_slices])
-    sums = NormalEquations.of(np.array(every), len(labels), count, PRIOR_SD)
+    count = [float(part.stop - part.start) for part in data.recording_slices]
+    sums = NormalEquations.of(  # repeats of an experiment do not predict each other
+        np.array([sum(every[r] for r in group) for group in data.experiments]),
+        len(labels),
+        np.array([sum(count[r] for r in group) for group in data.experiments]),
+        PRIOR_SD,
+    )
     return selected_law(sums, labels, "of motion and inputs")
 
 
@@ -73,14 +78,14 @@ def _variables(recording: Series, units: Mapping[str, str]) -> list[_Variable]:
     channels = [_Variable(one.name, one.name, one.unit) for one in recording.quantities]
     rates = [_Variable(f"d({one.name})/dt", f"the rate of {one.name}", _over(one.unit, "s")) for one in channels]
     inputs = [_Variable(name, f"the input {name}", units.get(name, "1")) for name in recording.inputs]
-    return [*channels, *rates, *inputs][:MOST_VARIABLES]
+    return [*channels, *inputs, *rates][:MOST_VARIABLES]
 
 
 def _values(recording: Series, residual: Float[Array, "T C"], variables: list[_Variable]) -> Float[Array, "V T"]:
     """Return the variables as the model simulates them, at the samples of ``recording``."""
     simulated = np.stack([_filled(recording.times, column) for column in (recording.values + residual).T])
     rates = np.gradient(simulated, recording.times, axis=1)
-    return np.concatenate([simulated, rates, *[one[None] for one in recording.inputs.values()]])[: len(variables)]
+    return np.concatenate([simulated, *[one[None] for one in recording.inputs.values()], rates])[: len(variables)]
 
 
 def _filled(times: Float[Array, " T"], values: Float[Array, " T"]) -> Float[Array, " T"]:
@@ -132,7 +137,7 @@ def _products(data: WhitenedData, nominal: Fit, recording: int, features: list[A
 
 
 def _power(unit: str, exponent: int) -> str:
-    return unit if unit == "1" else f"{_bracketed(unit)}^{exponent}"
+    return unit if unit == "1" else f"({unit})^{exponent}" if set(unit) & set(" /*^") else f"{unit}^{exponent}"
 
 
 def _times(one: str, other: str) -> str:

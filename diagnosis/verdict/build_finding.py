@@ -19,6 +19,7 @@ from wingfit.diagnosis.location.series_law import series_law
 from wingfit.diagnosis.rig_subject import RigSubject
 from wingfit.diagnosis.search_state import SearchState
 from wingfit.diagnosis.subject import Subject
+from wingfit.diagnosis.verdict.held_out import held_out_refutes
 from wingfit.diagnosis.verdict.locate_in_beat import locate_in_beat
 from wingfit.diagnosis.verdict.next_experiment import rank_conditions, separations
 from wingfit.diagnosis.verdict.next_series import Candidate, rank_recordings, series_separations
@@ -52,8 +53,13 @@ def build_finding(state: SearchState, name: str, held_out: Sequence[AnyRecording
     yield 0.05, "predicting the held-out recordings", None
     validation, failed = predict_held_out(held_out, state.context, nominal.fit, best.fit)
     own = ResidualPair(state.data, nominal.fit.residuals, best.fit.residuals)
+    refuted = (
+        decision.verdict == "adequate"
+        and validation is not None
+        and held_out_refutes(state.context, best.fit, validation, _discretisation_error(state))
+    )
     located: Located | None = None
-    for fraction, stage, found in _locate(state, decision, best, own, validation):
+    for fraction, stage, found in _locate(state, decision, best, own, validation, refuted=refuted):
         located = found
         yield 0.15 + 0.6 * fraction, stage, None
     if located is None:
@@ -63,7 +69,7 @@ def build_finding(state: SearchState, name: str, held_out: Sequence[AnyRecording
         for part, ranked in _advice(state):
             advice = ranked
             yield 0.75 + 0.2 * part, "comparing what to record next", None
-    finding = _finding(state, name, decision, best, own, validation, advice, located)
+    finding = _finding(state, name, decision, best, own, validation, advice, located, refuted=refuted)
     yield 1.0, "done", replace(finding, remarks=(*finding.remarks, *failed))
 
 
@@ -83,8 +89,15 @@ def _advice(state: SearchState) -> Iterator[tuple[float, tuple[Advice, ...]]]:
 
 
 def _locate(
-    state: SearchState, decision: Decision, best: Refit, fitted: ResidualPair, held_out: ResidualPair | None
+    state: SearchState,
+    decision: Decision,
+    best: Refit,
+    fitted: ResidualPair,
+    held_out: ResidualPair | None,
+    *,
+    refuted: bool,
 ) -> Iterator[tuple[float, str, Located | None]]:
+    """Locate the misfit; ``refuted``: by the held-out recordings alone, so that it lies there."""
     if state.data.kind != "series":
         yield from locate_in_beat(state, decision, best, fitted, held_out)
         return
@@ -93,7 +106,10 @@ def _locate(
     shown = list(series_overlays(data, fitted.before, fitted.after, held_out=False))
     if held_out is not None:
         shown += series_overlays(held_out.data, held_out.before, held_out.after, held_out=True)
-    where = series_location(data, coefficients, fitted.before)
+    if refuted and held_out is not None:
+        where = series_location(held_out.data, held_out.data.coefficients_of(held_out.before), held_out.before)
+    else:
+        where = series_location(data, coefficients, fitted.before)
     channels = channel_misfits(data, coefficients, best.fit.coefficients)
     law = series_law(data, nominal, _input_units(state.subject)) if decision.verdict == "unnamed" else None
     yield 1.0, "locating the misfit", Located(where, tuple(shown), law=law, channels=channels)
@@ -112,6 +128,8 @@ def _finding(
     validation: ResidualPair | None,
     advice: tuple[Advice, ...],
     located: Located,
+    *,
+    refuted: bool,
 ) -> Finding:
     subject, data, weights = state.subject, state.data, state.final_weights
     nominal, discretisation, unit = state.fitted_nominal.refit, _discretisation_error(state), state.data.unit
@@ -120,7 +138,7 @@ def _finding(
     if validation is not None:
         rows += recording_misfits(validation, held_out=True, floor=discretisation)
         proved = proof(validation, discretisation, unit, effects_added=bool(best.names))
-        decision = doubted_by_held_out(decision, proved, data)
+        decision = doubted_by_held_out(decision, proved, data, refuted=refuted)
     suspects, genes = {suspect.name: suspect for suspect in subject.suspects}, gene_values(data, best)
     weights = replace(weights, refits=tuple(best if one.names == best.names else one for one in weights.refits))
     return Finding(
@@ -133,7 +151,7 @@ def _finding(
         + ("" if data.kind == "series" else drift_sentence(data))
         + remaining_sentence(data, decision, best, discretisation)
         + noise_sentence(data, decision, nominal)
-        + held_out_sentence(first, proved, data),
+        + held_out_sentence(first, proved, data, refuted=refuted),
         probabilities=decision.probabilities,
         named=decision.named,
         added_effects=best.names,

@@ -128,18 +128,28 @@ def explained_by_genes(
     """Return the part of the square of ``difference`` [n] that the rival's genes explain, minus the penalty for that.
 
     ``difference`` is divided by the noise, as are the ``slopes`` [F, n], its derivatives with respect to the genes.
-    ``lag1``: correlation of successive samples of the noise; ``unknown`` [F]: genes about which the existing recordings
-    say nothing, such as the start of a new one.
+    ``lag1``: correlation of successive samples of the noise; ``unknown`` [F]: genes that have another value in the new
+    recording, such as its start, of which only the prior is known.
     """
     lag1 = float(np.clip(lag1, 0.0, 0.99))
     weight = data.likelihood_weight(rival.coefficients)
     counts = weight * (1.0 - lag1) / (1.0 + lag1)  # weight of a sample, less for correlated noise
     known = rival.jacobian / data.scale[:, None]
-    if unknown is not None:
-        known = np.where(unknown, 0.0, known)
     information = weight * known.T @ known + np.eye(len(rival.unit)) / PRIOR_SD**2
+    if unknown is not None:
+        information = _forgotten(information, unknown)
     score = slopes @ difference
     return float(counts * score @ np.linalg.solve(information + counts * slopes @ slopes.T, score))
+
+
+def _forgotten(information: Float[Array, "F F"], unknown: Bool[Mask, " F"]) -> Float[Array, "F F"]:
+    """Return ``information`` about the other genes whatever the ``unknown`` ones were, and the prior of these."""
+    others = ~unknown
+    found = np.diag(np.where(unknown, PRIOR_SD**-2, 0.0))
+    across = information[np.ix_(others, unknown)]
+    lost = across @ np.linalg.solve(information[np.ix_(unknown, unknown)], across.T) if unknown.any() else 0.0
+    found[np.ix_(others, others)] = information[np.ix_(others, others)] - lost
+    return np.asarray(found)
 
 
 def resolving_probability(data: WhitenedData, weights: HypothesisWeights, apart: float) -> float:

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import scipy
 
 from wingfit.diagnosis.evidence.fit import Fit
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.inference.noise.series import EXCEEDS, MEASURED_ERROR
+from wingfit.inference.noise.steadiness import steady_probability
 
 LOUD = 3.0  # times the visible noise; first-order noise with a correlation of 0.8 has as much
+EXCEEDING = 1.5  # times the assumed noise: power of an octave that is compared between recordings and times
 BY_CHANCE = 1e-3  # probability that noise as assumed is so much smaller than its standard deviation
 
 
@@ -53,6 +57,18 @@ def uncertain(data: WhitenedData, fit: Fit) -> bool:
     beyond = data.excess(fit.coefficients) - (data.policy.negligible * data.noise) ** 2 - data.accepted**2
     least, most = sure_error(data), data.excess_standard_error
     return data.policy.refuting_excess * least < beyond <= data.policy.refuting_excess * most
+
+
+def judged_noise(data: WhitenedData, nominal: Fit) -> WhitenedData:
+    """Return ``data``, not steady if slow noise does not explain the residual of the fit ``nominal``.
+
+    Asked only where slow noise is all that could explain it.
+    """
+    if data.kind != "series" or not uncertain(data, nominal):
+        return data
+    noises = data.series.noises if data.series else {}
+    deviations = [noises[one.name].standard_deviation for one in data.recordings]
+    return replace(data, is_steady=steady_probability(nominal.residuals, deviations, EXCEEDING) >= BY_CHANCE)
 
 
 def sure_error(data: WhitenedData) -> float:

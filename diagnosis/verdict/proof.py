@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from wingfit.calibration.estimates.linearised import free_genes, unit_at
+from wingfit.calibration.problem import Problem
 from wingfit.diagnosis.evidence.context import FitContext
 from wingfit.diagnosis.evidence.fit import FIT_ERRORS, Fit, gauss_newton_fit
 from wingfit.diagnosis.evidence.intervals import CONFIDENCE
@@ -15,7 +16,7 @@ from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.finding import Interval, Proof, RecordingMisfit, amount
 from wingfit.inference.noise.series_fit import SeriesFit
 from wingfit.records import AnyRecording, Condition, Recording
-from wingfit.records.array_types import Array
+from wingfit.records.array_types import Array, Float
 from wingfit.records.series import belongs_to
 
 BOOTSTRAP_DRAWS = 400  # of markers, with replacement (Efron 1979)
@@ -79,6 +80,20 @@ def predict_held_out(
 
 def _predicted(one: WhitenedData, context: FitContext, fit: Fit) -> tuple[Array, str | None]:
     """Return the residuals [T, C] of the only recording of ``one`` with the genes of ``fit``, and why it failed."""
+    try:
+        problem, values = with_own_genes(one, context, fit)
+    except FIT_ERRORS as error:
+        return np.empty(0), str(error)
+    _, (reason,), (residuals,) = one.evaluate(problem, context.evaluator, values)
+    return residuals[0], reason
+
+
+def with_own_genes(one: WhitenedData, context: FitContext, fit: Fit) -> tuple[Problem, Float[Array, "1 K"]]:
+    """Return the problem of the only recording of ``one`` with the genes of ``fit``, and values of its free genes.
+
+    Free are the K genes that belong to this recording alone, which are fitted to it; without any, those of ``fit``. One
+    of FIT_ERRORS where it cannot be simulated.
+    """
     (recording,) = one.recordings
     problem = replace(fit.problem, recordings=one.recordings)
     own = tuple(gene.name for gene in fit.problem.model.genes if belongs_to(gene.name, recording.name))
@@ -87,13 +102,9 @@ def _predicted(one: WhitenedData, context: FitContext, fit: Fit) -> tuple[Array,
         base = problem.base.replace(fit.values)
         problem = replace(problem, free=own, base=base)
         start = unit_at(free_genes(problem), np.array([base[name] for name in own]))
-        try:
-            *_, last = gauss_newton_fit(replace(context, data=one), problem, start, OWN_STEPS)
-        except FIT_ERRORS as error:
-            return np.empty(0), str(error)
+        *_, last = gauss_newton_fit(replace(context, data=one), problem, start, OWN_STEPS)
         values = last.individual
-    _, (reason,), (residuals,) = one.evaluate(problem, context.evaluator, values)
-    return residuals[0], reason
+    return problem, values
 
 
 def recording_misfits(predicted: ResidualPair, *, held_out: bool, floor: float) -> tuple[RecordingMisfit, ...]:

@@ -36,13 +36,18 @@ def noise_sentence(data: WhitenedData, decision: Decision, nominal: Refit) -> st
     return " But the noise is not known well enough to exclude it: see the remarks."
 
 
-def doubted_by_held_out(decision: Decision, proved: Proof | None, data: WhitenedData) -> Decision:
+def doubted_by_held_out(
+    decision: Decision, proved: Proof | None, data: WhitenedData, *, refuted: bool = False
+) -> Decision:
     """Return ``decision`` with less certainty where held-out series contradict it.
 
-    A model that does not predict them is adequate with a limited probability (`Policy.doubted_noise`). Effects with
-    which they are predicted no better are not named.
+    A model that they refute (``refuted``) is not adequate. One that does not predict them otherwise is adequate with a
+    limited probability (`Policy.doubted_noise`). Effects with which they are predicted no better are not named.
     """
     found = dict(decision.probabilities)
+    if refuted and decision.verdict == "adequate":
+        found["adequate"], found["unnamed"] = 0.0, found["unnamed"] + found["adequate"]
+        return replace(decision, verdict="unnamed", probabilities=found, named=(), alternatives=())
     if _unpredicted(decision, proved, data):
         moved = max(found["adequate"] - data.policy.doubted_noise, 0.0)
         found["adequate"], found["unnamed"] = found["adequate"] - moved, found["unnamed"] + moved
@@ -54,10 +59,15 @@ def doubted_by_held_out(decision: Decision, proved: Proof | None, data: Whitened
     return decision
 
 
-def held_out_sentence(before: Decision, proved: Proof | None, data: WhitenedData) -> str:
+def held_out_sentence(before: Decision, proved: Proof | None, data: WhitenedData, *, refuted: bool = False) -> str:
     """Return a sentence on held-out series that contradict the decision ``before`` they were considered; else empty."""
     if proved is None:
         return ""
+    if refuted and before.verdict == "adequate":
+        return (
+            " The fitted recordings do not show it, but the held-out ones do: their misfit is "
+            f"{proved.before.value:.3g} times the floor, more than noise and the errors of the genes explain."
+        )
     if _unpredicted(before, proved, data):
         return (
             f" But it does not predict the held-out recordings: their misfit is {proved.before.value:.3g} times the "

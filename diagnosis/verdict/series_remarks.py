@@ -25,7 +25,7 @@ SOURCES = {
 def series_remarks(data: WhitenedData, nominal: Fit, *, adequate: bool) -> tuple[str, ...]:
     """Return remarks on the noise; ``nominal``: fit of the nominal model; ``adequate``: whether it is called so."""
     doubts = _doubts(data, nominal) if adequate else ()
-    return (*_sources(data), *_uneven(data), *_contradicted(data), *doubts)
+    return (*_sources(data), *_uneven(data), *_contradicted(data), *_unsteady(data), *doubts)
 
 
 def _sources(data: WhitenedData) -> Iterator[str]:
@@ -50,6 +50,14 @@ def _uneven(data: WhitenedData) -> Iterator[str]:
                 f"the noise of {channel} in {', '.join(loud)} is more than {UNEVEN:g} times that of the quietest "
                 "recording: missing physics may hide in it"
             )
+
+
+def _unsteady(data: WhitenedData) -> Iterator[str]:
+    if not data.is_steady:
+        yield (
+            "the residual differs between recordings, or between parts of their time, as stationary noise of no colour "
+            "does: it is not taken for slow noise"
+        )
 
 
 def _contradicted(data: WhitenedData) -> Iterator[str]:

@@ -30,6 +30,7 @@ Source = Literal["repeats", "period", "stated", "highest frequencies", "resoluti
 SOURCES: tuple[Source, ...] = ("highest frequencies", "resolution", "stated", "period", "repeats")  # least sure first
 
 EVEN = 0.1  # of an interval: largest deviation of one that counts as even
+JITTER = 9  # samples: differences of times that last longer are a drift of the clock
 LEAST_PERIODS = 3.0
 BANDS_PER_OCTAVE = 2.0
 LEAST_PER_BAND = 6  # coefficients
@@ -205,13 +206,17 @@ def _shown(recording: Series, column: int, stated: float | None = None) -> Visib
 def at_even_times(times: Float[Array, " T"], values: Float[Array, " T"]) -> Float[Array, " T"]:
     """Return ``values`` [T] at evenly spaced times near ``times`` [T], to first order of their differences.
 
-    Else the motion times these differences would look like noise. The noise itself changes by at most EVEN.
+    Else the motion times these differences would look like noise. Differences that accumulate (a clock that drifts) are
+    left: they stretch the motion slowly, which no high frequency shows. The noise changes by at most EVEN.
     """
     if len(times) < 3:
         return values
     count = np.arange(len(times))
     even = np.polynomial.Polynomial.fit(count, times, 1)(count)
-    return np.asarray(values - np.gradient(values, times) * (times - even))
+    apart = times - even
+    usual = (times[-1] - times[0]) / (len(times) - 1)
+    apart -= scipy.ndimage.uniform_filter1d(apart, JITTER, mode="nearest")
+    return np.asarray(values - np.gradient(values, times) * np.clip(apart, -EVEN * usual, EVEN * usual))
 
 
 def _deviations(shown: Sequence[VisibleNoise | None]) -> Array:

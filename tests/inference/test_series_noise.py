@@ -241,3 +241,15 @@ def test_noise_of_a_period_and_of_repeats_is_known() -> None:
     for name, one in known.items():
         np.testing.assert_array_equal(one.standard_deviation, whole[name].standard_deviation)
         assert one.relative_error[0] == whole[name].relative_error
+
+
+@pytest.mark.parametrize("stretch", [0.002, 0.005])
+def test_a_clock_that_drifts_does_not_look_like_noise(stretch: float) -> None:
+    count, ratio = 1500, []
+    for seed in range(5):
+        interval = np.where(np.arange(count) < count / 2, 1.0 - stretch, 1.0 + stretch)
+        times = 0.01 * np.cumsum(interval)
+        values = np.sin(30.0 * times) + coloured(seed, 0.0, count)
+        one = Series("one", times, (Channel("y", "m"),), values[:, None])
+        ratio.append(float(noise_of([one])["one"].standard_deviation[0]) / SIGMA)
+    assert np.mean(ratio) == pytest.approx(1.0, abs=0.1)

@@ -78,3 +78,24 @@ def test_what_differs_from_recording_to_recording_has_no_law() -> None:
 
 def test_two_recordings_are_too_few() -> None:
     assert law_of(lambda x, _: 5.0 * x**3, 2) is None
+
+
+def test_repeats_of_one_experiment_do_not_validate_a_law() -> None:
+    """The same misfit in every repeat is predicted by the other repeats, whatever its law is."""
+    drive = 5.0 * np.sin(4.0 * TIMES)
+    error = 0.02 * np.sin(2 * np.pi * 2.3 * TIMES + 1.0)
+    recordings = tuple(
+        Series(
+            f"r{k}",
+            TIMES,
+            (CHANNEL,),
+            (0.03 * drive + error + NOISE * np.random.default_rng(k).standard_normal(len(TIMES)))[:, None],
+            inputs={"drive": drive},
+            repeats="one",
+        )
+        for k in range(5)
+    )
+    dataset = SeriesDataset("d", "follower", recordings, (CHANNEL,), (Quantity("drive", "m/s^2"),))
+    finding = wingfit.diagnose(dataset, rig=RIG)
+    assert finding.verdict == "unnamed"
+    assert finding.law is None

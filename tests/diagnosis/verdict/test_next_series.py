@@ -9,7 +9,9 @@ import pytest
 
 import wingfit
 from tests.rigs.oscillator import UNFORCED, blank
+from wingfit.diagnosis.evidence.fit import PRIOR_SD
 from wingfit.diagnosis.finding import Finding
+from wingfit.diagnosis.verdict.next_experiment import _forgotten
 from wingfit.diagnosis.verdict.next_series import candidates
 from wingfit.records import Channel, Quantity, Series, SeriesDataset
 from wingfit.rigs.rig_model import RigModel
@@ -78,3 +80,16 @@ def test_candidates_change_one_thing_within_what_was_recorded() -> None:
     ]
     largest = next(one for one in candidates([a, again, b]) if "1.5 times" in one.change)
     np.testing.assert_array_equal(largest.recording.inputs["push"], 3.0 * push)
+
+
+def test_a_start_that_is_new_keeps_what_was_known_of_the_other_genes() -> None:
+    """The information on the rest is that of the marginal distribution (inverse of a block of the covariance)."""
+    slopes = np.random.default_rng(0).standard_normal((12, 4))
+    information = slopes.T @ slopes + 4.0 * np.eye(4)
+    unknown = np.array([False, True, False, True])
+    found = _forgotten(information, unknown)
+    marginal = np.linalg.inv(information)[np.ix_(~unknown, ~unknown)]
+    np.testing.assert_allclose(found[np.ix_(~unknown, ~unknown)], np.linalg.inv(marginal), rtol=1e-10)
+    np.testing.assert_allclose(found[np.ix_(unknown, unknown)], np.eye(2) / PRIOR_SD**2)
+    np.testing.assert_allclose(found[np.ix_(~unknown, unknown)], 0.0)
+    np.testing.assert_array_equal(_forgotten(information, np.zeros(4, bool)), information)

@@ -62,6 +62,17 @@ def test_a_model_that_does_not_predict_is_adequate_with_little_certainty() -> No
     assert doubted_by_held_out(before, proof(1.1, 1.1, improved=False), data()) == before
 
 
+def test_a_model_that_held_out_recordings_refute_is_not_adequate() -> None:
+    before, wrong = decision("adequate"), proof(3.0, 3.0, improved=False)
+    after = doubted_by_held_out(before, wrong, data(), refuted=True)
+    assert (after.verdict, after.probabilities["adequate"]) == ("unnamed", 0.0)
+    assert sum(after.probabilities.values()) == pytest.approx(1.0)
+    assert "but the held-out ones do: their misfit is 3 times" in held_out_sentence(before, wrong, data(), refuted=True)
+    assert doubted_by_held_out(decision("named"), proof(3.0, 1.0, improved=True), data(), refuted=True) == decision(
+        "named"
+    )
+
+
 @pytest.mark.parametrize("verdict", VERDICTS)
 def test_recordings_with_a_beat_keep_their_verdict(verdict: Verdict) -> None:
     found = decision(verdict)
