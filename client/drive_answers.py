@@ -35,8 +35,8 @@ class Simulation(TypedDict):
 class Work(TypedDict):
     """What a driver is to do for a job, and how far the job is.
 
-    ``rig`` is the declaration of the rig. ``simulations`` is empty where the job needs none at present; with a final
-    ``state``, it needs no more.
+    ``rig`` is the declaration of the rig, null unless it was wanted. ``simulations`` is empty where the job needs none
+    at present; with a final ``state``, it needs no more.
     """
 
     job_id: str
@@ -46,7 +46,7 @@ class Work(TypedDict):
     progress: float
     eta_seconds: float | None
     error: str | None
-    rig: dict[str, Any]
+    rig: dict[str, Any] | None
     simulations: list[Simulation]
 
 

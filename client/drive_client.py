@@ -25,14 +25,17 @@ class DriveCalls(Transport):
         limit: int = 1,
         wait_s: float = 0.0,
         holding: Sequence[str] = (),
+        with_rig: bool = False,
         leaving: bool = False,
     ) -> Work:
         """Take up to ``limit`` simulations of a run or diagnosis, and return them with the state of the job.
 
         ``driver``: any name that is yours alone; ``wait_s``: how long to wait for a simulation, at most 25;
-        ``holding``: ids of those that it took and computes; ``leaving``: give back what this driver took.
+        ``holding``: ids of those that it took and computes; ``with_rig``: whether to return the declaration of
+        the rig; ``leaving``: give back what this driver took.
         """
-        body = {"driver": driver, "limit": limit, "wait_s": wait_s, "holding": list(holding), "leaving": leaving}
+        body = {"driver": driver, "limit": limit, "wait_s": wait_s, "holding": list(holding)}
+        body |= {"with_rig": with_rig, "leaving": leaving}
         return cast(Work, self._json("POST", f"/v1/drive/{part(job_id)}/work", json=body, key=str(uuid.uuid4())))
 
     def return_results(self, job_id: str, driver: str, results: Sequence[dict[str, Any]]) -> Settled:

@@ -38,6 +38,10 @@ def check(dataset: Dataset, spec: DiagnosisSpec) -> None:
     WhitenedData.of(fitted, axes)
     for recording in held_out:
         WhitenedData.of([recording], axes)
+    _check_search(subject, spec)
+
+
+def _check_search(subject: Subject, spec: DiagnosisSpec) -> None:
     select_suspects(subject, spec)
     base_genome(subject.model, {**spec.start, **spec.calibration.fixed})
     if spec.refits < 1:
@@ -68,10 +72,11 @@ def diagnose_rig(rig: Rig, dataset: SeriesDataset, spec: DiagnosisSpec, evaluato
 @one_blas_thread
 def check_diagnosis_of_rig(rig: Rig, dataset: SeriesDataset, spec: DiagnosisSpec) -> None:
     """Raise ValueError where ``spec`` does not fit ``rig`` and ``dataset``; simulates nothing."""
-    subject, fitted, _, _ = _prepare_rig(rig, dataset, spec)
-    WhitenedData.of(fitted, (), spec.policy, SeriesReduction.of(dataset.recordings, fitted))
-    select_suspects(subject, spec)
-    base_genome(subject.model, {**spec.start, **spec.calibration.fixed})
+    subject, fitted, held_out, _ = _prepare_rig(rig, dataset, spec)
+    data = WhitenedData.of(fitted, (), spec.policy, SeriesReduction.of(dataset.recordings, fitted))
+    for recording in held_out:
+        data.like([recording])
+    _check_search(subject, spec)
 
 
 @one_blas_thread

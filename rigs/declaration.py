@@ -38,6 +38,7 @@ class GeneDeclaration(_Declared):
     upper: Number
     scale: Literal["linear", "log"] = "linear"
     description: Text = ""
+    share_of: Annotated[Name | None, Field(description="group of weights that are divided by their sum")] = None
 
 
 Genes = Annotated[list[GeneDeclaration], Field(max_length=MOST)]
@@ -56,6 +57,9 @@ class SuspectDeclaration(_Declared):
     typical: Annotated[dict[Name, Number], Field(max_length=MOST)] = {}
     source: Text = ""
     signature: Text = ""
+    location_genes: Annotated[
+        dict[Literal["span", "chord"], Name], Field(description="genes of the location of the effect")
+    ] = {}
     confused_with: Annotated[list[Name], Field(max_length=MOST)] = []
     candidate_shapes: Annotated[list[list[Number]], Field(max_length=MOST)] = []
 
@@ -134,7 +138,7 @@ def _suspect(declared: SuspectDeclaration) -> Suspect:
 
 
 def _gene_json(gene: Gene) -> dict[str, Any]:
-    return {name: value for name, value in asdict(gene).items() if name != "share_of"}
+    return asdict(gene)
 
 
 def _suspect_json(suspect: Suspect) -> dict[str, Any]:
@@ -147,6 +151,7 @@ def _suspect_json(suspect: Suspect) -> dict[str, Any]:
         "typical": dict(suspect.typical),
         "source": suspect.source,
         "signature": suspect.signature,
+        "location_genes": dict(suspect.location_genes),
         "confused_with": list(suspect.confused_with),
         "candidate_shapes": [list(one) for one in suspect.candidate_shapes],
     }

@@ -18,6 +18,7 @@ from wingfit.rigs.suspect import Suspect
 SMOOTH = 0.02  # of the port's rate: dry friction has 3/4 of its force at this rate
 WIDEST = 0.5  # of the port's coordinate: largest play, and largest distance in which a hysteresis builds up
 PUSHES = 0.1  # of its largest value: a friction may seem to drive the coordinate by as much, when others are wrong
+LEAST_TYPICAL, MOST_TYPICAL = 1e-60, 1e60  # of coordinate, rate and force: their cubes are finite
 Values = Mapping[str, float]
 
 
@@ -45,8 +46,11 @@ class Port:
     def __post_init__(self) -> None:
         for name in ("coordinate", "rate", "force"):
             value = getattr(self, name)
-            if not (np.isfinite(value) and value > 0.0):
-                raise ValueError(f"port {self.name!r}: its typical {name} is {value:g}; give a positive number")
+            if not LEAST_TYPICAL <= value <= MOST_TYPICAL:
+                raise ValueError(
+                    f"port {self.name!r}: its typical {name} is {value:g}; give a positive number from "
+                    f"{LEAST_TYPICAL:g} to {MOST_TYPICAL:g}"
+                )
 
 
 class Law(NamedTuple):

@@ -68,21 +68,31 @@ class Rig:
             raise ValueError(f"rig {self.name!r} has no channel; give the unit of each, such as {{'angle': 'rad'}}")
         if not callable(self.simulate):
             raise ValueError(f"rig {self.name!r}: simulate is {self.simulate!r}; give a function of (genes, run)")
+        self._check_names()
         own = [gene.name for gene in (*self.genes, *self.recording_genes)]
-        added = [gene.name for suspect in self.suspects for gene in suspect.genes]
+        for port in self.ports:
+            if port.stiffness and port.stiffness not in own:
+                raise ValueError(
+                    f"port {port.name!r}: its stiffness {port.stiffness!r} is no gene of rig {self.name!r}"
+                )
+
+    def _check_names(self) -> None:
+        """ValueError for a name that is used twice, or a gene that is called as one of a single recording."""
+        genes = [gene.name for gene in (*self.genes, *self.recording_genes)]
+        genes += [gene.name for suspect in self.suspects for gene in suspect.genes]
         for what, names in (
-            ("gene", own + added),
+            ("gene", genes),
             ("suspect", [suspect.name for suspect in self.suspects]),
             ("port", [port.name for port in self.ports]),
         ):
             twice = [name for name, times in Counter(names).items() if times > 1]
             if twice:
                 raise ValueError(f"rig {self.name!r} has {what} {twice[0]!r} twice; give each a name of its own")
+        bracketed = [name for name in genes if "[" in name]
+        if bracketed:
+            raise ValueError(
+                f"rig {self.name!r}: gene {bracketed[0]!r} has a bracket, like genes of single recordings; rename it"
+            )
         both = sorted(set(self.channels) & set(self.inputs))
         if both:
             raise ValueError(f"rig {self.name!r}: {both[0]!r} is a channel and an input; give one of them another name")
-        for port in self.ports:
-            if port.stiffness and port.stiffness not in own:
-                raise ValueError(
-                    f"port {port.name!r}: its stiffness {port.stiffness!r} is no gene of rig {self.name!r}"
-                )

@@ -117,10 +117,10 @@ class RigModel:
         of_others = {gene.name for one in self.all_recordings for gene in self.genes_of(one)} - set(own)
         columns = [k for k, name in enumerate(names) if name not in of_others]
         labels = [own.get(names[k], names[k]) for k in columns]
-        first: dict[bytes, int] = {}
-        place = [first.setdefault(row.tobytes(), len(first)) for row in batch[:, columns]]
-        rows = [batch[place.index(k), columns].tolist() for k in range(len(first))]
-        return [dict(zip(labels, row, strict=True)) for row in rows], place
+        own_values, known = batch[:, columns], dict[bytes, int]()
+        place = [known.setdefault(row.tobytes(), len(known)) for row in own_values]
+        rows = dict(zip(place[::-1], own_values[::-1].tolist(), strict=True))
+        return [dict(zip(labels, rows[k], strict=True)) for k in range(len(known))], place
 
     def simulated(self, values: Values, recording: Series) -> Simulated:
         """Simulate one individual with ``values`` by name, as :meth:`calls` gives them, for ``recording``."""

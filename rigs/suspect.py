@@ -63,6 +63,13 @@ class Suspect:
                 raise ValueError(
                     f"size gene {gene.name!r} of suspect {self.name!r} must be 0 when off, not {gene.nominal:g}"
                 )
+        shapes = len(genes) - len(sizes)
+        for row in self.candidate_shapes:
+            if len(row) != shapes:
+                raise ValueError(
+                    f"suspect {self.name!r}: candidate_shapes has a row of {len(row)} values; each needs {shapes}, one "
+                    "for each gene that is no size"
+                )
         values = {gene.name: _typical(gene) if gene.name in sizes else gene.nominal for gene in genes}
         for name, value in (
             ("title", self.title or self.name.replace("_", " ")),

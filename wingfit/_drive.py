@@ -24,7 +24,8 @@ from wingfit.client.client import Client
 from wingfit.client.drive_answers import Simulation, Work
 from wingfit.client.transport import WingfitError, is_passing
 from wingfit.records import Series, SeriesDataset, load_dataset
-from wingfit.rigs.declaration import declaration
+from wingfit.rigs.dataset_model import model_of
+from wingfit.rigs.declaration import RigDeclaration, declaration
 from wingfit.rigs.rig import Rig
 from wingfit.rigs.rig_model import RigModel
 from wingfit.workers.share import child_environment, lower_priority
@@ -33,8 +34,10 @@ T = TypeVar("T")
 OnWork = Callable[[Work], object]
 BATCH_SECONDS = 0.5  # computing time of the simulations that are taken at once
 MOST_AT_ONCE = 500
-MOST_NUMBERS = 500_000  # in one message with results
+MOST_NUMBERS = 50_000  # in one message with several results
+LONGEST_REASON = 2000  # characters
 WAIT_SECONDS = 20.0  # that a request for simulations may take, where nothing is computed
+ASK_SECONDS = 2.0  # after which the state of the job is asked for though nothing more can be taken
 RETRY_SECONDS = 1.0  # after which a request is repeated that the server did not answer
 HEARD_SECONDS = 20.0  # between signs of life
 DISK_FULL = 507
@@ -72,16 +75,15 @@ def drive(
         dataset = load_dataset(path)
     if not isinstance(dataset, SeriesDataset):
         raise WingfitError("not a job of a rig", f"{job_id} is on a wing or a vehicle, which the server simulates")
-    used = {one.name: rig.channels[one.name] for one in dataset.channels}
-    with _Computing(_Simulator(rig, used, dataset), workers) as computing:
+    with _Computing(_Simulator(rig, dataset), workers) as computing:
         return _Driver(client, job_id, computing, on_work or (lambda _: None), patience_s).run()
 
 
 def _first(client: Client, job_id: str, rig: Rig) -> Work:
     """Return the state of the job; WingfitError if its rig differs from ``rig``."""
-    work = client.take_work(job_id, "look", limit=0, leaving=True)
-    mine, theirs = declaration(rig), work["rig"]
-    different = [name for name in mine if _plain(mine[name]) != _plain(theirs.get(name))]
+    work = client.take_work(job_id, "look", limit=0, with_rig=True, leaving=True)
+    mine, theirs = (RigDeclaration.model_validate(one).model_dump() for one in (declaration(rig), work["rig"]))
+    different = [name for name in mine if name != "description" and mine[name] != theirs[name]]
     if different:
         raise WingfitError(
             "this is another rig",
@@ -91,28 +93,27 @@ def _first(client: Client, job_id: str, rig: Rig) -> Work:
     return work
 
 
-def _plain(value: Any) -> Any:
-    """Return ``value`` as it looks after a way through JSON: numbers are floats."""
-    if isinstance(value, dict):
-        return {key: _plain(one) for key, one in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(one) for one in value]
-    return float(value) if isinstance(value, int) and not isinstance(value, bool) else value
-
-
 class _Simulator:
     """Computes single simulations; sent to worker processes once."""
 
-    def __init__(self, rig: Rig, channels: dict[str, str], dataset: SeriesDataset) -> None:
-        self._dataset = dataset
-        self._model = RigModel(replace(rig, channels=channels), dataset.recordings)
+    def __init__(self, rig: Rig, dataset: SeriesDataset) -> None:
+        self._dataset, self._model = dataset, model_of(rig, dataset)
         self._models: dict[tuple[str, ...], RigModel] = {}
 
     def __getstate__(self) -> dict[str, Any]:
         return vars(self) | {"_models": {}}
 
     def compute(self, simulation: Simulation) -> dict[str, Any]:
-        """Return the result of ``simulation`` as the server takes it."""
+        """Return the result of ``simulation`` as the server takes it.
+
+        An error that is not the failure of an individual, such as a misspelt name, ends the job.
+        """
+        try:
+            return self._computed(simulation)
+        except Exception as error:
+            return {"id": simulation["id"], "error": f"{type(error).__name__}: {error}"[:LONGEST_REASON]}
+
+    def _computed(self, simulation: Simulation) -> dict[str, Any]:
         effects = tuple(simulation["effects"])
         if effects not in self._models:
             self._models[effects] = self._model.with_effects(*effects)
@@ -121,7 +122,7 @@ class _Simulator:
         if reason is None and not np.isfinite(channels).all():
             reason = "a simulated channel is not finite"
         if reason is not None:
-            return {"id": simulation["id"], "reason": reason[:2000]}
+            return {"id": simulation["id"], "reason": reason[:LONGEST_REASON]}
         columns = zip(recording.channels, channels.T.tolist(), strict=True)
         return {"id": simulation["id"], "channels": dict(columns)}
 
@@ -150,12 +151,14 @@ def _compute(simulation: Simulation) -> dict[str, Any]:
 class _Computing:
     """Computes simulations, in this process or in ``workers`` others; a context manager, at whose end these close.
 
-    A process that ends is replaced; a simulation that was under way BROKEN times when one ended has failed.
+    A process that ends is replaced. What was under way is then computed again, one at a time, to find which simulation
+    ends its process; one that does so BROKEN times has failed.
     """
 
     def __init__(self, simulator: _Simulator, workers: int) -> None:
         self._simulator, self._workers = simulator, workers
         self._queue: deque[Simulation] = deque()
+        self._doubtful: deque[Simulation] = deque()  # one of them ended a process
         self._present: list[Simulation] = []  # in this process
         self._under_way: dict[Future[dict[str, Any]], Simulation] = {}
         self._broken: Counter[str] = Counter()
@@ -172,13 +175,14 @@ class _Computing:
     @property
     def holding(self) -> list[str]:
         """Ids of the simulations that are not finished; may be called in another thread."""
-        return [one["id"] for one in (*self._present, *self._queue.copy(), *self._under_way.copy().values())]
+        waiting = (*self._queue.copy(), *self._doubtful.copy(), *self._under_way.copy().values())
+        return [one["id"] for one in (*self._present, *waiting)]
 
     @property
     def room(self) -> int:
         """Number of further simulations that will be computed within about BATCH_SECONDS."""
         most = int(BATCH_SECONDS * self._workers / self._seconds)
-        return min(max(most, self._workers), MOST_AT_ONCE) - len(self._queue) - len(self._under_way)
+        return max(min(max(most, self._workers), MOST_AT_ONCE) - len(self.holding), 0)
 
     def add(self, simulations: Iterable[Simulation]) -> None:
         """Queue ``simulations``."""
@@ -202,28 +206,30 @@ class _Computing:
 
     def _some(self) -> list[dict[str, Any]]:
         """Keep the processes busy, and return what they finish within BATCH_SECONDS."""
-        try:
-            with child_environment():
-                while self._queue and len(self._under_way) < self._workers and self._pool:
-                    self._under_way[self._pool.submit(_compute, self._queue[0])] = self._queue[0]
-                    self._queue.popleft()
-            done = wait(self._under_way, BATCH_SECONDS, FIRST_COMPLETED).done
-            results = [future.result() for future in done]
-        except BrokenProcessPool:
-            return self._replaced()
-        for future in done:
-            del self._under_way[future]
-        return results
+        source, most = (self._doubtful, 1) if self._doubtful else (self._queue, self._workers)
+        with child_environment():
+            while source and len(self._under_way) < most and self._pool:
+                self._under_way[self._pool.submit(_compute, source[0])] = source[0]
+                source.popleft()
+        results, lost = list[dict[str, Any]](), list[Simulation]()
+        for future in wait(self._under_way, BATCH_SECONDS, FIRST_COMPLETED).done:
+            simulation = self._under_way.pop(future)
+            try:
+                results.append(future.result())
+            except BrokenProcessPool:
+                lost.append(simulation)
+        return results + (self._replaced(lost) if lost else [])
 
-    def _replaced(self) -> list[dict[str, Any]]:
-        """Start new processes, queue again what was under way, and return what has failed for good."""
-        lost = list(self._under_way.values())
+    def _replaced(self, lost: list[Simulation]) -> list[dict[str, Any]]:
+        """Start new processes, queue again what was ``lost`` with the old ones, and return what has failed for good."""
+        lost += self._under_way.values()
         self._under_way.clear()
         if self._pool:
             self._pool.shutdown(wait=False, cancel_futures=True)
         self._pool = self._new_pool()
-        self._broken.update(one["id"] for one in lost)
-        self._queue.extendleft(one for one in lost if self._broken[one["id"]] < BROKEN)
+        if len(lost) == 1:  # no other simulation can have ended the process
+            self._broken[lost[0]["id"]] += 1
+        self._doubtful.extend(one for one in lost if self._broken[one["id"]] < BROKEN)
         reason = f"the simulation ended its process, {BROKEN} times"
         return [{"id": one["id"], "reason": reason} for one in lost if self._broken[one["id"]] >= BROKEN]
 
@@ -240,21 +246,25 @@ class _Driver:
         self._client, self._job, self._computing = client, job_id, computing
         self._on_work, self._patience = on_work, patience_s
         self._name = f"driver-{uuid.uuid4().hex[:12]}"
+        self._asked = 0.0
 
     def run(self) -> Work:
         over = threading.Event()
-        threading.Thread(target=self._stay_heard, args=(over,), name="wingfit-drive", daemon=True).start()
+        heard = threading.Thread(target=self._stay_heard, args=(over,), name="wingfit-drive", daemon=True)
+        heard.start()
         try:
             while True:
-                work = self._patiently(self._take)
-                self._on_work(work)
-                if work["state"] in FINAL:
-                    return work
-                self._computing.add(work["simulations"])
+                if self._computing.room or time.monotonic() - self._asked > ASK_SECONDS:
+                    work = self._patiently(self._take)
+                    self._on_work(work)
+                    if work["state"] in FINAL:
+                        return work
+                    self._computing.add(work["simulations"])
                 for message in _messages(self._computing.finished()):
                     self._patiently(partial(self._client.return_results, self._job, self._name, message))
         finally:
             over.set()
+            heard.join(HEARD_SECONDS)
             with suppress(WingfitError):
                 self._client.take_work(self._job, self._name, limit=0, leaving=True)
 
@@ -265,9 +275,8 @@ class _Driver:
                 self._client.take_work(self._job, self._name, limit=0, holding=self._computing.holding)
 
     def _take(self) -> Work:
-        holding = self._computing.holding
-        wait_s = 0.0 if holding else WAIT_SECONDS
-        room = max(self._computing.room, 0)
+        self._asked, holding = time.monotonic(), self._computing.holding
+        wait_s, room = 0.0 if holding else WAIT_SECONDS, self._computing.room
         return self._client.take_work(self._job, self._name, limit=room, wait_s=wait_s, holding=holding)
 
     def _patiently(self, send: Callable[[], T]) -> T:

@@ -1,7 +1,7 @@
 """The most frequent reads, from the database straight to JSON: a page of runs, a page of a run's history.
 
-They bypass SQLAlchemy's object mapper, which would load and parse the unneeded columns ``genome`` and ``result`` and
-take longer than all the rest (docs/decisions/0010-reads.md).
+They bypass SQLAlchemy's object mapper, which would load and parse the unneeded columns ``genome``, ``result`` and
+``rig`` and take longer than all the rest (docs/decisions/0010-reads.md).
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from wingfit.service.storage import store
 from wingfit.service.storage.database import Database
 from wingfit.service.storage.tables import RunRow
 
-RUN = tuple(column.name for column in RunRow.__table__.columns if column.name not in ("genome", "result"))
+RUN = tuple(column.name for column in RunRow.__table__.columns if column.name not in ("genome", "result", "rig"))
 ITEM = tuple(HistoryItem.__annotations__)
 RUNS_IN_CACHE = 2**14
 
@@ -83,5 +83,4 @@ def _run_json(row: tuple[Any, ...]) -> bytes:
     """Return a run as JSON; ``row``: the columns named in RUN. Equal rows give equal JSON, so it is cached."""
     values = dict(zip(RUN, row, strict=True))
     values["spec"] = json.loads(values["spec"])
-    values["rig"] = values["rig"] and json.loads(values["rig"])
     return to_json(views.run_of(values))

@@ -19,7 +19,7 @@ UPLOAD_LIMIT = 64 * 2**20
 # Boundaries and headers of the multipart form around the file.
 FORM_OVERHEAD = 64 * 2**10
 BODY_LIMIT = 2**20
-DRIVE_PATH, DRIVE_LIMIT = "/v1/drive/", 32 * 2**20  # results of many simulations
+DRIVE_PATH, RESULTS, RESULTS_LIMIT = "/v1/drive/", "/results", 8 * 2**20  # of many simulations
 CHUNK = 256 * 2**10
 # Load balancers and Kubernetes probe these by IP address; they return nothing that was uploaded or computed.
 PROBES = frozenset({"/v1/health", "/v1/ready", "/v1/metrics"})
@@ -103,8 +103,8 @@ def _is_foreign(headers: Headers, host: str) -> bool:
 
 
 def _limit(scope: Scope) -> int:
-    if scope["path"].startswith(DRIVE_PATH):
-        return DRIVE_LIMIT
+    if scope["path"].startswith(DRIVE_PATH) and scope["path"].endswith(RESULTS):
+        return RESULTS_LIMIT
     return UPLOAD_LIMIT + FORM_OVERHEAD if scope["path"] == UPLOAD_PATH else BODY_LIMIT
 
 

@@ -23,7 +23,6 @@ from wingfit.service.jobs.interruptible import InterruptibleEvaluator
 from wingfit.service.jobs.job_kind import InterruptedStepError, JobKind, NotReadyError, Points, Step
 from wingfit.service.jobs.wakeups import Changes
 from wingfit.service.rigs.driving import Driving
-from wingfit.service.rigs.stored_rig import is_driven
 from wingfit.service.runs.simulation_hints import with_remedy
 from wingfit.service.storage import store
 from wingfit.service.storage.database import Database, DatabaseClosedError, is_full
@@ -34,6 +33,7 @@ from wingfit.workers.share import lower_priority
 
 LOG = logging.getLogger("wingfit.runs")
 LONGEST_ERROR = 1000
+MOST_DRIVEN, MOST_DRIVEN_OF_ONE = 16, 4  # jobs that drivers simulate, at the same time; those of one owner
 # Pause between attempts to write to a full disk: the first and the longest.
 RETRY_SECONDS = (0.5, 15.0)
 
@@ -51,14 +51,14 @@ class JobRef(NamedTuple):
     @classmethod
     def of(cls, kind: JobKind, row: JobRow) -> JobRef:
         """Return the job that ``row`` stores."""
-        return cls(kind, row.id, row.owner, is_driven(row.rig))
+        return cls(kind, row.id, row.owner, bool(row.driven))
 
     def __str__(self) -> str:
         return f"{self.kind.what} {self.id}"
 
 
 class Pace(NamedTuple):
-    """Signs of a hanging computation, for the metrics (0 where no job runs or waits).
+    """Signs of a hanging computation, for the metrics (0 where no job runs or waits; without those that users drive).
 
     ``stalled_s``: seconds since the last stored step, of the running job for which they are most; ``waited_s``: seconds
     that the oldest queued job has waited.
@@ -112,7 +112,7 @@ class Runner:
                     for row, kind in self._unfinished(session, state)
                 ]
                 todo = [(job, _step(row, jobs.Restart(self._most_starts))) for row, job in left]
-                self._suspects = {job for row, job in left if self._is_suspect(row)}
+                self._suspects = {job for row, job in left if self._is_suspect(row) and not job.driven}
             for job, instructions in todo:
                 self._obey(job, instructions)
 
@@ -147,7 +147,7 @@ class Runner:
                     raise conflict(f"{job}: {error}", state=row.state) from None
             if row.wish == jobs.Wish.CANCEL:
                 self._cancelled.add(job)
-            if Instruction.ENQUEUE in instructions and self._is_suspect(row):
+            if Instruction.ENQUEUE in instructions and self._is_suspect(row) and not job.driven:
                 self._suspects.add(job)
             self._obey(job, (*instructions, Instruction.PUBLISH))
         return row
@@ -171,10 +171,9 @@ class Runner:
         """Return how long running jobs have made no progress, and how long queued jobs have waited."""
         with self._lock:
             now = time.monotonic()
-            return Pace(
-                max((now - since for since in self._progressed.values()), default=0.0),
-                max((now - since for since in self._waits_since.values()), default=0.0),
-            )
+            stalled = [now - since for job, since in self._progressed.items() if not job.driven]
+            waited = [now - since for job, since in self._waits_since.items() if not job.driven]
+            return Pace(max(stalled, default=0.0), max(waited, default=0.0))
 
     def _leave(self) -> None:
         """Store that the server stops in an orderly way, so that the running jobs are not suspected of a crash."""
@@ -208,11 +207,13 @@ class Runner:
                 self._take(job)
         if Instruction.PUBLISH in instructions:
             self._changes.publish(job.id)
+            if job.driven:
+                self._driving.board.changes.publish(job.id)
         self._dispatch()
 
     def _dispatch(self) -> None:
         with self._lock:
-            while self._evaluator and not self._stopping and len(self._threads) < self._at_once:
+            while self._evaluator and not self._stopping:
                 job = self._next()
                 if job is None:
                     return
@@ -241,14 +242,15 @@ class Runner:
         return None
 
     def _may_start(self, job: JobRef) -> bool:
-        """Return whether fewer than the permitted number of jobs of this owner run, and the job itself has no thread.
+        """Return whether fewer than the permitted number of jobs run, of all and of this owner, and this one does not.
 
-        A job that was paused and resumed at once may still have its earlier thread. One that drivers simulate also
-        needs a driver.
+        A job that was paused and resumed at once may still have its earlier thread. Jobs that drivers simulate, which
+        take little of this machine, are counted by themselves; they also need a driver.
         """
-        beside = sum(other.owner == job.owner for other in self._threads)
+        most, of_one = (MOST_DRIVEN, MOST_DRIVEN_OF_ONE) if job.driven else (self._at_once, self._of_one)
+        beside = [other.owner for other in self._threads if other.driven == job.driven]
         is_ready = not job.driven or self._driving.attended(job.id)
-        return is_ready and job not in self._threads and beside < self._of_one
+        return is_ready and job not in self._threads and len(beside) < most and beside.count(job.owner) < of_one
 
     # -- in the job's thread ---------------------------------------------------------------------------------
 
@@ -262,8 +264,9 @@ class Runner:
             if not self._stopping:
                 self._end(job, jobs.Fail("interrupted"))  # becomes CANCELLED where that is pending
         except NotReadyError as error:
-            LOG.info("%s: goes back to the queue (%s)", job, error)
-            self._end(job, jobs.Wait())
+            if not self._stopping:
+                LOG.info("%s: goes back to the queue (%s)", job, error)
+                self._end(job, jobs.Wait())
         except Exception as error:
             self._fail(job, error)
         finally:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -22,17 +21,15 @@ from wingfit.workers.running_evaluator import Interrupted, RunningEvaluator
 from wingfit.workers.share import Task
 from wingfit.workers.watch import Standing
 
-PATIENCE_SECONDS = 60.0  # after which a job without a driver goes back to the queue
-
 
 class DrivenEvaluator(RunningEvaluator):
     """Puts the simulations of a job on the ``board``, and waits for their results; ``kept`` has earlier ones.
 
-    NotReadyError is raised where no driver is heard of for PATIENCE_SECONDS. Misfits are computed here, of the channels
+    NotReadyError is raised where no driver is heard of for SILENT_SECONDS. Misfits are computed here, of the channels
     that a driver returns, so that they are the same numbers as those of other evaluators.
     """
 
-    kind: Literal["in_process"] = "in_process"
+    kind: Literal["in_process"] = "in_process"  # it needs no process of the server
     workers = 1
 
     def __init__(self, job_id: str, board: Board, kept: KeptSimulations) -> None:
@@ -69,13 +66,10 @@ class DrivenEvaluator(RunningEvaluator):
             self._board.withdraw(self._job, keys)
 
     def _awaited(self, keys: Sequence[str], interrupted: Interrupted) -> dict[str, Simulated]:
-        since = time.monotonic()
         while (found := self._board.results(self._job, keys)) is None:
             self._check(interrupted)
-            if self._board.attended(self._job):
-                since = time.monotonic()
-            elif time.monotonic() - since > PATIENCE_SECONDS:
-                raise NotReadyError(f"no driver was heard of for {PATIENCE_SECONDS:g} s")
+            if not self._board.attended(self._job):
+                raise NotReadyError("its drivers are gone")
         return found
 
 

@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+
+from sqlalchemy import select
+from sqlalchemy.orm import Session
 
 from wingfit.rigs.rig_model import Simulated
 from wingfit.service.rigs.board import Board
 from wingfit.service.rigs.driven_evaluator import DrivenEvaluator
 from wingfit.service.rigs.kept_simulations import KeptSimulations
 from wingfit.service.storage.database import Database
+from wingfit.service.storage.tables import DiagnosisRow, RunRow
+from wingfit.workers.jobs import State
 
 
 class Driving:
     """The open simulations of driven jobs (``board``), and the stored results of earlier ones."""
 
     def __init__(self, database: Database) -> None:
-        self.board, self._kept = Board(), KeptSimulations(database)
+        self._database, self.board, self._kept = database, Board(), KeptSimulations(database)
 
     def attended(self, job_id: str) -> bool:
         """Return whether a driver serves the job at present."""
@@ -25,12 +30,25 @@ class Driving:
         """Return the evaluator of the job."""
         return DrivenEvaluator(job_id, self.board, self._kept)
 
-    def settle(self, job_id: str, results: Mapping[str, Simulated]) -> None:
-        """Store the ``results`` of a driver by key, first in the database, then for the job that waits for them."""
-        self._kept.write(job_id, results)
-        self.board.settle(job_id, results)
+    def settle(
+        self, job_id: str, driver: str, results: Mapping[str, Simulated], wanted: Callable[[Session], bool]
+    ) -> bool:
+        """Store the ``results`` of a driver by key, first in the database, then for the job that waits for them.
+
+        Does nothing, and returns False, if ``wanted(session)`` is False because the job has ended.
+        """
+        if not self._kept.write(job_id, results, wanted):
+            return False
+        self.board.settle(job_id, driver, results)
+        return True
 
     def left(self, job_id: str) -> None:
         """Drop what is open for a job that no longer runs; waiting drivers are woken, and learn its state."""
-        self.board.clear(job_id)
+        (self.board.forget if self._is_over(job_id) else self.board.clear)(job_id)
         self._kept.forget(job_id)
+
+    def _is_over(self, job_id: str) -> bool:
+        with self._database.read() as session:
+            states = [session.scalar(select(table.state).where(table.id == job_id)) for table in (RunRow, DiagnosisRow)]
+        found = [state for state in states if state is not None]
+        return not found or State(found[0]).final

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 from sqlalchemy import func, insert, select
+from sqlalchemy.orm import Session
 
 from wingfit.rigs.rig_model import Simulated
 from wingfit.service.storage.database import Database
@@ -32,20 +33,23 @@ class KeptSimulations:
                 found |= {row.key: _result(row, shapes[row.key]) for row in session.scalars(rows)}
         return found
 
-    def write(self, job_id: str, results: Mapping[str, Simulated]) -> None:
-        """Store ``results`` by key, up to MOST_BYTES for the job."""
-        size = sum(one.channels.nbytes for one in results.values() if one.reason is None)
+    def write(self, job_id: str, results: Mapping[str, Simulated], wanted: Callable[[Session], bool]) -> bool:
+        """Store ``results`` by key, up to MOST_BYTES for the job, unless ``wanted(session)`` is False by now.
+
+        Returns whether they are wanted.
+        """
+        rows = [_row(job_id, key, one) for key, one in results.items()]
+        size = sum(one.channels.nbytes if one.reason is None else len(one.reason) for one in results.values())
         with self._database.write() as session:
-            held = self._bytes.get(job_id)
-            if held is None:
+            if not wanted(session):
+                return False
+            if job_id not in self._bytes:
                 stored = select(func.sum(func.length(SimulatedRow.channels))).where(SimulatedRow.job_id == job_id)
-                held = session.scalar(stored) or 0
-            if held + size > MOST_BYTES:
-                return
-            rows = [_row(job_id, key, one) for key, one in results.items()]
-            if rows:
+                self._bytes[job_id] = session.scalar(stored) or 0
+            if rows and self._bytes[job_id] + size <= MOST_BYTES:
                 session.execute(insert(SimulatedRow).prefix_with("OR IGNORE"), rows)
-        self._bytes[job_id] = held + size
+                self._bytes[job_id] += size
+        return True
 
     def forget(self, job_id: str) -> None:
         """Forget the size of what is stored for a job that has ended."""

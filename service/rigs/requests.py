@@ -29,6 +29,7 @@ class WorkIn(_Body):
         list[Name],
         Field(max_length=MOST_SIMULATIONS, description="ids that this driver has taken and computes; others are free"),
     ] = []
+    with_rig: Annotated[bool, Field(description="whether the answer has the declaration of the rig")] = False
     leaving: Annotated[bool, Field(description="offer to others what this driver took, and wait for nothing")] = False
 
 
@@ -41,6 +42,10 @@ class ResultIn(_Body):
         Field(description="by name of the channel, in its unit, at every sample of the recording; null if it failed"),
     ] = None
     reason: Annotated[str | None, Field(min_length=1, max_length=2000, description="why it failed; else null")] = None
+    error: Annotated[
+        str | None,
+        Field(min_length=1, max_length=2000, description="of the simulation itself, with which the job fails"),
+    ] = None
 
 
 class ResultsIn(_Body):

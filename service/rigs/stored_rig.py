@@ -14,6 +14,7 @@ from wingfit.rigs.rig import Rig
 from wingfit.service.http.problems import error_item, invalid
 
 INSTALLED, DECLARED = "installed", "declared"
+MOST_DRIVEN_VALUES = 300_000  # of a recording; each takes up to 26 bytes of a message
 
 RigIn = Annotated[
     Name | RigDeclaration,
@@ -24,13 +25,17 @@ RigIn = Annotated[
 ]
 
 
-def stored_rig(given: str | RigDeclaration) -> dict[str, Any]:
-    """Return what a job stores of its rig, as JSON."""
-    return {INSTALLED: given} if isinstance(given, str) else {DECLARED: given.model_dump()}
+def stored_rig(given: str | RigDeclaration | None) -> dict[str, Any]:
+    """Return the columns with which a job stores its rig, by name; empty without a rig."""
+    if given is None:
+        return {}
+    if isinstance(given, str):
+        return {"rig": {INSTALLED: given}, "rig_name": given, "driven": False}
+    return {"rig": {DECLARED: given.model_dump()}, "rig_name": given.name, "driven": True}
 
 
 def given_rig(stored: Mapping[str, Any]) -> str | RigDeclaration:
-    """Return what the request of a job gave as its rig; the inverse of :func:`stored_rig`."""
+    """Return what the request of a job gave as its rig; ``stored``: the column ``rig`` of the job."""
     return RigDeclaration.model_validate(stored[DECLARED]) if DECLARED in stored else str(stored[INSTALLED])
 
 
@@ -43,18 +48,6 @@ def rig_of(stored: Mapping[str, Any]) -> Rig:
     """Return the rig of a job; ValueError if it is no longer installed."""
     given = given_rig(stored)
     return _installed(given) if isinstance(given, str) else given.rig()
-
-
-def is_driven(stored: Mapping[str, Any] | None) -> bool:
-    """Return whether a driver simulates the rig of a job, and not the server."""
-    return stored is not None and DECLARED in stored
-
-
-def rig_in_words(stored: Mapping[str, Any] | None) -> str | None:
-    """Return the name of a job's rig; None if its dataset describes the rig."""
-    if stored is None:
-        return None
-    return str(stored[DECLARED]["name"] if DECLARED in stored else stored[INSTALLED])
 
 
 def requested_rig(given: str | RigDeclaration | None, dataset: AnyDataset) -> Rig | None:
@@ -75,7 +68,10 @@ def requested_rig(given: str | RigDeclaration | None, dataset: AnyDataset) -> Ri
         )
         raise invalid("there is no simulation", [error_item("body.rig", None, message)])
     try:
-        return _installed(given) if isinstance(given, str) else given.rig()
+        if isinstance(given, str):
+            return _installed(given)
+        _refuse_large(dataset)
+        return given.rig()
     except ValueError as error:
         shown = given if isinstance(given, str) else given.name
         raise invalid("the rig cannot be used", [error_item("body.rig", shown, str(error))]) from None
@@ -89,3 +85,13 @@ def _installed(name: str) -> Rig:
             "on your machine, send its declaration ('wingfit diagnose DATASET --rig my_rig.py' does)"
         )
     return load_rig(name)
+
+
+def _refuse_large(dataset: SeriesDataset) -> None:
+    """ValueError for a recording whose simulation does not fit into the message of a driver."""
+    for one in dataset.recordings:
+        if one.values.size > MOST_DRIVEN_VALUES:
+            raise ValueError(
+                f"recording {one.name!r} has {one.values.size} values; a driver can return {MOST_DRIVEN_VALUES} for a "
+                "simulation: thin or cut the recording, install the rig on the server, or diagnose it with --local"
+            )

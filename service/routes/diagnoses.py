@@ -70,9 +70,9 @@ def submit(
             known = wing_or_vehicle(dataset)
             spec = checks.checked(body, known, service.engine, service.diagnoser, of_run, _genome(run))
         name = body.name or f"{dataset.name}, {spec_views.model_name(dataset, spec.calibration)}"
-        row = DiagnosisRow(dataset_id=dataset_id, kind=dataset.kind, name=name[: spec_views.LONGEST_NAME])
+        row = DiagnosisRow(dataset_id=dataset_id, kind=dataset.kind, **stored_rig(given))
+        row.name = name[: spec_views.LONGEST_NAME]
         row.run_id, row.spec = body.run_id, store.spec_json(spec)
-        row.rig = None if given is None else stored_rig(given)
         return row
 
     return submit_job(request, service, service.diagnosing, idempotency_key, body, plan)

@@ -7,6 +7,7 @@ from contextlib import suppress
 
 import numpy as np
 from fastapi import APIRouter
+from sqlalchemy.orm import Session
 from starlette.concurrency import run_in_threadpool
 
 from wingfit.client import drive_answers as a
@@ -41,27 +42,24 @@ def installed() -> a.InstalledRigs:
 async def work(service: ServiceDep, body: WorkIn, job_id: str) -> a.Work:
     """Take simulations of a run or diagnosis whose rig you simulate; the job runs while a driver asks for its work."""
     board = service.driving.board
-    row = await run_in_threadpool(_row, service, job_id)
-    if body.leaving:
-        board.release(job_id, body.driver)
-        return _work(row, [])
     deadline = asyncio.get_running_loop().time() + body.wait_s
     with board.changes.watch(job_id) as changed:
         while True:
             changed.clear()
-            if State(row.state).final:
-                board.forget(job_id)
-            if State(row.state).final or board.changes.closed:
-                return _work(row, [])
+            row = await run_in_threadpool(_row, service, job_id)
+            if body.leaving:
+                board.release(job_id, body.driver)
+            if body.leaving or State(row.state).final or board.changes.closed:
+                return _work(row, body, [])
             if calls := board.take(job_id, body.driver, body.limit, body.holding):
-                return _work(row, [call.simulation() for call in calls])
-            service.runner.wake()
+                return _work(row, body, [call.simulation() for call in calls])
+            if row.state == State.QUEUED:  # it has a driver now
+                await run_in_threadpool(service.runner.wake)
             left = deadline - asyncio.get_running_loop().time()
             if left <= 0:
-                return _work(row, [])
+                return _work(row, body, [])
             with suppress(TimeoutError):
                 await asyncio.wait_for(changed.wait(), left)
-            row = await run_in_threadpool(_row, service, job_id)
 
 
 @router.post(
@@ -73,15 +71,15 @@ async def work(service: ServiceDep, body: WorkIn, job_id: str) -> a.Work:
 def results(service: ServiceDep, body: ResultsIn, job_id: str) -> a.Settled:
     """Return results of simulations that :func:`work` gave; a simulation that fails has a reason instead of channels.
 
-    Nothing is taken if one of the results is malformed.
+    Nothing is taken if one of the results is malformed. An error of the simulation itself ends the job.
     """
     row, board = _row(service, job_id), service.driving.board
-    if State(row.state).final:
-        return {"taken": 0, "unknown": len(body.results)}
-    board.hear(job_id, body.driver)
     dataset = service.datasets.get(row.dataset_id)
     if not isinstance(dataset, SeriesDataset):
         raise not_found("driven job", job_id)
+    if error := next((result.error for result in body.results if result.error), None):
+        board.give_up(job_id, error)
+        return {"taken": 0, "unknown": 0}
     taken, faults = dict[str, Simulated](), []
     for place, result in enumerate(body.results):
         call = board.given_call(job_id, result.id)
@@ -89,12 +87,17 @@ def results(service: ServiceDep, body: ResultsIn, job_id: str) -> a.Settled:
             continue
         try:
             taken[result.id] = _simulated(result, dataset.recording(call.recording))
-        except ValueError as error:
-            faults.append(error_item(f"body.results.{place}", result.id, str(error)))
+        except ValueError as fault:
+            faults.append(error_item(f"body.results.{place}", result.id, str(fault)))
     if faults:
         raise invalid("the results are malformed", faults)
-    service.driving.settle(job_id, taken)
-    return {"taken": len(taken), "unknown": len(body.results) - len(taken)}
+
+    def wanted(session: Session) -> bool:
+        return not State(store.one(session, type(row), job_id).state).final
+
+    done = service.driving.settle(job_id, body.driver, taken, wanted)
+    count = len(taken) if done else 0
+    return {"taken": count, "unknown": len(body.results) - count}
 
 
 def _row(service: Service, job_id: str) -> JobRow:
@@ -104,12 +107,12 @@ def _row(service: Service, job_id: str) -> JobRow:
         raise not_found("run or diagnosis", job_id)
     with service.database.read() as session:
         row = store.one(session, table, job_id)
-    if row.rig is None or DECLARED not in row.rig:
+    if not row.driven:
         raise conflict(f"the server simulates the rig of {job_id} itself; it needs no driver")
     return row
 
 
-def _work(row: JobRow, simulations: list[a.Simulation]) -> a.Work:
+def _work(row: JobRow, body: WorkIn, simulations: list[a.Simulation]) -> a.Work:
     return {
         "job_id": row.id,
         "dataset_id": row.dataset_id,
@@ -118,7 +121,7 @@ def _work(row: JobRow, simulations: list[a.Simulation]) -> a.Work:
         "progress": row.progress,
         "eta_seconds": row.eta_seconds,
         "error": row.error,
-        "rig": (row.rig or {})[DECLARED],
+        "rig": (row.rig or {})[DECLARED] if body.with_rig else None,
         "simulations": simulations,
     }
 

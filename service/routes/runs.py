@@ -67,8 +67,9 @@ def submit(
     def plan() -> RunRow:
         dataset, spec = _planned(service, body)
         name = body.name or spec_views.run_name(dataset, spec)
-        rig = None if body.rig is None else stored_rig(body.rig)
-        return RunRow(dataset_id=body.dataset_id, kind=dataset.kind, name=name, spec=store.spec_json(spec), rig=rig)
+        row = RunRow(dataset_id=body.dataset_id, kind=dataset.kind, name=name, **stored_rig(body.rig))
+        row.spec = store.spec_json(spec)
+        return row
 
     if validate_only:
         row = plan()

@@ -21,7 +21,6 @@ from wingfit.records.files.folder import RECORDINGS
 from wingfit.service.container import Service
 from wingfit.service.http.problems import ProblemError
 from wingfit.service.outcomes import coefficient_source, force_views
-from wingfit.service.rigs.stored_rig import rig_in_words
 from wingfit.service.runs import best_genome, views
 from wingfit.service.runs import netcdf_variables as nc
 from wingfit.service.runs.exports import Exported, blocks, request
@@ -58,7 +57,7 @@ def file(service: Service, exported: Exported[RunRow], genome: GenomeInfo, gone:
             _recordings(root, service, exported.row, dataset, gone)
 
     row = exported.row
-    model = {"tracks": "flexible wing", "forces": "blade-element model"}.get(row.kind) or rig_in_words(row.rig) or ""
+    model = {"tracks": "flexible wing", "forces": "blade-element model"}.get(row.kind) or row.rig_name or ""
     of_run = {"title": f"calibration {row.name}", "request": json.dumps(request(row))}
     return nc.made(write, nc.provenance(row, exported.dataset, model, exported.at) | of_run)
 

@@ -15,7 +15,6 @@ from wingfit.client.answers import Comparison, Numerics
 from wingfit.records import AnyDataset, Recording, Series, SeriesDataset
 from wingfit.records.array_types import Array, Mask
 from wingfit.service.answers import answer, checked
-from wingfit.service.rigs.stored_rig import is_driven, rig_in_words
 from wingfit.service.runs.spec_views import run_settings
 from wingfit.service.storage import store
 from wingfit.service.storage.tables import DatasetRow, RunRow
@@ -127,8 +126,7 @@ def job_of(shape: type[T], values: Mapping[str, Any], spec: object) -> T:
     ``values``: its database row, column name to value; ``spec``: its settings as the answer contains them.
     """
     action = None if values["wish"] == Wish.NONE else values["wish"]
-    rig = values["rig"]
-    shown = {"rig": rig_in_words(rig), "driven": is_driven(rig)}
+    shown = {"rig": values["rig_name"], "driven": bool(values["driven"])}
     return checked(shape, {**values, **shown, "pending_action": action, "steps": values["generations"], "spec": spec})
 
 

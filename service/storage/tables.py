@@ -117,6 +117,7 @@ class JobRow(OwnedRow):
     Attributes:
         spec: the specification (model, method, settings) as JSON.
         rig: of a job on series, the rig as `service.rigs.stored_rig` stores it; else None.
+        rig_name, driven: its name, and whether drivers simulate it; lists of jobs do not read the rig.
         state, wish, generations, progress, error, starts: those of `workers.jobs.Job`.
         stage: name of the present stage of the search.
         eta_seconds: estimated remaining time (s), None if unknown.
@@ -128,6 +129,8 @@ class JobRow(OwnedRow):
     dataset_id: Mapped[str] = mapped_column(ForeignKey("dataset.id", ondelete="RESTRICT"), index=True)
     spec: Mapped[dict[str, Any]]
     rig: Mapped[dict[str, Any] | None] = mapped_column(JSON(none_as_null=True))
+    rig_name: Mapped[str | None]
+    driven: Mapped[bool] = mapped_column(default=False)
     state: Mapped[str] = mapped_column(index=True)
     wish: Mapped[str]
     stage: Mapped[str | None]
@@ -147,8 +150,9 @@ class RunRow(JobRow, Table):
     """A calibration run.
 
     Attributes:
-        best_mm, best_mn, best_percent: misfit of the best genome (of the present stage, at the end of the result): mm
-            for tracks, mN for forces, percent of the range of the channels for series.
+        best_mm, best_mn: misfit of the best genome (of the present stage, at the end of the result): mm for tracks, mN
+            for forces.
+        best_percent: the same for series, in percent of the range of the channels; at the end of the search.
         genome: best genome so far, gene name to value; None before the first generation.
         result: result as JSON; None unless the run has succeeded.
     """

@@ -10,11 +10,13 @@ import httpx
 import pytest
 from pydantic import BaseModel, TypeAdapter
 
+from tests.records.series_samples import arm_dataset
 from tests.service import toy
 from tests.service.conftest import Api
 from wingfit.calibration.spec import CalibrationSpec, resolved
 from wingfit.client.transport import parse_events
 from wingfit.records import Dataset
+from wingfit.records.files.netcdf import write_netcdf
 from wingfit.service.diagnoses.requests import DiagnosisIn
 from wingfit.service.examples import EXAMPLES
 from wingfit.service.outcomes.requests import LoadsIn, PredictionIn, SimulationIn
@@ -84,12 +86,18 @@ def test_unchanged_answers_are_304_as_described(api: Api, specification: Specifi
     api.finish(run)
     api.diagnosed(diagnosis)
     ids = {"run_id": run, "dataset_id": api.run(run)["dataset_id"], "diagnosis_id": diagnosis}
+    file = {"file": ("arm.nc", write_netcdf(arm_dataset()))}
+    series = {"dataset_id": api.client.post("/v1/datasets", files=file).json()["id"]}
     tried = 0
     for method, path, operation in operations(specification):
         marked = any(parameter["name"] == "If-None-Match" for parameter in operation.get("parameters", ()))
         assert ("304" in operation["responses"]) is marked, path
         if marked:
-            answer = api.client.request(method, path.format(**ids), headers={"If-None-Match": "*"})
+            answer = api.client.request(
+                method,
+                path.format(**(ids | series if path.endswith("/series") else ids)),
+                headers={"If-None-Match": "*"},
+            )
             assert (answer.status_code, answer.content) == (304, b""), path
             tried += 1
     assert tried >= 8

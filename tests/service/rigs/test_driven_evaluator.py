@@ -20,7 +20,6 @@ from wingfit.client.drive_answers import Simulation
 from wingfit.records import Series
 from wingfit.rigs.rig_model import RigModel, Simulated
 from wingfit.service.jobs.job_kind import NotReadyError
-from wingfit.service.rigs import driven_evaluator
 from wingfit.service.rigs.driving import Driving
 from wingfit.service.storage.database import Database
 from wingfit.workers.in_process import InProcessEvaluator
@@ -51,7 +50,7 @@ def individuals() -> np.ndarray:
 @contextmanager
 def driven(folder: Path) -> Iterator[Driving]:
     """A board whose simulations a thread computes, after a way through JSON."""
-    database, simulator = Database(folder), _Simulator(PUSHED, dict(PUSHED.channels), dataset(FIRST, SECOND))
+    database, simulator = Database(folder), _Simulator(PUSHED, dataset(FIRST, SECOND))
     driving, over = Driving(database), threading.Event()
 
     def drive() -> None:
@@ -60,7 +59,7 @@ def driven(folder: Path) -> Iterator[Driving]:
                 asked = cast(Simulation, json.loads(json.dumps(call.simulation())))
                 result = json.loads(json.dumps(simulator.compute(asked)))
                 channels = np.array(list(result["channels"].values())).T
-                driving.settle("run_1", {result["id"]: Simulated(channels, None)})
+                driving.settle("run_1", "one", {result["id"]: Simulated(channels, None)}, lambda _: True)
             over.wait(0.001)
 
     thread = threading.Thread(target=drive)
@@ -105,9 +104,8 @@ def test_what_a_driver_cannot_simulate_is_not_asked(tmp_path: Path, changes: dic
         driving.evaluator("run_1").evaluate(problem(changed), individuals())
 
 
-def test_a_job_without_a_driver_goes_back_to_the_queue(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(driven_evaluator, "PATIENCE_SECONDS", 0.3)
+def test_a_job_without_a_driver_goes_back_to_the_queue(tmp_path: Path) -> None:
     database = Database(tmp_path)
-    with pytest.raises(NotReadyError, match=r"no driver was heard of for 0\.3 s"):
+    with pytest.raises(NotReadyError, match="its drivers are gone"):
         Driving(database).evaluator("run_1").evaluate(problem(FIRST), individuals())
     database.close()

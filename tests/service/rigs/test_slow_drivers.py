@@ -16,16 +16,15 @@ from tests.service.rigs.test_drive import DECLARED, _result, _take, alone, clien
 from wingfit import _drive
 from wingfit.records.array_types import Array
 from wingfit.rigs.run import Run
-from wingfit.service.rigs import board, driven_evaluator
+from wingfit.service.rigs import board
 
 __all__ = ["alone"]  # a fixture
-SILENT, PATIENCE, LONG = 0.4, 0.3, 1.5  # s
+SILENT, LONG = 0.4, 1.5  # s
 
 
 @pytest.fixture(autouse=True)
 def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(board, "SILENT_SECONDS", SILENT)
-    monkeypatch.setattr(driven_evaluator, "PATIENCE_SECONDS", PATIENCE)
     monkeypatch.setattr(_drive, "HEARD_SECONDS", 0.1)
 
 

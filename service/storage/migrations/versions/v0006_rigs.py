@@ -13,6 +13,9 @@ def upgrade() -> None:
     """Add the columns and the table; existing datasets and jobs have no rig of the user's own (NULL)."""
     for table in ("dataset", "run", "diagnosis"):
         op.add_column(table, sa.Column("rig", sa.JSON))
+    for table in ("run", "diagnosis"):
+        op.add_column(table, sa.Column("rig_name", sa.String))
+        op.add_column(table, sa.Column("driven", sa.Boolean, nullable=False, server_default="0"))
     for table in ("run", "generation"):
         op.add_column(table, sa.Column("best_percent", sa.Double))
     op.create_table(
