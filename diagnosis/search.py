@@ -37,7 +37,6 @@ from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.search_state import SearchState
 from wingfit.diagnosis.spec import DiagnosisSpec
 from wingfit.diagnosis.subject import Subject
-from wingfit.diagnosis.verdict.noise_doubt import judged_noise
 from wingfit.diagnosis.verdict.verdict import decide
 from wingfit.diagnosis.verdict.weigh_hypotheses import HypothesisWeights, nominal_suffices, tolerated_excess, weigh
 from wingfit.rigs.suspect import Suspect
@@ -61,7 +60,7 @@ def run_search(state: SearchState, free: tuple[str, ...]) -> Steps:
     for k, fit in enumerate(fit_nominal(state.context, free, {**spec.start, **spec.calibration.fixed})):
         state.initial_fit = state.initial_fit or (state.context, fit)
         yield 0.25 * (1.0 - 0.85 ** (k + 1)), "fitting the nominal model"
-    state.context = replace(state.context, data=judged_noise(state.data, fit))
+    state.judge_noise(fit)
     yield 0.25, "comparing with a finer discretisation"
     suspects = select_suspects(state.subject, spec)
     for fraction, stage in _search_coarse_first(state, fit, suspects):
@@ -73,8 +72,7 @@ def run_search(state: SearchState, free: tuple[str, ...]) -> Steps:
         for fraction, stage in _try_suspects(state, suspects):
             yield 0.85 + 0.07 * fraction, stage
     yield 0.92, "comparing with a finer discretisation"
-    for stage in _refine_and_extend(state):
-        yield 0.93, stage
+    yield from ((0.93, stage) for stage in _refine_and_extend(state))
     yield 0.94, "continuing the best refits"
     if state.refits:
         _continue_best(state)

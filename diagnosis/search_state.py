@@ -16,6 +16,7 @@ from wingfit.diagnosis.evidence.screen import Trial
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.spec import DiagnosisSpec
 from wingfit.diagnosis.subject import Subject
+from wingfit.diagnosis.verdict.noise_doubt import judged_noise
 from wingfit.diagnosis.verdict.weigh_hypotheses import HypothesisWeights, tolerated_excess
 from wingfit.records.array_types import ArrayLike
 
@@ -75,6 +76,10 @@ class SearchState:
         """Replace the nominal fit by ``nominal`` and delete all score tests and refits, which held for the old fit."""
         self.nominal, self.context = nominal, replace(self.context, subject=nominal.subject)
         self.trials, self.refits = [], []
+
+    def judge_noise(self, nominal: Fit) -> None:
+        """Find out, at the fit ``nominal``, whether slow noise may explain what the nominal model misses."""
+        self.context = replace(self.context, data=judged_noise(self.data, nominal))
 
     def add(self, refit: Refit | None) -> None:
         """Store ``refit`` unless it is None.

@@ -34,7 +34,7 @@ from wingfit.records.series import belongs_to
 STARTS = (0.5, 2.0)  # times the genes of a recording
 SMALLER = 0.5  # times the inputs
 LEAST_CHANGE = 1.1  # times: a larger input that is less is not tried
-STEPS = 16  # factors of inputs are multiples of 1 / STEPS, so that a driver can be told them exactly
+STEPS = 16  # factors of inputs are multiples of 1 / STEPS, so that they can be sent exactly
 MOVED = 0.01  # in unit coordinates: a start that changes no gene by more is the same
 MOST_CANDIDATES = 16
 

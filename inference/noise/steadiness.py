@@ -1,6 +1,6 @@
 """Whether residuals can be the noise of a sensor: then their power is the same in all recordings and at all times.
 
-Slow noise cannot be told from an error of the model by its frequencies. But noise of any colour, as long as it is
+Slow noise and an error of the model may have the same frequencies. But noise of any colour, as long as it is
 stationary, has the same power in every recording and in every part of it, while the error of a model grows with the
 motion. In each octave of frequency the powers in quarters of recordings are compared by Bartlett's test of equal
 variances (Bartlett 1937, Proc. R. Soc. A 160, 268), with as many degrees of freedom as the octave has coefficients.
