@@ -62,7 +62,7 @@ class _Weighed:
 
     @classmethod
     def of(cls, problem: Problem, linear: Linearised, which: list[bool]) -> _Weighed:
-        noise = [Noise.of(record, v) for record, v in zip(problem.recordings, linear.residuals, strict=True)]
+        noise = Noise.of_each(problem.recordings, linear.residuals)
         white = np.concatenate([n.whitened(v).ravel() for n, v in zip(noise, linear.residuals, strict=True)])
         slopes = [
             whitened_sensitivity(n, s[:, :, which]).reshape(-1, sum(which))

@@ -65,6 +65,7 @@ def diagnose_rig(rig: Rig, dataset: SeriesDataset, spec: DiagnosisSpec, evaluato
     vehicles are refused.
     """
     subject, fitted, held_out, free = _prepare_rig(rig, dataset, spec)
+    _check_search(subject, spec)
     series = SeriesReduction.of(dataset.recordings, fitted)
     yield from diagnose_subject(subject, dataset.name, fitted, held_out, spec, evaluator, free=free, series=series)
 

@@ -19,6 +19,11 @@ MAX_HARMONICS = 50
 MAX_ESTIMATES = 1000
 MAX_QUANTITIES = 1000  # channels of a series, at most; as many inputs, and settings
 
+# Largest magnitude of a recorded number of a series, in any unit, and smallest of a standard deviation, period or
+# difference of times: their squares and products are still exact.
+LARGEST = 1e50
+SMALLEST = 1e-50
+
 MIN_FRAMES = 8  # instants in one recording, at least; fewer cannot resolve a beat
 MAX_ROWS = 200_000  # instants in one recording, at most
 MAX_VALUES = 64_000_000  # numbers in one dataset, 8 bytes each in memory

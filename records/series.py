@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 
 from wingfit.records.array_types import Array, Bool, Float, Mask
+from wingfit.records.limits import LARGEST, SMALLEST
 from wingfit.records.recorded import Recorded
 from wingfit.records.series_checks import check_recording, check_recordings
 
@@ -50,9 +51,12 @@ class Channel:
     def __post_init__(self) -> None:
         for name in ("standard_deviation", "accepted_error"):
             value = getattr(self, name)
-            if value is not None and not 0.0 < value < np.inf:
+            if value is not None and not SMALLEST <= value <= LARGEST:
                 unit = "" if self.unit == "1" else f" {self.unit}"
-                raise ValueError(f"channel {self.name!r}: {name} is {value:g}{unit}; give a positive number or None")
+                raise ValueError(
+                    f"channel {self.name!r}: {name} is {value:g}{unit}; give a positive number, from {SMALLEST:g} to "
+                    f"{LARGEST:g}, or None"
+                )
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,9 +9,11 @@ import numpy as np
 
 from wingfit.records.array_types import Array, Float
 from wingfit.records.errors import Faults, nearest
+from wingfit.records.limits import LARGEST, SMALLEST
 
 Locate = Callable[[int], str]
 SHOWN = 3
+IN_RANGE = f"from -{LARGEST:g} to {LARGEST:g}"
 
 
 class _Named(Protocol):
@@ -66,9 +68,9 @@ def check_recording(recording: _Recording) -> None:
     check_samples(recording.times, recording.values, recording.inputs, f"{where}, sample {{}}".format, faults)
     for what, numbers in (("settings", recording.settings), ("estimates", recording.estimates)):
         for name, value in numbers.items():
-            if not np.isfinite(value):
-                faults.add(f"{where}: {what}.{name}", value, f"is {_plain(value)}; give a finite number")
-    if recording.period is not None and not 0.0 < recording.period < np.inf:
+            if not abs(value) <= LARGEST:
+                faults.add(f"{where}: {what}.{name}", value, f"is {_plain(value)}; give a finite number, {IN_RANGE}")
+    if recording.period is not None and not SMALLEST <= recording.period <= LARGEST:
         message = f"is {_plain(recording.period)} s; give a positive number of seconds, or None if it is not periodic"
         faults.add(f"{where}: period", recording.period, message)
     faults.raise_any()
@@ -126,6 +128,12 @@ def check_samples(
     increasing = check_times(times, at, faults)
     for row in np.flatnonzero(np.isinf(values).any(axis=1))[:SHOWN]:
         faults.add(at(int(row)), "inf", "a channel is infinite; it must be finite, or missing")
+    for what, numbers in (("a channel", values), *((f"input {name!r}", one) for name, one in inputs.items())):
+        sizes = np.abs(np.where(np.isfinite(numbers), numbers, 0.0))
+        largest = sizes.reshape(len(numbers), -1 if sizes.size else 0).max(axis=1, initial=0.0)
+        for row in np.flatnonzero(largest > LARGEST)[:SHOWN]:
+            message = f"{what} is {largest[row]:.3g}; give a number {IN_RANGE}: use another unit, or correct it"
+            faults.add(at(int(row)), float(largest[row]), message)
     for name, samples in inputs.items():
         for row in np.flatnonzero(~np.isfinite(samples))[:SHOWN]:
             message = (
@@ -142,7 +150,9 @@ def check_times(times: Float[Array, " T"], at: Locate, faults: Faults) -> bool:
         faults.add(at(int(row)), times[row], "time_s is missing or not finite; every row needs its time in seconds")
     if bad.size:
         return False
-    back = np.flatnonzero(np.diff(times) <= 0) + 1
+    for row in np.flatnonzero(np.abs(times) > LARGEST)[:SHOWN]:
+        faults.add(at(int(row)), times[row], f"time_s is {times[row]:.3g} s; give a time {IN_RANGE}")
+    back = np.flatnonzero(np.diff(times) < SMALLEST) + 1
     for row in back[:SHOWN]:
         before, here = float(times[row - 1]), float(times[row])
         how = "the same as" if here == before else "before"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import replace
 
 from wingfit.records import SeriesDataset
@@ -16,7 +17,27 @@ def model_of(rig: Rig, dataset: SeriesDataset) -> RigModel:
     """
     check_fits(rig, dataset)
     channels = {one.name: rig.channels[one.name] for one in dataset.channels}
-    return RigModel(replace(rig, channels=channels), dataset.recordings)
+    model = RigModel(replace(rig, channels=channels), dataset.recordings)
+    _check_own_names(model)
+    return model
+
+
+def _check_own_names(model: RigModel) -> None:
+    """Raise ValueError if a suspect or gene of the rig has the name of one that is added: a fault, or a law of a port.
+
+    Which names these are depends on the channels that were recorded.
+    """
+    genes = [*model.rig.genes, *model.rig.recording_genes]
+    for what, names in (
+        ("suspect", [one.name for one in model.suspects]),
+        ("gene", [gene.name for gene in (*genes, *(gene for one in model.suspects for gene in one.genes))]),
+    ):
+        twice = [name for name, times in Counter(names).items() if times > 1]
+        if twice:
+            raise ValueError(
+                f"rig {model.rig.name!r} has a {what} {twice[0]!r}, but faults of the channels and inputs and laws at "
+                "the ports are added with names of that form; rename yours"
+            )
 
 
 def check_fits(rig: Rig, dataset: SeriesDataset) -> None:

@@ -58,10 +58,11 @@ class SuspectDeclaration(_Declared):
     source: Text = ""
     signature: Text = ""
     location_genes: Annotated[
-        dict[Literal["span", "chord"], Name], Field(description="genes of the location of the effect")
+        dict[Literal["span", "chord"], Name],
+        Field(max_length=2, description="genes of the location of the effect"),
     ] = {}
     confused_with: Annotated[list[Name], Field(max_length=MOST)] = []
-    candidate_shapes: Annotated[list[list[Number]], Field(max_length=MOST)] = []
+    candidate_shapes: Annotated[list[Annotated[list[Number], Field(max_length=MOST)]], Field(max_length=MOST)] = []
 
 
 class PortDeclaration(_Declared):

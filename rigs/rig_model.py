@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -131,9 +131,7 @@ class RigModel:
         for fault in faults:
             run = fault.before(run, values) if fault.before else run
         try:
-            channels: Channels = {
-                name: np.asarray(one, float) for name, one in self.rig.simulate({**off, **values}, run).items()
-            }
+            channels = _channels(self.rig.simulate({**off, **values}, run))
         except (ValueError, ArithmeticError, np.linalg.LinAlgError) as error:
             return Simulated(failed, f"the simulation fails: {error}")
         problem = _unusable(channels, recording)
@@ -150,13 +148,25 @@ class RigModel:
                 port, law = self._laws[name]
                 if any(values[size] != 0.0 for size in law.suspect.size_genes):  # else its memory is not integrated
                     at_ports.setdefault(port, []).append(law)
-        times = recording.times
-        return Run(recording.name, times, recording.settings, dict(recording.inputs), times, values, at_ports)
+        times = recording.times  # copied, as are inputs: the user's code may change them
+        inputs = {name: one.copy() for name, one in recording.inputs.items()}
+        return Run(recording.name, times.copy(), dict(recording.settings), inputs, times.copy(), values, at_ports)
 
 
 def observation(done: Sequence[Simulated], place: Sequence[int]) -> Observation:
     """Return the observation of individuals; the result of each is that of ``done`` at its ``place``."""
     return Observation(np.stack([done[k].channels for k in place]), tuple(done[k].reason for k in place))
+
+
+def _channels(returned: object) -> Channels:
+    """Return what a simulation ``returned`` as arrays; TypeError if it is no mapping of real numbers by channel."""
+    if not isinstance(returned, Mapping):
+        kind = type(returned).__name__
+        raise TypeError(f"simulate returned {kind}; it must return a dict with the values of each channel by its name")
+    for name, one in returned.items():
+        if np.iscomplexobj(one):
+            raise TypeError(f"simulate returned complex values of {name!r}; return real ones, such as their real part")
+    return {name: np.asarray(np.ma.filled(one, np.nan), float) for name, one in returned.items()}
 
 
 def _unusable(channels: Channels, recording: Series) -> str | None:

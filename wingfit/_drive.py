@@ -144,6 +144,10 @@ def _begin(simulator: _Simulator) -> None:
     _HERE[:] = [simulator]
 
 
+def _begun() -> bool:
+    return bool(_HERE)
+
+
 def _compute(simulation: Simulation) -> dict[str, Any]:
     return _HERE[0].compute(simulation)
 
@@ -163,6 +167,7 @@ class _Computing:
         self._under_way: dict[Future[dict[str, Any]], Simulation] = {}
         self._broken: Counter[str] = Counter()
         self._pool = self._new_pool()
+        self._check_pool()
         self._seconds = BATCH_SECONDS  # that one simulation takes
 
     def __enter__(self) -> Self:
@@ -171,6 +176,20 @@ class _Computing:
     def __exit__(self, *_: object) -> None:
         if self._pool:
             self._pool.shutdown(wait=False, cancel_futures=True)
+
+    def _check_pool(self) -> None:
+        """WingfitError if processes cannot load the rig."""
+        try:
+            with child_environment():
+                if self._pool:
+                    self._pool.submit(_begun).result()
+        except Exception as error:
+            self.__exit__()
+            cause = "" if isinstance(error, BrokenProcessPool) else f": {type(error).__name__}: {error}"
+            raise WingfitError(
+                "the rig cannot be loaded by other processes",
+                f"its functions must be importable there{cause}; give workers=1, or load the rig from a file",
+            ) from None
 
     @property
     def holding(self) -> list[str]:

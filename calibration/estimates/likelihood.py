@@ -209,7 +209,7 @@ def _iteration(problem: Problem, evaluator: Evaluator, genes: list[Gene], state:
     unit, motion = np.array(state.unit), np.array(state.motion)
     problem = beside_problem(problem, values_at(genes, motion[None])[0])
     linear = linearise(problem, evaluator, unit, motion)
-    noise = [Noise.of(record, v) for record, v in zip(problem.recordings, linear.residuals, strict=True)]
+    noise = Noise.of_each(problem.recordings, linear.residuals)
     quadratic, power = _quadratic(noise, linear)
     move = _better(problem, evaluator, unit, noise, quadratic, power, state.damping)
     stays = move.gain == 0.0

@@ -111,7 +111,7 @@ def uncertainty(problem: Problem, evaluator: Evaluator) -> Uncertainty:
     linear = linearise(problem, evaluator, unit_at(genes, values))
     free = ~stopped(genes, values)
     linear = replace(linear, known=linear.known & free)
-    noise = [Noise.of(record, v) for record, v in zip(problem.recordings, linear.residuals, strict=True)]
+    noise = Noise.of_each(problem.recordings, linear.residuals)
     unit, doubts = unit_covariance(problem, linear, noise)
     per_value, per_cent = _slopes(genes, values)
     to_shares = _share_map(genes, problem.base) * per_cent

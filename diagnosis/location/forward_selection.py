@@ -135,6 +135,8 @@ def _select_terms(sums: NormalEquations) -> Index:
     usable = np.flatnonzero(np.einsum("rmm->m", sums.curvature)[: len(sums.size)] > 0)
     while len(terms) < MAX_TERMS:
         tried = np.array([[*terms, k] for k in usable if k not in terms])
+        if not len(tried):
+            break
         explained = sums.explained(tried)
         if not explained.max() > before + MIN_GAIN:
             break

@@ -5,6 +5,7 @@ R follows Armanini et al. (2016, Eq. 22).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -37,9 +38,11 @@ class Noise:
         Forces have a full covariance, (1/N) sum of v v^T over N samples v. Tracks have one variance for each of the C
         coordinates and no covariances: from as many frames as coordinates, with gaps, a full matrix would be singular.
         Each variance is a weighted mean of that of the coordinate and of the mean over all (weight: POOLED samples), so
-        that a track of a few frames cannot be fitted exactly and dominate. Channels of a series have different units,
-        so each has the variance of its own. Channels without residuals get variance 1, which has no influence.
+        that a track of a few frames cannot be fitted exactly and dominate. Channels without residuals get variance 1,
+        which has no influence.
         """
+        if record.kind == "series":
+            raise ValueError("the noise of series is that of all recordings; use of_each")
         seen = np.isfinite(residuals)
         v, count = np.where(seen, residuals, 0.0), seen.sum(axis=0)
         if record.kind == "forces":
@@ -47,15 +50,34 @@ class Noise:
         else:
             power = (v**2).sum(axis=0)
             others = POOLED * power.sum() / max(count.sum(), 1)
-            pooled = record.kind == "tracks"
-            matrix = np.diag((power + others) / (count + POOLED) if pooled else power / np.maximum(count, 1))
-        axis = 0 if record.kind == "series" else None
-        largest = np.nanmax(np.abs(record.values), axis=axis, initial=0.0)
+            matrix = np.diag((power + others) / (count + POOLED))
+        largest = np.nanmax(np.abs(record.values), initial=0.0)
+        least = (FLOOR * (largest if largest > 0.0 else 1.0)) ** 2
+        return cls._of_covariance(matrix + np.diag(np.where(count > 0, least, 1.0 - np.diag(matrix))))
+
+    @classmethod
+    def of_each(cls, records: Sequence[AnyRecording], residuals: Sequence[Array]) -> list[Noise]:
+        """Estimate the noise of each of ``records`` from its residuals [T, C] (NaN: not compared).
+
+        Each channel of series has a variance of its own, because units differ, but the same in all recordings, because
+        the sensor is the same: with one for each recording, a model that fits some of them exactly and others not at
+        all would be the most likely.
+        """
+        if not any(record.kind == "series" for record in records):
+            return [cls.of(record, v) for record, v in zip(records, residuals, strict=True)]
+        v = np.concatenate(residuals)
+        seen = np.isfinite(v)
+        power, count = (np.where(seen, v, 0.0) ** 2).sum(axis=0), seen.sum(axis=0)
+        largest = np.nanmax(np.abs(np.concatenate([record.values for record in records])), axis=0, initial=0.0)
         least = (FLOOR * np.where(largest > 0.0, largest, 1.0)) ** 2
-        matrix = matrix + np.diag(np.where(count > 0, least, 1.0 - np.diag(matrix)))
-        factor = np.linalg.cholesky(matrix)
+        noise = cls._of_covariance(np.diag(np.where(count > 0, power / np.maximum(count, 1) + least, 1.0)))
+        return [noise] * len(records)
+
+    @classmethod
+    def _of_covariance(cls, covariance: Float[Array, "C C"]) -> Noise:
+        factor = np.linalg.cholesky(covariance)
         whitening = np.asarray(np.linalg.solve(factor, np.eye(len(factor))).T, float)
-        return cls(matrix, whitening, 2.0 * np.log(np.diag(factor)))
+        return cls(covariance, whitening, 2.0 * np.log(np.diag(factor)))
 
     def whitened(self, residuals: Float[Array, "*B T C"]) -> Float[Array, "*B T C"]:
         """Whiten residuals [..., T, C] to unit covariance; zero where they are NaN (not compared)."""

@@ -5,11 +5,14 @@ from __future__ import annotations
 from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
+from pydantic.config import JsonDict
 
+from wingfit.records.limits import MAX_QUANTITIES, MAX_ROWS
 from wingfit.rigs.declaration import Name, Number
 
 MOST_SIMULATIONS = 1000
 LONGEST_WAIT_S = 25.0
+RESULTS: JsonDict = {"driver": "laptop-1", "results": [{"id": "sim_0", "channels": {"angle": [0.1, 0.2]}}]}
 DRIVER = "names the process that computes; what a driver took and did not return is offered to others when it is silent"
 
 
@@ -19,6 +22,8 @@ class _Body(BaseModel):
 
 class WorkIn(_Body):
     """A request for simulations to compute."""
+
+    model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [{"driver": "laptop-1", "limit": 4}]})
 
     driver: Annotated[Name, Field(description=DRIVER)]
     limit: Annotated[int, Field(strict=True, ge=0, le=MOST_SIMULATIONS, description="largest number")] = 1
@@ -38,8 +43,11 @@ class ResultIn(_Body):
 
     id: Name
     channels: Annotated[
-        dict[Name, list[Number]] | None,
-        Field(description="by name of the channel, in its unit, at every sample of the recording; null if it failed"),
+        dict[Name, Annotated[list[Number], Field(max_length=MAX_ROWS)]] | None,
+        Field(
+            max_length=MAX_QUANTITIES,
+            description="by name of the channel, in its unit, at every sample of the recording; null if it failed",
+        ),
     ] = None
     reason: Annotated[str | None, Field(min_length=1, max_length=2000, description="why it failed; else null")] = None
     error: Annotated[
@@ -50,6 +58,8 @@ class ResultIn(_Body):
 
 class ResultsIn(_Body):
     """Results of simulations."""
+
+    model_config = ConfigDict(extra="forbid", json_schema_extra={"examples": [RESULTS]})
 
     driver: Annotated[Name, Field(description=DRIVER)]
     results: Annotated[list[ResultIn], Field(min_length=1, max_length=MOST_SIMULATIONS)]

@@ -13,10 +13,12 @@ import pytest
 from tests.rigs.oscillator import GENES, RIG, START, blank
 from tests.rigs.oscillator import simulate as oscillator
 from wingfit.calibration.problem import Problem, base_genome
-from wingfit.records import Channel, Series
+from wingfit.records import Channel, Gene, Quantity, Series, SeriesDataset
 from wingfit.records.array_types import Array
+from wingfit.rigs.dataset_model import model_of
 from wingfit.rigs.rig_model import RigModel
 from wingfit.rigs.run import Run, SimulationError
+from wingfit.rigs.suspect import Suspect
 from wingfit.workers import make_evaluator
 
 ONE, TWO = blank("one"), blank("two", samples=90, estimates={"start": 0.05})
@@ -125,6 +127,10 @@ def test_a_failed_simulation_is_a_reason_and_spares_its_neighbours() -> None:
         ({}, "returned no channel 'position', but nothing"),
         ({"position": np.zeros(3), "speed": np.zeros(160)}, r"'position' with shape \[3\]; it needs .* 160 times"),
         ({"position": np.full(160, np.nan), "speed": np.zeros(160)}, "the simulated position is not finite"),
+        (
+            {"position": np.ma.masked_less(np.zeros(160), 1), "speed": np.zeros(160)},
+            "the simulated position is not finite",
+        ),
     ],
 )
 def test_wrong_results_are_named(returned: dict[str, Array], reason: str) -> None:
@@ -136,6 +142,50 @@ def test_wrong_results_are_named(returned: dict[str, Array], reason: str) -> Non
 def test_a_mistake_in_the_users_code_is_not_hidden() -> None:
     with pytest.raises(KeyError, match="stifness"):
         model(lambda genes, _: {"position": genes["stifness"]}).observe(nominal(model()), ONE)
+
+
+@pytest.mark.parametrize(
+    ("returned", "message"),
+    [
+        (None, "simulate returned NoneType; it must return a dict"),
+        ([np.zeros(160)], "simulate returned list"),
+        ({"position": np.zeros(160) + 1j, "speed": np.zeros(160)}, "complex values of 'position'"),
+    ],
+)
+def test_no_mapping_of_real_values_is_refused(returned: object, message: str) -> None:
+    with pytest.raises(TypeError, match=message):
+        model(lambda _genes, _run: returned).observe(nominal(model()), ONE)
+
+
+def test_a_simulation_cannot_change_the_recording() -> None:
+    def simulate(_: Mapping[str, float], run: Run) -> dict[str, Array]:
+        run.times[:] = 0.0
+        for samples in run.inputs.values():
+            samples[:] = 0.0
+        return {"position": run.times, "speed": run.times}
+
+    before = ONE.times.copy(), {name: one.copy() for name, one in ONE.inputs.items()}
+    model(simulate).observe(nominal(model()), ONE)
+    np.testing.assert_array_equal(ONE.times, before[0])
+    for name, one in before[1].items():
+        np.testing.assert_array_equal(ONE.inputs[name], one)
+
+
+def test_a_suspect_that_is_called_like_a_fault_is_refused() -> None:
+    own = Suspect("gain.position", genes=(Gene("own.size", "1", 0.0, -1.0, 1.0),))
+    channels = tuple(Channel(one.name, one.unit) for one in ONE.quantities)
+    one = replace(blank("one"), quantities=channels)
+    dataset = SeriesDataset(
+        "named twice",
+        RIG.name,
+        (one,),
+        channels,
+        tuple(Quantity(name, unit) for name, unit in RIG.inputs.items()),
+        tuple(Quantity(name, unit) for name, unit in RIG.settings.items()),
+    )
+    model_of(RIG, dataset)
+    with pytest.raises(ValueError, match=r"suspect 'gain\.position'.*rename yours"):
+        model_of(replace(RIG, suspects=(*RIG.suspects, own)), dataset)
 
 
 def test_a_missing_setting_is_a_reason() -> None:

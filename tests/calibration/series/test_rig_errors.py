@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -13,6 +14,8 @@ from tests.calibration.series.swing import NOISE, RIG, STARTS, TRUTH, dataset, r
 from tests.calibration.series.test_calibrate_rig import calibrated, genes, spec
 from wingfit import CalibrationSpec, Channel, Gene
 from wingfit.calibration.preparation import prepare_rig
+from wingfit.records.array_types import Array
+from wingfit.rigs.run import Run, SimulationError
 
 SEEDS = 30
 ALL = {**TRUTH, "start[a]": STARTS["a"], "start[b]": STARTS["b"], "speed[a]": 0.1, "speed[b]": 0.1}
@@ -69,7 +72,8 @@ def test_noise_of_repeats_and_of_the_highest_frequencies_is_known() -> None:
 def test_an_accepted_error_counts_as_noise() -> None:
     coarse = three(added={"creep.rate": 0.02})
     accepted = (replace(coarse.channels[0], accepted_error=0.05), coarse.channels[1])
-    coarse = replace(coarse, recordings=tuple(replace(one, quantities=accepted) for one in coarse.recordings))
+    recordings = tuple(replace(one, quantities=accepted) for one in coarse.recordings)
+    coarse = replace(coarse, recordings=recordings, channels=accepted)
     found = calibrated(coarse)
     assert not any("beyond the noise: position" in one for one in found.remarks)
 
@@ -86,9 +90,12 @@ def test_genes_that_the_data_do_not_show_are_named() -> None:
 
 
 def test_a_recording_that_cannot_be_simulated_is_said() -> None:
-    heavy = recorded("c")
-    broken = replace(heavy, settings={})
-    found = calibrated(dataset(recorded("a"), recorded("b"), broken, held_out=("c",)))
+    def gone(genes: Mapping[str, float], run: Run) -> dict[str, Array]:
+        if run.recording == "c":
+            raise SimulationError("its state was not recorded")
+        return dict(RIG.simulate(genes, run))
+
+    found = calibrated(three(), rig=replace(RIG, simulate=gone))
     assert found.recordings[2].after is None
     assert found.held_out_after is None
     assert any("recording 'c' cannot be simulated with the best genome: " in one for one in found.remarks)
@@ -140,7 +147,7 @@ def test_recordings_that_do_not_fit_are_refused() -> None:
         wingfit.calibrate(replace(data, held_out=tuple(STARTS)), rig=RIG)
     blank = replace(data.recordings[1], values=np.full((80, 2), np.nan))
     with pytest.raises(ValueError, match="recording 'b' has no value of any channel"):
-        prepare_rig(spec(), RIG, replace(data, recordings=(data.recordings[0], blank)))
+        prepare_rig(spec(), RIG, replace(data, recordings=(data.recordings[0], blank), held_out=()))
     differs = replace(recorded("b"), repeats="x", settings={"mass": 2.0})
     with pytest.raises(ValueError, match="different settings"):
         prepare_rig(spec(), RIG, dataset(replace(recorded("a"), repeats="x"), differs))

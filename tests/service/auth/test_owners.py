@@ -17,7 +17,7 @@ from wingfit.service.settings import Settings
 
 ADMINISTRATION = re.compile(r"/v1/(?:keys|backup)(?:/|$)")
 OPEN = ("/v1/health", "/v1/ready", "/v1/session")
-OF_A_THING = re.compile(r"{(dataset_id|run_id|diagnosis_id)}")
+OF_A_THING = re.compile(r"{(dataset_id|run_id|diagnosis_id|job_id)}")
 Call = tuple[str, str, dict[str, Any]]
 
 
@@ -47,7 +47,7 @@ def test_every_call_with_an_id_is_closed_to_other_owners(as_: As, calls: list[Ca
     run, diagnosis = ann.submit(dataset)["id"], ann.diagnose(dataset)["id"]
     ann.finish(run)
     ann.diagnosed(diagnosis)
-    ids = {"dataset_id": dataset, "run_id": run, "diagnosis_id": diagnosis}
+    ids = {"dataset_id": dataset, "run_id": run, "diagnosis_id": diagnosis, "job_id": run}
     tried = 0
     for method, path, body in calls:
         if not OF_A_THING.search(path):

@@ -42,6 +42,12 @@ def simulation(name: str, rate: float) -> Simulation:
     return {"id": name, "recording": "from-1", "effects": [], "genes": genes, "settings": {}, "input_factors": {}}
 
 
+def test_a_rig_that_other_processes_cannot_load_is_refused_before_any_work() -> None:
+    unloadable = replace(decay_rig.rig, simulate=lambda genes, run: decay_rig.simulate(genes, run))
+    with pytest.raises(wingfit.WingfitError, match="workers=1"):
+        _Computing(_Simulator(unloadable, decay_rig.dataset()), 2)
+
+
 def test_only_the_simulation_that_ends_its_process_fails() -> None:
     simulations = [simulation(f"good {k}", 0.5 + 0.1 * k) for k in range(6)]
     simulations.insert(1, simulation("deadly", 3.0))
