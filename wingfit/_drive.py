@@ -87,8 +87,8 @@ def _first(client: Client, job_id: str, rig: Rig) -> Work:
     if different:
         raise WingfitError(
             "this is another rig",
-            f"{different[0]} of rig {rig.name!r} differ from those with which {job_id} was submitted; give the same "
-            "rig, or submit the job again",
+            f"{different[0]} of rig {rig.name!r}: not those with which {job_id} was submitted; give the same rig, or "
+            "submit the job again",
         )
     return work
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any
 
-from pydantic import Field
+from pydantic import Discriminator, Field, Tag
 
 from wingfit.records import AnyDataset, SeriesDataset
 from wingfit.rigs.declaration import Name, RigDeclaration
@@ -17,7 +17,8 @@ INSTALLED, DECLARED = "installed", "declared"
 MOST_DRIVEN_VALUES = 300_000  # of a recording; each takes up to 26 bytes of a message
 
 RigIn = Annotated[
-    Name | RigDeclaration,
+    Annotated[Name, Tag("name")] | Annotated[RigDeclaration, Tag("declaration")],
+    Discriminator(lambda given: "name" if isinstance(given, str) else "declaration"),  # else errors come from both
     Field(
         description="for a dataset of series: the name of a rig that is installed on the server (/v1/rigs), or the "
         "declaration of one that you simulate with 'wingfit drive'"

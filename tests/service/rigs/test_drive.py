@@ -194,7 +194,7 @@ def test_simulations_that_fail_have_their_reason(real: Api) -> None:
 
 def test_a_driver_with_another_rig_is_refused(real: Api) -> None:
     one = real.diagnose(upload(real), rig=DECLARED | {"genes": [DECLARED["genes"][0] | {"upper": 6.0}]})["id"]
-    with client_of(real) as client, pytest.raises(WingfitError, match="genes of rig 'decay' differ"):
+    with client_of(real) as client, pytest.raises(WingfitError, match="genes of rig 'decay': not those"):
         wingfit.drive(client, one, decay_rig.rig)
     real.client.post(f"/v1/diagnoses/{one}/cancel")
 
