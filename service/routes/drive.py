@@ -85,6 +85,9 @@ def results(service: ServiceDep, body: ResultsIn, job_id: str) -> a.Settled:
         call = board.given_call(job_id, result.id)
         if call is None:
             continue
+        if result.id in taken:
+            faults.append(error_item(f"body.results.{place}.id", result.id, "it has a result above; give one for each"))
+            continue
         try:
             taken[result.id] = _simulated(result, dataset.recording(call.recording))
         except ValueError as fault:

@@ -175,6 +175,9 @@ def test_malformed_results_are_refused_and_nothing_is_lost(real: Api) -> None:
         assert word in refused.json()["errors"][0]["message"]
     body = b'{"driver":"one","results":[{"id":"%s","channels":{"charge":[NaN]}}]}' % first["id"].encode()
     assert real.client.post(path, content=body, headers={"Content-Type": "application/json"}).status_code == 422
+    twice = real.client.post(path, json={"driver": "one", "results": [good, good]})
+    assert twice.status_code == 422
+    assert twice.json()["errors"][0]["where"] == "body.results.1.id"
     assert send(id="elsewhere").json() == {"taken": 0, "unknown": 1}
     assert send().json() == {"taken": 1, "unknown": 0}
     assert send().json() == {"taken": 0, "unknown": 1}
@@ -207,6 +210,7 @@ def test_requests_that_do_not_fit_are_refused_with_the_remedy(real: Api) -> None
         ({"dataset_id": decay, "rig": "../my_rig.py"}, "body.rig", "no rig '../my_rig.py' is installed"),
         ({"dataset_id": decay, "rig": DECLARED, "division": "4"}, "body.division", "means nothing for a rig of your"),
         ({"dataset_id": decay, "rig": DECLARED | {"channels": {"charge": "mC"}}}, "body", "'C' in dataset 'decay'"),
+        ({"dataset_id": decay, "rig": DECLARED | {"genes": 5}}, "body.rig.declaration.genes", "list"),
         ({"dataset_id": decay, "rig": DECLARED, "suspects": ["gusts"]}, "body", "unknown suspect 'gusts'"),
         ({"dataset_id": decay, "rig": DECLARED, "genes": ["span"]}, "body", "unknown gene 'span'"),
         ({"dataset_id": decay, "rig": DECLARED, "recordings": ["from-9"]}, "body", "no recording 'from-9'"),
