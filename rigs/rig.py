@@ -12,6 +12,7 @@ from wingfit.rigs.ports import Port
 from wingfit.rigs.run import Run
 from wingfit.rigs.suspect import Suspect
 
+JOINTS = "+,"  # characters that join the names of effects in findings and commands
 Simulate = Callable[[Mapping[str, float], Run], Mapping[str, Array]]
 """Simulates the :class:`Run` with the values of all genes by name, those of suspects included (zero: off); returns the
 values [T] of each channel at ``run.times``, in the channel's unit. Raises ValueError where that is impossible."""
@@ -88,6 +89,12 @@ class Rig:
             twice = [name for name, times in Counter(names).items() if times > 1]
             if twice:
                 raise ValueError(f"rig {self.name!r} has {what} {twice[0]!r} twice; give each a name of its own")
+            strange = [name for name in names if not name.strip() or not name.isprintable() or set(name) & set(JOINTS)]
+            if strange:
+                raise ValueError(
+                    f"rig {self.name!r} has {what} {strange[0]!r}; a name needs printable characters and none of "
+                    f"{JOINTS!r}, which join names: rename it"
+                )
         bracketed = [name for name in genes if "[" in name]
         if bracketed:
             raise ValueError(

@@ -59,6 +59,9 @@ def test_a_suspect_that_cannot_be_switched_off_is_refused(changes: dict[str, obj
         ({"suspects": (DRAG, DRAG)}, "has gene 'drag.size' twice"),
         ({"ports": (PORT, PORT)}, "has port 'slide' twice"),
         ({"ports": (replace(PORT, stiffness="k"),)}, "its stiffness 'k' is no gene of rig 'oscillator'"),
+        ({"genes": (*GENES, replace(GENES[0], name="a+b"))}, r"gene 'a\+b'; a name needs"),
+        ({"suspects": (replace(DRAG, name="dr\nag"),)}, "suspect 'dr.*rename it"),
+        ({"ports": (replace(PORT, name=" "),)}, "port ' '; a name needs"),
         ({"inputs": {"position": "N"}}, "'position' is a channel and an input"),
     ],
 )
