@@ -54,8 +54,8 @@ class Channel:
             if value is not None and not SMALLEST <= value <= LARGEST:
                 unit = "" if self.unit == "1" else f" {self.unit}"
                 raise ValueError(
-                    f"channel {self.name!r}: {name} is {value:g}{unit}; give a positive number, from {SMALLEST:g} to "
-                    f"{LARGEST:g}, or None"
+                    f"channel {self.name!r}: {name} is {value:g}{unit}; give a positive number ({SMALLEST:g} to "
+                    f"{LARGEST:g}) or None"
                 )
 
 

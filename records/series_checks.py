@@ -13,6 +13,7 @@ from wingfit.records.limits import LARGEST, SMALLEST
 
 Locate = Callable[[int], str]
 SHOWN = 3
+SAMPLES_PER_PERIOD = 2  # at least; fewer show not even the first harmonic
 IN_RANGE = f"from -{LARGEST:g} to {LARGEST:g}"
 
 
@@ -70,8 +71,15 @@ def check_recording(recording: _Recording) -> None:
         for name, value in numbers.items():
             if not abs(value) <= LARGEST:
                 faults.add(f"{where}: {what}.{name}", value, f"is {_plain(value)}; give a finite number, {IN_RANGE}")
+    step = float(np.median(np.diff(recording.times))) if len(recording.times) > 1 else 0.0
     if recording.period is not None and not SMALLEST <= recording.period <= LARGEST:
         message = f"is {_plain(recording.period)} s; give a positive number of seconds, or None if it is not periodic"
+        faults.add(f"{where}: period", recording.period, message)
+    elif recording.period is not None and recording.period < SAMPLES_PER_PERIOD * step:
+        message = (
+            f"is {_plain(recording.period)} s, but samples are {_plain(step)} s apart; a period needs at least "
+            f"{SAMPLES_PER_PERIOD} samples: correct it, or leave it out"
+        )
         faults.add(f"{where}: period", recording.period, message)
     faults.raise_any()
 

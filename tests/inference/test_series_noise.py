@@ -209,7 +209,7 @@ def test_a_channel_that_one_recording_lacks_is_not_used_there(repeats: str) -> N
 @pytest.mark.parametrize("name", ["standard_deviation", "accepted_error"])
 @pytest.mark.parametrize("value", [0.0, -1.0, float("nan"), float("inf")])
 def test_deviations_are_positive(name: str, value: float) -> None:
-    with pytest.raises(ValueError, match=f"channel 'y': {name} is .* m; give a positive number or None"):
+    with pytest.raises(ValueError, match=f"channel 'y': {name} is .* m; give a positive number"):
         replace(Channel("y", "m"), **{name: value})  # type: ignore[arg-type]
 
 
