@@ -163,7 +163,7 @@ def check_times(times: Float[Array, " T"], at: Locate, faults: Faults) -> bool:
     back = np.flatnonzero(np.diff(times) < SMALLEST) + 1
     for row in back[:SHOWN]:
         before, here = float(times[row - 1]), float(times[row])
-        how = "the same as" if here == before else "before"
+        how = "the same as" if here == before else "before" if here < before else f"less than {SMALLEST:g} s after"
         message = f"time_s is {here!r} s, {how} the one above, {before!r} s; times must increase: sort the rows"
         faults.add(at(int(row)), here, message)
     return not back.size

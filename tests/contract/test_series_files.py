@@ -22,6 +22,7 @@ from wingfit.records.files.confined import convert_netcdf
 from wingfit.records.files.netcdf import write_netcdf
 from wingfit.records.files.parsed import load_parsed
 from wingfit.records.files.series_table import Columns, read_series
+from wingfit.records.limits import LARGEST, SMALLEST
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -94,20 +95,21 @@ units = st.text(
     min_size=1,
     max_size=9,
 )
-numbers = st.floats(-1e300, 1e300) | st.just(-0.0) | st.just(5e-324)
-sizes = st.floats(1e-300, 1e300)
+numbers = st.floats(-LARGEST, LARGEST) | st.just(-0.0) | st.just(5e-324)
+sizes = st.floats(SMALLEST, LARGEST)
+instants = st.floats(-1e3, 1e6).filter(lambda t: t == 0.0 or abs(t) > 1e-30)  # so that they differ by SMALLEST
 
 
 @st.composite
 def recordings(draw: st.DrawFn, name: str, dataset: SeriesDataset) -> Series:
-    times = np.array(sorted(draw(st.lists(st.floats(-1e3, 1e6), min_size=8, max_size=10, unique=True))))
+    times = np.array(sorted(draw(st.lists(instants, min_size=8, max_size=10, unique=True))))
     shape = len(times), len(dataset.channels)
     cells = st.lists(numbers | st.just(math.nan), min_size=shape[0] * shape[1], max_size=shape[0] * shape[1])
     values = np.array(draw(cells)).reshape(shape)
     values[:2] = [[1.0], [2.0]]
     own = st.lists(numbers, min_size=len(times), max_size=len(times)).map(np.array)
     genes = st.from_regex(r"[A-Za-z][A-Za-z0-9_]{0,5}", fullmatch=True)
-    period = draw(st.none() | st.floats(0.01, 1.0))
+    period = draw(st.none() | st.floats(0.5, 1.0))  # at least two samples
     return Series(
         name,
         times,
