@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -16,6 +16,7 @@ from wingfit.records.series import belongs_to
 from wingfit.rigs.dataset_model import check_fits
 from wingfit.rigs.rig import Rig
 from wingfit.rigs.rig_model import RigModel
+from wingfit.rigs.run import Run
 from wingfit.rigs.suspect import Suspect
 
 ROUGH = 0.2  # largest relative change of a derivative when its step is halved
@@ -59,7 +60,6 @@ class _Checks:
     def __init__(self, model: RigModel, recording: Series) -> None:
         self.model, self.recording = model, recording
         self.nominal = np.array([gene.nominal for gene in model.genes])
-        self.before = (recording.times.copy(), {name: u.copy() for name, u in recording.inputs.items()})
         began = time.perf_counter()
         model.observe(self.nominal, recording)
         self.milliseconds = 1e3 * (time.perf_counter() - began)
@@ -83,10 +83,18 @@ class _Checks:
         yield CheckResult("is deterministic", "pass" if same else "fail", words)
 
     def leaves_arguments(self) -> Iterator[CheckResult]:
-        """The simulation does not change the recording."""
-        before = self.before
-        same = np.array_equal(before[0], self.recording.times) and all(
-            np.array_equal(u, self.recording.inputs[name]) for name, u in before[1].items()
+        """The simulation does not change the times and inputs that it gets, from which faults are computed."""
+        runs, rig, recording = list[Run](), self.model.rig, self.recording
+
+        def watched(genes: Mapping[str, float], run: Run) -> Mapping[str, Array]:
+            runs.append(run)
+            return rig.simulate(genes, run)
+
+        self.simulated(self.nominal, replace(self.model, rig=replace(rig, simulate=watched)))
+        same = all(
+            np.array_equal(recording.times, run.times)
+            and all(np.array_equal(u, run.inputs[name]) for name, u in recording.inputs.items())
+            for run in runs
         )
         words = "" if same else "simulate changes run.times or run.inputs: copy them before changing them"
         yield CheckResult("leaves its arguments as they are", "pass" if same else "fail", words)

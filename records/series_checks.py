@@ -134,6 +134,10 @@ def check_samples(
     Returns whether the times are finite and increase.
     """
     increasing = check_times(times, at, faults)
+    steps = np.diff(times) if increasing else np.ones(0)
+    for row in np.flatnonzero(steps < SMALLEST)[:SHOWN] + 1:
+        message = f"time_s is {float(steps[row - 1]):g} s after the one above; give times at least {SMALLEST:g} s apart"
+        faults.add(at(int(row)), times[row], message)
     for row in np.flatnonzero(np.isinf(values).any(axis=1))[:SHOWN]:
         faults.add(at(int(row)), "inf", "a channel is infinite; it must be finite, or missing")
     for what, numbers in (("a channel", values), *((f"input {name!r}", one) for name, one in inputs.items())):
@@ -160,10 +164,10 @@ def check_times(times: Float[Array, " T"], at: Locate, faults: Faults) -> bool:
         return False
     for row in np.flatnonzero(np.abs(times) > LARGEST)[:SHOWN]:
         faults.add(at(int(row)), times[row], f"time_s is {times[row]:.3g} s; give a time {IN_RANGE}")
-    back = np.flatnonzero(np.diff(times) < SMALLEST) + 1
+    back = np.flatnonzero(np.diff(times) <= 0) + 1
     for row in back[:SHOWN]:
         before, here = float(times[row - 1]), float(times[row])
-        how = "the same as" if here == before else "before" if here < before else f"less than {SMALLEST:g} s after"
+        how = "the same as" if here == before else "before"
         message = f"time_s is {here!r} s, {how} the one above, {before!r} s; times must increase: sort the rows"
         faults.add(at(int(row)), here, message)
     return not back.size

@@ -74,6 +74,7 @@ def with_recordings(*recordings: Series) -> SeriesDataset:
         (r"period: is 0 s; give a positive number of seconds, or None", lambda: changed(period=0.0)),
         (r"period: is 1e-05 s, but samples are .* s apart; a period needs at least 2", lambda: changed(period=1e-5)),
         (r"a channel is 1e\+60; give a number from -1e\+50", lambda: changed(values=np.full((12, 3), 1e60))),
+        (r"sample 1: time_s is 1e-60 s after the one above", lambda: changed(times=np.r_[0.0, 1e-60, 1:11])),
         (r"time_s is 9.09e\+58 s; give a time from", lambda: changed(times=np.linspace(0.0, 1e60, 12))),
         (r"recordings\[1\]: 'light-1' is used a second time here", lambda: with_recordings(changed(), changed())),
         (r"the input 'voltage' of the dataset is missing; add it", lambda: with_recordings(changed(inputs={}))),
