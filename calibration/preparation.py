@@ -117,7 +117,7 @@ def _elsewhere(spec: CalibrationSpec, model: RigModel, dataset: SeriesDataset, f
 
 
 def _refuse_genes(spec: CalibrationSpec, model: Model) -> None:
-    """Raise ValueError if ``spec`` names a gene twice or one that ``model`` lacks, or fixes one beyond its bounds."""
+    """Raise ValueError if ``spec`` names a gene twice or one unknown to ``model``, or fixes one beyond its bounds."""
     _refuse_repeated("gene", spec.genes)
     known = [gene.name for gene in model.genes]
     for name in (*spec.genes, *spec.fixed):

@@ -13,7 +13,7 @@ from wingfit.inference.differences import STEP
 from wingfit.records import Gene, Series, SeriesDataset
 from wingfit.records.array_types import Array
 from wingfit.records.series import belongs_to
-from wingfit.rigs.dataset_model import check_fits
+from wingfit.rigs.dataset_model import model_of
 from wingfit.rigs.rig import Rig
 from wingfit.rigs.rig_model import RigModel
 from wingfit.rigs.run import Run
@@ -38,13 +38,13 @@ class CheckResult:
 def check_rig(rig: Rig, dataset: SeriesDataset) -> Iterator[CheckResult]:
     """Check ``rig`` on the first recording of ``dataset``; yields one result for each requirement of the contract."""
     try:
-        check_fits(rig, dataset)
+        model = model_of(rig, dataset)
     except ValueError as error:
         yield CheckResult("fits the dataset", "fail", str(error))
         return
     yield CheckResult("fits the dataset", "pass", f"{len(rig.channels)} channels, {len(rig.inputs)} inputs")
     recording = dataset.recordings[0]
-    checks = _Checks(RigModel(rig, dataset.recordings), recording)
+    checks = _Checks(model, recording)
     first = checks.simulated(checks.nominal)
     if isinstance(first, str):
         yield CheckResult("simulates its nominal genes", "fail", f"recording {recording.name}: {first}")

@@ -20,7 +20,7 @@ MAX_ESTIMATES = 1000
 MAX_QUANTITIES = 1000  # channels of a series, at most; as many inputs, and settings
 
 # Largest magnitude of a recorded number of a series, in any unit, and smallest of a standard deviation, period or
-# difference of times: their squares and products are still exact.
+# difference of times: their squares and products are still finite.
 LARGEST = 1e50
 SMALLEST = 1e-50
 

@@ -131,7 +131,7 @@ class RigModel:
         for fault in faults:
             run = fault.before(run, values) if fault.before else run
         try:
-            channels = _channels(self.rig.simulate({**off, **values}, run))
+            channels = _channels(self.rig.simulate({**off, **values}, _copied(run)))
         except (ValueError, ArithmeticError, np.linalg.LinAlgError) as error:
             return Simulated(failed, f"the simulation fails: {error}")
         problem = _unusable(channels, recording)
@@ -148,14 +148,21 @@ class RigModel:
                 port, law = self._laws[name]
                 if any(values[size] != 0.0 for size in law.suspect.size_genes):  # else its memory is not integrated
                     at_ports.setdefault(port, []).append(law)
-        times = recording.times  # copied, as are inputs: the user's code may change them
-        inputs = {name: one.copy() for name, one in recording.inputs.items()}
-        return Run(recording.name, times.copy(), dict(recording.settings), inputs, times.copy(), values, at_ports)
+        times = recording.times
+        return Run(recording.name, times, recording.settings, dict(recording.inputs), times, values, at_ports)
 
 
 def observation(done: Sequence[Simulated], place: Sequence[int]) -> Observation:
     """Return the observation of individuals; the result of each is that of ``done`` at its ``place``."""
     return Observation(np.stack([done[k].channels for k in place]), tuple(done[k].reason for k in place))
+
+
+def _copied(run: Run) -> Run:
+    """Return ``run`` with arrays of its own: the user's code may change them, and faults are computed from ``run``."""
+    inputs = {name: one.copy() for name, one in run.inputs.items()}
+    return replace(
+        run, times=run.times.copy(), settings=dict(run.settings), inputs=inputs, input_times=run.input_times.copy()
+    )
 
 
 def _channels(returned: object) -> Channels:

@@ -62,7 +62,7 @@ def uncertain(data: WhitenedData, fit: Fit) -> bool:
 def judged_noise(data: WhitenedData, nominal: Fit) -> WhitenedData:
     """Return ``data``, not steady if slow noise does not explain the residual of the fit ``nominal``.
 
-    Asked only where slow noise is all that could explain it.
+    It matters only where slow noise is all that could explain it.
     """
     if data.kind != "series" or not uncertain(data, nominal):
         return data
