@@ -17,6 +17,7 @@ from wingfit.inference.differences import NotSimulatedError
 
 SEARCHED = 8  # generations of the search before
 MOST = 5  # starts
+SHIFT = 0.3  # of a gene between a start and the one added to it, genes scaled to 0..1
 APART = 0.1  # largest difference of a gene between two starts, genes scaled to 0..1
 AGREE = 1.0  # difference of two negative log-likelihoods up to which they count as the same
 FLAT = 4.0  # the same, times the decrease at which iterations end
@@ -107,13 +108,20 @@ class Ends:
 
 
 def apart(population: Population) -> list[list[float]]:
-    """Return up to MOST individuals (genes scaled to 0..1), best first, that lie APART from each other; none failed."""
+    """Return up to MOST individuals (genes scaled to 0..1), best first, that lie APART from each other; none failed.
+
+    Where a population has converged to one place, a start off it is added, to confirm the minimum: each gene is shifted
+    by SHIFT, away from the nearer bound.
+    """
     chosen: list[list[float]] = []
-    for unit, fitness in zip(population.unit, population.fitness, strict=True):
-        if fitness < FAILED and all(np.abs(np.subtract(unit, other)).max() >= APART for other in chosen):
+    usable = [unit for unit, fitness in zip(population.unit, population.fitness, strict=True) if fitness < FAILED]
+    for unit in usable:
+        if all(np.abs(np.subtract(unit, other)).max() >= APART for other in chosen):
             chosen.append(unit)
         if len(chosen) == MOST:
             break
+    if len(chosen) == 1 < min(len(usable), MOST):
+        chosen.append([gene + SHIFT if gene <= 0.5 else gene - SHIFT for gene in chosen[0]])
     return chosen
 
 

@@ -196,8 +196,8 @@ class MissingLoad:
 class RecordingMisfit:
     """Misfit to one recording before (nominal model, refitted) and after (effects added), with 90 % intervals.
 
-    ``airspeed`` in m/s; ``floor``: misfit to be expected from noise and discretisation error. A series has ``settings``
-    by name instead of flap frequency, phase lag, pressure and airspeed, which are None.
+    ``airspeed`` in m/s; ``floor``: misfit to be expected from noise, discretisation error and accepted error. A series
+    has ``settings`` by name instead of flap frequency, phase lag, pressure and airspeed, which are None.
     """
 
     name: str

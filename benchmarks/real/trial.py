@@ -35,6 +35,7 @@ class Trial:
         adequate: whether "adequate" is right.
         claims: effects that must not be named; a verdict that names none of them is right where no name is wanted.
         without: suspects that are removed.
+        small: whether what is documented may be smaller than the accepted error, so that "adequate" is not wrong.
         control: whether the trial is a control, which is listed apart.
     """
 
@@ -45,6 +46,7 @@ class Trial:
     adequate: bool = False
     claims: frozenset[str] = field(default_factory=frozenset)
     without: frozenset[str] = field(default_factory=frozenset)
+    small: bool = False
     control: bool = False
 
     def judge(self, finding: Finding) -> Judgement:
@@ -57,7 +59,8 @@ class Trial:
         named = frozenset(finding.named)
         possible = [frozenset(one) for one in finding.indistinguishable] or [named]
         if finding.verdict == "adequate":
-            return self.adequate if finding.probabilities["adequate"] >= CERTAIN else "abstained"
+            certain = finding.probabilities["adequate"] >= CERTAIN and not self.small
+            return self.adequate if certain else "abstained"
         if finding.verdict == "unnamed":
             return "abstained" if self.right or self.claims else not self.adequate
         if self.right:

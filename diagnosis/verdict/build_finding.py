@@ -26,9 +26,12 @@ from wingfit.diagnosis.verdict.next_series import Candidate, rank_recordings, se
 from wingfit.diagnosis.verdict.noise_remarks import drift_sentence, noise_remarks
 from wingfit.diagnosis.verdict.proof import ResidualPair, predict_held_out, proof, recording_misfits
 from wingfit.diagnosis.verdict.reservations import (
+    accepted_sentence,
     doubted_by_held_out,
     held_out_sentence,
+    insufficient,
     noise_sentence,
+    none_suffices,
     remaining_sentence,
 )
 from wingfit.diagnosis.verdict.series_remarks import series_remarks
@@ -47,6 +50,8 @@ def build_finding(state: SearchState, name: str, held_out: Sequence[AnyRecording
     """
     nominal, weights = state.fitted_nominal.refit, state.final_weights
     decision = decide(weights)
+    if none_suffices(state.data, decision, weights.refits, _discretisation_error(state)):
+        decision = insufficient(decision)
     best = nominal if decision.verdict == "adequate" else decision.best
     yield 0.0, "computing the intervals of the genes", None
     best = replace(best, fit=with_measured_jacobian(state.context, best.fit))
@@ -150,6 +155,7 @@ def _finding(
         summary=summary(decision, suspects, _summary_texts(data, nominal, best, located, proved))
         + ("" if data.kind == "series" else drift_sentence(data))
         + remaining_sentence(data, decision, best, discretisation)
+        + accepted_sentence(data, decision, nominal)
         + noise_sentence(data, decision, nominal)
         + held_out_sentence(first, proved, data, refuted=refuted),
         probabilities=decision.probabilities,

@@ -115,7 +115,7 @@ def recording_misfits(predicted: ResidualPair, *, held_out: bool, floor: float) 
         alone = replace(predicted.data, recordings=(recording,), reduced=(fit,))
         before, after, _ = _misfits(ResidualPair(alone, (predicted.before[r],), (predicted.after[r],)))
         noise = float(np.sqrt(np.mean(fit.noise[fit.used] ** 2)))
-        expected = before, after, float(np.hypot(noise, floor))
+        expected = before, after, _least(noise, floor, alone)
         if isinstance(recording, Recording):
             rows.append(RecordingMisfit(recording.name, held_out, *_setting(recording.condition), *expected))
         else:
@@ -136,7 +136,7 @@ def proof(predicted: ResidualPair, floor: float, unit: str, *, effects_added: bo
     """
     data = predicted.data
     before, after, better = _misfits(predicted)
-    least = float(np.hypot(data.noise, floor))
+    least = _least(data.noise, floor, data)
     change = amount(before.value, unit)
     if effects_added:
         change += f" before, {amount(after.value, unit)} after"
@@ -146,6 +146,11 @@ def proof(predicted: ResidualPair, floor: float, unit: str, *, effects_added: bo
     if effects_added and not better:
         words += "; the improvement is not significant"
     return Proof(_relative_to_floor(before, least), _relative_to_floor(after, least), least, better, words)
+
+
+def _least(noise: float, floor: float, data: WhitenedData) -> float:
+    """Return the misfit to be expected of a right model: noise, discretisation error and the error that is accepted."""
+    return float(np.sqrt(noise**2 + floor**2 + data.accepted**2))
 
 
 def _relative_to_floor(interval: Interval, floor: float) -> Interval:

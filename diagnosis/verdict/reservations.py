@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,6 +13,7 @@ from wingfit.diagnosis.finding import Proof, Verdict, amount
 from wingfit.diagnosis.verdict.noise_doubt import noise_may_hide
 from wingfit.diagnosis.verdict.verdict import Decision
 from wingfit.diagnosis.verdict.weigh_hypotheses import nominal_refuted
+from wingfit.records import Series
 
 NAMING: tuple[Verdict, ...] = ("named", "ambiguous", "measurement fault")
 NO_GAIN = 0.1  # of the held-out misfit: effects that remove less of it are not named
@@ -29,11 +31,42 @@ def remaining_sentence(data: WhitenedData, decision: Decision, best: Refit, floo
     return f" A misfit of {rest} beyond the noise remains: the law has another form, or something else is missing too."
 
 
+def accepted_sentence(data: WhitenedData, decision: Decision, nominal: Refit) -> str:
+    """Return a sentence on the accepted error of series, if a model is adequate only because of it; else empty."""
+    beyond = nominal.excess > (data.policy.negligible * data.noise) ** 2
+    if decision.verdict != "adequate" or not data.accepted or not beyond:
+        return ""
+    stated = {c.name: c for one in data.recordings if isinstance(one, Series) for c in one.quantities}
+    errors = ", ".join(f"{c.accepted_error:.3g} {c.unit} in {c.name}" for c in stated.values() if c.accepted_error)
+    return f" What exceeds the noise is within the accepted error: {errors}."
+
+
 def noise_sentence(data: WhitenedData, decision: Decision, nominal: Refit) -> str:
     """Return a sentence on a noise that may hide missing physics, if the model is called adequate; else empty."""
     if decision.verdict != "adequate" or not noise_may_hide(data, nominal.fit):
         return ""
     return " But the noise is not known well enough to exclude it: see the remarks."
+
+
+def none_suffices(data: WhitenedData, decision: Decision, refits: Sequence[Refit], floor: float) -> bool:
+    """Return whether each alternative of an ambiguous verdict on series leaves more than their accepted error.
+
+    ``refits``: of all hypotheses; ``floor``: discretisation error. False where no accepted error is stated: then a
+    misfit that remains may be that of a law which is nearly right.
+    """
+    if data.kind != "series" or decision.verdict != "ambiguous" or not data.accepted:
+        return False
+    possible = [frozenset(one) for one in decision.alternatives]
+    left = [one.excess for one in refits if frozenset(one.names) in possible]
+    return bool(left) and all(nominal_refuted(data, excess, floor) for excess in left)
+
+
+def insufficient(decision: Decision) -> Decision:
+    """Return ``decision`` as "unnamed": none of the alternatives that remain is an explanation."""
+    found = dict(decision.probabilities)
+    given = sum(found[name] for name in NAMING)
+    found.update(dict.fromkeys(NAMING, 0.0), unnamed=found["unnamed"] + given)
+    return replace(decision, verdict="unnamed", probabilities=found, named=(), alternatives=())
 
 
 def doubted_by_held_out(
@@ -52,11 +85,7 @@ def doubted_by_held_out(
         moved = max(found["adequate"] - data.policy.doubted_noise, 0.0)
         found["adequate"], found["unnamed"] = found["adequate"] - moved, found["unnamed"] + moved
         return replace(decision, probabilities=found)
-    if _useless(decision, proved, data):
-        given = sum(found[name] for name in NAMING)
-        found.update(dict.fromkeys(NAMING, 0.0), unnamed=found["unnamed"] + given)
-        return replace(decision, verdict="unnamed", probabilities=found, named=(), alternatives=())
-    return decision
+    return insufficient(decision) if _useless(decision, proved, data) else decision
 
 
 def held_out_sentence(before: Decision, proved: Proof | None, data: WhitenedData, *, refuted: bool = False) -> str:

@@ -28,7 +28,7 @@ from wingfit.calibration.estimates.likelihood import iterate
 from wingfit.calibration.preparation import Prepared, prepare
 from wingfit.calibration.problem import Evaluation, Problem, base_genome
 from wingfit.calibration.search import CalibrationSpec, Generation, calibrate
-from wingfit.calibration.starts import AGREE, APART, MOST, SEARCHED, Ends, apart, doubts
+from wingfit.calibration.starts import AGREE, APART, MOST, SEARCHED, SHIFT, Ends, apart, doubts
 from wingfit.records import Dataset, Genome
 from wingfit.records.blas_threads import one_blas_thread
 from wingfit.workers.errors import EvaluationInterruptedError
@@ -45,10 +45,14 @@ def test_starts_lie_apart_best_first() -> None:
     near = 0.99 * APART
     units = [[0.5, 0.5], [0.5 + near, 0.5 - near], [0.5, 0.5 + APART + 1e-9], [0.0, 0.5], [0.0, 0.5 + near], [1.0, 1.0]]
     assert apart(population(units)) == [units[0], units[2], units[3], units[5]]
-    assert apart(population([[0.5, 0.5]] * 20)) == [[0.5, 0.5]]
     many = [[k / 20, 0.0] for k in range(0, 20, 3)]
     assert len(many) > MOST
     assert apart(population(many)) == many[:MOST]
+
+
+def test_a_converged_population_is_confirmed_by_a_start_off_it() -> None:
+    assert apart(population([[0.5, 0.6]] * 20)) == [[0.5, 0.6], [0.5 + SHIFT, 0.6 - SHIFT]]
+    assert apart(population([[0.2]])) == [[0.2]], "a single individual has not converged"
 
 
 def test_a_failed_individual_is_no_start() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from wingfit.diagnosis.finding import Interval, RecordingMisfit
 from wingfit.diagnosis.verdict.build_finding import _worsened
-from wingfit.diagnosis.verdict.proof import ResidualPair, _misfits
+from wingfit.diagnosis.verdict.proof import ResidualPair, _misfits, proof
 
 
 def data(kind: str, recordings: int, channels: int) -> Any:
@@ -50,3 +50,13 @@ def test_a_recording_that_fits_worse_gets_a_remark() -> None:
     added, nothing = (cast("Any", SimpleNamespace(names=names)) for names in (("mass",), ()))
     assert _worsened(rows, added, "m") == ("with the added effects the misfit increases in bad from 2 to 3 mm",)
     assert _worsened(rows, nothing, "m") == ()
+
+
+def test_an_accepted_error_is_part_of_the_misfit_to_be_expected() -> None:
+    """Noise 1, accepted error 3, discretisation error 2: a right model misses by the root of their squares."""
+    off = np.full((8, 1), 7.0)
+    two = data("forces", 1, 1)
+    two.noise, two.accepted = 1.0, 3.0
+    found = proof(ResidualPair(two, (off,), (off,)), 2.0, "noise", effects_added=False)
+    assert found.floor == np.sqrt(1.0 + 9.0 + 4.0)
+    assert found.before.value == 7.0 / found.floor

@@ -2,15 +2,25 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
 
+import numpy as np
 import pytest
 
 from wingfit.diagnosis.finding import VERDICTS, Interval, Proof, Verdict
 from wingfit.diagnosis.policy import POLICY
-from wingfit.diagnosis.verdict.reservations import doubted_by_held_out, held_out_sentence, remaining_sentence
+from wingfit.diagnosis.verdict.reservations import (
+    accepted_sentence,
+    doubted_by_held_out,
+    held_out_sentence,
+    insufficient,
+    none_suffices,
+    remaining_sentence,
+)
 from wingfit.diagnosis.verdict.verdict import Decision
+from wingfit.records import Channel, Series
 
 
 def decision(verdict: Verdict) -> Decision:
@@ -26,9 +36,17 @@ def proof(before: float, after: float, *, improved: bool) -> Proof:
     return Proof(around(before), around(after), 1.0, improved, "")
 
 
-def data(kind: str = "series") -> Any:
+def data(kind: str = "series", accepted: float = 0.0) -> Any:
+    times, channel = np.arange(4.0), Channel("height", "m", accepted_error=0.5)
     return SimpleNamespace(
-        kind=kind, unit="noise", noise=1.0, accepted=0.0, policy=POLICY, excess_standard_error=0.05, drift=0.0
+        kind=kind,
+        unit="noise",
+        noise=1.0,
+        accepted=accepted,
+        policy=POLICY,
+        excess_standard_error=0.05,
+        drift=0.0,
+        recordings=(Series("one", times, (channel,), times[:, None]),),
     )
 
 
@@ -96,3 +114,33 @@ def test_a_misfit_that_remains_is_stated() -> None:
 def replace_excess(found: Decision, excess: float) -> Decision:
     best = cast("Any", SimpleNamespace(names=found.best.names, excess=excess))
     return Decision(found.verdict, found.probabilities, found.named, found.alternatives, best)
+
+
+def either(*excesses: float) -> tuple[Decision, list[Any]]:
+    """An ambiguous verdict between effects that leave ``excesses``, and the refits of all hypotheses."""
+    names = [f"effect {k}" for k in range(len(excesses))]
+    refits: list[Any] = [SimpleNamespace(names=(), excess=400.0)]
+    refits += [SimpleNamespace(names=(name,), excess=excess) for name, excess in zip(names, excesses, strict=True)]
+    return replace(decision("ambiguous"), alternatives=tuple((name,) for name in names)), refits
+
+
+def test_alternatives_that_all_leave_more_than_the_accepted_error_explain_nothing() -> None:
+    found, refits = either(36.0, 49.0)
+    assert none_suffices(data(accepted=5.0), found, refits, 0.0)
+    after = insufficient(found)
+    assert (after.verdict, after.named, after.alternatives) == ("unnamed", (), ())
+    assert after.probabilities["unnamed"] == pytest.approx(1.0)
+    one_is_right, refits_of_it = either(16.0, 49.0)
+    assert not none_suffices(data(accepted=5.0), one_is_right, refits_of_it, 0.0)
+    assert not none_suffices(data(accepted=0.0), found, refits, 0.0)  # a law that is nearly right leaves a misfit too
+    assert not none_suffices(data("tracks", accepted=5.0), found, refits, 0.0)
+    assert not none_suffices(data(accepted=5.0), decision("named"), refits, 0.0)
+
+
+def test_a_model_that_is_adequate_by_the_accepted_error_alone_says_so() -> None:
+    found = decision("adequate")
+    words = accepted_sentence(data(accepted=10.0), found, found.best)
+    assert words == " What exceeds the noise is within the accepted error: 0.5 m in height."
+    assert accepted_sentence(data(), found, found.best) == ""
+    assert accepted_sentence(data(accepted=10.0), found, replace_excess(found, 0.0).best) == ""
+    assert accepted_sentence(data(accepted=10.0), decision("unnamed"), found.best) == ""
