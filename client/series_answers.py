@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Literal, NotRequired
 
 from typing_extensions import TypedDict
 
@@ -34,12 +34,30 @@ class SeriesRecordingResult(TypedDict):
     channels: list[ChannelResult]
 
 
+class Curve(TypedDict):
+    """Values of one channel of one recording over time, in ``unit``: one in ``stride`` of the recorded samples.
+
+    ``nominal`` and ``best`` are simulated with these genomes; null where the genome cannot be simulated.
+    """
+
+    recording: str
+    channel: str
+    unit: str
+    held_out: bool
+    stride: int
+    time_s: list[float]
+    recorded: list[float]
+    nominal: list[float] | None
+    best: list[float] | None
+
+
 class SeriesResult(TypedDict):
     """Result of a calibration of a rig of the user's own.
 
     ``before`` (nominal genome) and ``after`` (best genome) are root mean squares over the fitted recordings, in each
     channel divided by the standard deviation of its noise or, where that is not known of all, by its range
-    (``relative_to``).
+    (``relative_to``). ``curves`` are those of the channels that fit worst, that with the largest misfit first; results
+    of earlier versions have none.
     """
 
     kind: Literal["series"]
@@ -51,3 +69,4 @@ class SeriesResult(TypedDict):
     remarks: list[str]
     recordings: list[SeriesRecordingResult]
     genes: list[GeneInfo]
+    curves: NotRequired[list[Curve]]

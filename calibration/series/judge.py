@@ -13,6 +13,7 @@ from wingfit.calibration.preparation import Prepared
 from wingfit.calibration.problem import Evaluation, Problem, base_genome
 from wingfit.calibration.result import gene_results
 from wingfit.calibration.series import remarks
+from wingfit.calibration.series.curves import curves
 from wingfit.calibration.series.misfits import compared, misfit_of, total
 from wingfit.calibration.series.own_genes import OwnGenes
 from wingfit.calibration.series.result import RelativeTo, SeriesResult
@@ -60,6 +61,7 @@ def judge_series(
             *remarks.unknown_noise(fitted),
             *remarks.own_genes(own, dataset),
         ),
+        curves=curves(everywhere, held_out, relative_to),
     )
 
 

@@ -44,6 +44,25 @@ class SeriesMisfit:
 
 
 @dataclass(frozen=True)
+class Curve:
+    """Values of one channel of one recording over time, for a plot: one in ``stride`` of the recorded samples.
+
+    ``time`` is in s; ``recorded``, ``nominal`` and ``best`` (simulated with these genomes) are in ``unit``. None where
+    the genome cannot be simulated.
+    """
+
+    recording: str
+    channel: str
+    unit: str
+    held_out: bool
+    stride: int
+    time: tuple[float, ...]
+    recorded: tuple[float, ...]
+    nominal: tuple[float, ...] | None
+    best: tuple[float, ...] | None
+
+
+@dataclass(frozen=True)
 class SeriesResult:
     """Outcome of a calibration of a rig with a simulation of the user's own.
 
@@ -63,6 +82,7 @@ class SeriesResult:
             cannot be simulated.
         held_out_after: the same of the best genome.
         remarks: warnings about the result.
+        curves: values over time of the channels that fit worst (:mod:`wingfit.calibration.series.curves`).
     """
 
     genes: tuple[GeneResult, ...]
@@ -73,3 +93,4 @@ class SeriesResult:
     held_out_before: float | None
     held_out_after: float | None
     remarks: tuple[str, ...] = ()
+    curves: tuple[Curve, ...] = ()

@@ -50,4 +50,11 @@ def genes(
 
 def result(outcome: SeriesResult) -> a.SeriesResult:
     """Return the JSON answer with the result of a calibration."""
-    return answer(a.SeriesResult, outcome, kind="series", genes=[gene(one) for one in outcome.genes])
+    genes = [gene(one) for one in outcome.genes]
+    return answer(
+        a.SeriesResult,
+        outcome,
+        kind="series",
+        genes=genes,
+        curves=[answer(a.Curve, one, time_s=list(one.time)) for one in outcome.curves],
+    )

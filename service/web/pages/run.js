@@ -4,6 +4,7 @@ import { call, follow, get, history, isFinal, part } from "../base/api.js";
 import { copy, curl, python } from "../base/copying.js";
 import { $, plural, toast, when } from "../base/format.js";
 import { hideForces, redrawForces, setUpForces, showForces } from "./forces.js";
+import { redrawCurves, setUpCurves, showCurves } from "../parts/curves.js";
 import { showWaiting } from "../parts/driving.js";
 import { aboutHistory, drawHistory } from "../parts/history.js";
 import { badge, runName, setBar, timeLeft } from "../parts/sidebar.js";
@@ -33,6 +34,7 @@ export function setUpRun(given) {
   hooks = given;
   setUpViewer();
   setUpForces();
+  setUpCurves();
   $("actions").addEventListener("click", (event) => {
     const action = event.target.dataset?.action;
     if (action) act(action);
@@ -52,6 +54,7 @@ export async function selectRun(id) {
   drawGenes(null);
   drawMisfit(null);
   drawSeriesMisfit(null);
+  showCurves(null);
   $("run").hidden = true;
   if (!id) return;
   try {
@@ -75,6 +78,7 @@ export function redraw() {
   if (!run) return;
   drawFitness();
   if (isForces(run)) redrawForces();
+  if (isSeries(run)) redrawCurves();
   if (run.kind !== "tracks") return;
   redrawWing();
   redrawLoads();
@@ -154,6 +158,7 @@ function showResult() {
   else {
     showRemarks($("remarks"), result.remarks, result.genes.map((gene) => gene.name));
     drawSeriesMisfit(result);
+    showCurves(result.curves);
   }
 }
 

@@ -214,6 +214,18 @@ def test_an_installed_rig_is_calibrated_and_diagnosed(seen: Seen, api: Api, deca
     assert "leak" in str(seen.page.evaluate(REPORT))
 
 
+def check_curves(seen: Seen, curves: list[dict[str, Any]]) -> None:
+    """The chart shows the curve that is chosen, first that with the largest misfit."""
+    seen.wait(DRAWN.format("curve-plot", 2))
+    options = seen.page.locator("#curve option").all_inner_texts()
+    assert options == [f"{c['channel']} in {c['recording']}{' (held out)' * c['held_out']}" for c in curves]
+    for k in (0, len(curves) - 1):
+        seen.page.select_option("#curve", str(k))
+        for trace, name in enumerate(("recorded", "nominal", "best")):
+            assert seen.data("curve-plot", trace, "y") == pytest.approx(curves[k][name])
+    assert "worst first" in seen.page.inner_text("#curves-note")
+
+
 def test_a_driven_run_is_followed_to_its_end(seen: Seen, api: Api, decay: str) -> None:
     made = api.submit(decay, rig=DECLARED, **SHORT)["id"]
     seen.open(made)
@@ -236,6 +248,7 @@ def test_a_driven_run_is_followed_to_its_end(seen: Seen, api: Api, decay: str) -
     assert seen.rows("series-misfit")[0][6] == "C"
     for part in ("tracks-part", "forces-part"):
         assert seen.page.is_hidden(f"#{part}")
+    check_curves(seen, result["curves"])
     history = api.history(made)
     best = [item["best_percent"] for item in history]
     seen.wait(DRAWN.format("history", 1))
