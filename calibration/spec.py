@@ -8,6 +8,7 @@ from typing import Literal, get_args
 
 from wingfit.calibration.limits import REAL, WHOLE, refuse_number
 from wingfit.records import Dataset
+from wingfit.records.name_lists import refuse_text
 from wingfit.sim.solver.numerics import ACCURACY, Numerics
 from wingfit.sim.vehicle.blade_element_wing import BladeElementWing
 from wingfit.sim.vehicle.terms import chosen
@@ -83,6 +84,9 @@ class CalibrationSpec:
     peel_width: float = 0.0
     effects: tuple[str, ...] = ()
     search_division: str | None = None
+
+    def __post_init__(self) -> None:
+        refuse_text(self, "recordings", "genes", "without", "axes", "effects")
 
 
 class SearchDivisionError(ValueError):

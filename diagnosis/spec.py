@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from wingfit.calibration.spec import CalibrationSpec
 from wingfit.diagnosis.finding import Finding
 from wingfit.diagnosis.policy import POLICY, Policy
+from wingfit.records.name_lists import refuse_text
 
 
 @dataclass(frozen=True)
@@ -33,6 +34,9 @@ class DiagnosisSpec:
     refits: int = 8
     axes: tuple[str, ...] = ()
     policy: Policy = POLICY
+
+    def __post_init__(self) -> None:
+        refuse_text(self, "suspects", "axes")
 
 
 @dataclass(frozen=True)

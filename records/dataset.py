@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 
 from wingfit.records.array_types import Array, Bool, Float, Mask
+from wingfit.records.name_lists import refuse_text
 from wingfit.records.recorded import Recorded
 from wingfit.records.series import Series, SeriesDataset
 from wingfit.records.vehicle import Vehicle, WingMotion
@@ -113,6 +114,9 @@ class Dataset(Recorded[Recording]):
     recordings: tuple[Recording, ...]
     held_out: tuple[str, ...] = ()
     description: str = ""
+
+    def __post_init__(self) -> None:
+        refuse_text(self, "held_out")
 
     @property
     def kind(self) -> Kind:

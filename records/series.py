@@ -11,6 +11,7 @@ import numpy as np
 
 from wingfit.records.array_types import Array, Bool, Float, Mask
 from wingfit.records.limits import LARGEST, SMALLEST
+from wingfit.records.name_lists import refuse_text
 from wingfit.records.recorded import Recorded
 from wingfit.records.series_checks import check_recording, check_recordings
 
@@ -160,6 +161,7 @@ class SeriesDataset(Recorded[Series]):
     description: str = ""
 
     def __post_init__(self) -> None:
+        refuse_text(self, "held_out")
         check_recordings(self)
 
     @property

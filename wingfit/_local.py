@@ -118,6 +118,8 @@ def _series_of(dataset: AnyDataset, rig: Rig | None) -> tuple[SeriesDataset, Rig
     if isinstance(dataset, SeriesDataset):
         if rig is None:
             raise ValueError(f"dataset {dataset.name!r} has series of rig {dataset.rig!r}; give its simulation as rig")
+        if not isinstance(rig, Rig):
+            raise TypeError(f"rig is a {type(rig).__name__}; give a wingfit.Rig, such as the one that its file defines")
         return dataset, rig
     if rig is not None:
         raise ValueError(f"dataset {dataset.name!r} describes a {dataset.kind} rig of its own; leave out rig")
