@@ -25,6 +25,7 @@ CONDITION = (
     ("pressure_mbar", "mbar", "pressure of the air"),
     ("airspeed", "m s-1", "airspeed"),
 )
+MODELS = {"before": "nominal model, refitted", "after": "model with the named effects"}
 SPAN = "part of the span, root 0, tip 1"
 PHASE = "phase of the beat"
 
@@ -51,12 +52,15 @@ def table(found: Json) -> str:
 def file(exported: Exported[DiagnosisRow], found: Json) -> bytes:
     """Return ``found``, a finding as JSON, as the bytes of a NetCDF file.
 
-    One group each has the misfit by recording, by marker, and by span and phase of the beat, and each missing load.
+    One group each has the misfit by recording, by marker, and by span and phase of the beat, and each missing load. Of
+    a series: by recording and by channel, and values over time of the channels that the report shows.
     """
     row = exported.row
 
     def write(root: Any) -> None:
         _recordings(root, found)
+        _channels(root, found)
+        _overlays(root, found)
         _markers(root, found)
         _phase_map(root, found)
         for number, load in enumerate(found["missing"], 1):
@@ -79,21 +83,54 @@ def _recordings(root: Any, found: Json) -> None:
 
     Misfits are those without and with the named effects, with 90 % intervals.
     """
-    items, unit, along = found["recordings"], found["unit"], ("recording",)
+    items, unit, along = found["recordings"], _units(found["unit"]), ("recording",)
     if not items:
         return
     group = root.create_group("recordings")
     group.dimensions = {"recording": len(items)}
     nc.texts(group, "recording", "recording", "recording", (one["name"] for one in items))
     nc.flags(group, "held_out", "recording", "whether it was held out", (one["held_out"] for one in items))
-    for name, units, meaning in CONDITION:
+    for name, units, meaning in CONDITION if found["kind"] != "series" else ():
         nc.numbers(group, name, along, units, meaning, _all(items, name))
-    for name, model in (("before", "nominal model, refitted"), ("after", "model with the named effects")):
+    if settings := list(items[0]["settings"]):
+        group.dimensions["setting"] = len(settings)
+        nc.texts(group, "setting", "setting", "setting of a recording", settings)
+        values = np.array([nc.or_nan(one["settings"].get(name) for name in settings) for one in items])
+        meaning = "value of a setting, in its unit in the dataset"
+        nc.numbers(group, "setting_value", ("recording", "setting"), nc.NO_UNIT, meaning, values)
+    for name, model in MODELS.items():
         for end, meaning in (("value", ""), ("low", ", lower end of its 90 % interval"), ("high", ", upper end of it")):
             values = nc.or_nan(one[name][end] for one in items)
             label = name if end == "value" else f"{name}_{end}"
             nc.numbers(group, label, along, unit, f"misfit of the {model}{meaning}", values)
     nc.numbers(group, "floor", along, unit, "misfit expected of a correct model", _all(items, "floor"))
+
+
+def _channels(root: Any, found: Json) -> None:
+    """Write a group with the misfit of each channel of a series, in its own unit, into ``root``."""
+    items, along = found["channels"], ("channel",)
+    if not items:
+        return
+    group = root.create_group("channels")
+    group.dimensions = {"channel": len(items)}
+    nc.texts(group, "channel", "channel", "channel", (one["name"] for one in items))
+    nc.texts(
+        group, "unit", "channel", "unit of the misfits and the noise of the channel", (one["unit"] for one in items)
+    )
+    meanings = {
+        "noise": "standard deviation of one sample",
+        "before": "misfit beyond the noise, nominal model",
+        "after": "misfit beyond the noise, with the named effects",
+    }
+    for name, meaning in meanings.items():
+        nc.numbers(group, name, along, nc.NO_UNIT, f"{meaning}, in the unit of the channel", _all(items, name))
+
+
+def _overlays(root: Any, found: Json) -> None:
+    """Write the values over time of the channels of a series that the report shows into ``root``, a group for each."""
+    shown = [one for one in found["overlays"] if one["times"]]
+    for number, one in enumerate(shown, 1):
+        nc.curve(root.create_group(f"overlays/{number}"), one, one["times"], MODELS)
 
 
 def _markers(root: Any, found: Json) -> None:
@@ -145,6 +182,11 @@ def _load(group: Any, load: Json) -> None:
     nc.numbers(group, "phase", ("phase",), nc.NO_UNIT, PHASE, load["phase"])
     nc.numbers(group, "value", along, units, meaning, load["values"])
     nc.numbers(group, "error", along, units, f"standard error of the {meaning}", load["errors"])
+
+
+def _units(unit: str) -> str:
+    """Return ``unit`` of a finding as CF conventions write it: misfits of a series are multiples of the noise."""
+    return nc.NO_UNIT if unit == "noise" else unit
 
 
 def _all(items: list[Json], name: str) -> Any:

@@ -6,7 +6,7 @@ Files are written in memory, because HDF5 aborts the process if the disk becomes
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import h5netcdf
@@ -102,6 +102,21 @@ def texts(group: Any, name: str, dimension: str, meaning: str, data: Iterable[st
 def text_array(data: Iterable[str]) -> npt.NDArray[np.object_]:
     """Return the strings as an array of objects, the type that h5netcdf stores."""
     return np.array([_storable(text) for text in data], dtype=object)
+
+
+def curve(group: Any, values: Mapping[str, Any], time: Iterable[float], models: Mapping[str, str]) -> None:
+    """Add to ``group`` the values over ``time`` (s) of one channel of a series, recorded and simulated.
+
+    ``values``: the curve in JSON, with recording, channel, unit, recorded values, and those of the ``models`` (name to
+    description), None where one could not be simulated.
+    """
+    describe(group, {"recording": values["recording"], "channel": values["channel"]})
+    times = list(time)
+    group.dimensions = {"time": len(times)}
+    numbers(group, "time", ("time",), "s", "time", times)
+    for name, meaning in {"recorded": "recorded values", **models}.items():
+        if values[name] is not None:
+            numbers(group, name, ("time",), values["unit"], meaning, or_nan(values[name]))
 
 
 def or_nan(values: Iterable[float | None]) -> npt.NDArray[np.float64]:

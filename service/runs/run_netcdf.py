@@ -2,8 +2,9 @@
 
 Layout: the root group has the history (dimension ``generation``) and the genes (dimension ``gene``); each group
 ``recordings/<name>`` has marker tracks (``time, marker, axis``) or forces (``quantity, phase``; modelled forces also
-``source``: where the coefficients come from). Numbers and names are those of the API. The file is made in memory, one
-recording at a time; it takes some hundred bytes per generation and twice the size of the dataset.
+``source``: where the coefficients come from). A run on series has groups ``curves/1, 2, ...`` instead, the curves of
+its result over ``time``. Numbers and names are those of the API. The file is made in memory, one recording at a time;
+it takes some hundred bytes per generation and twice the size of the dataset.
 """
 
 from __future__ import annotations
@@ -53,7 +54,9 @@ def file(service: Service, exported: Exported[RunRow], genome: GenomeInfo, gone:
         root.dimensions = {"generation": exported.row.generations, "gene": len(genome["genes"])}
         _history(root, service.database, exported.row)
         _genes(root, genome["genes"])
-        if not isinstance(dataset, SeriesDataset):  # the simulation of a rig of the user's own may be elsewhere
+        if isinstance(dataset, SeriesDataset):  # whose simulation may be elsewhere
+            _curves(root, exported.row)
+        else:
             _recordings(root, service, exported.row, dataset, gone)
 
     row = exported.row
@@ -112,6 +115,13 @@ def _genes(root: Any, genes: Any) -> None:
     nc.flags(
         root, "gene_identifiable", "gene", "whether the data determine it", (gene["identifiable"] for gene in genes)
     )
+
+
+def _curves(root: Any, row: RunRow) -> None:
+    """Write the curves of the result of a run on series into ``root``, a group for each; nothing before it has one."""
+    models = {"nominal": "simulated with the nominal genome", "best": "simulated with the best genome"}
+    for number, one in enumerate((row.result or {}).get("curves", ()), 1):
+        nc.curve(root.create_group(f"curves/{number}"), one, one["time_s"], models)
 
 
 def _recordings(root: Any, service: Service, row: RunRow, dataset: Dataset, gone: Callable[[], bool]) -> None:

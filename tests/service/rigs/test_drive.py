@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -10,6 +11,7 @@ from importlib.metadata import EntryPoint, EntryPoints
 from pathlib import Path
 from typing import Any
 
+import h5netcdf
 import httpx
 import pytest
 
@@ -68,6 +70,21 @@ def alone() -> Json:
     return without_time(wingfit.finding_json(finding))
 
 
+def check_netcdf(content: bytes, found: Json) -> None:
+    """The file has what a series has, in its units, and nothing of a beat."""
+    with h5netcdf.File(io.BytesIO(content)) as file:
+        assert set(file) == {"recordings", "channels", "overlays"}
+        assert not [name for name in file["recordings"].variables if "flap" in name or "pressure" in name]
+        assert file["recordings/before"].attrs["units"] == "1"
+        assert list(file["recordings/before"]) == [one["before"]["value"] for one in found["recordings"]]
+        assert list(file["channels/noise"]) == [one["noise"] for one in found["channels"]]
+        first = found["overlays"][0]
+        for name in ("recorded", "before", "after"):
+            assert list(file[f"overlays/1/{name}"]) == first[name]
+            assert file[f"overlays/1/{name}"].attrs["units"] == first["unit"]
+        assert file["overlays/1"].attrs["recording"] == first["recording"]
+
+
 def test_a_driven_diagnosis_finds_what_one_process_finds(real: Api, alone: Json) -> None:
     one = real.diagnose(upload(real), rig=DECLARED)
     assert (one["rig"], one["driven"], one["kind"]) == ("decay", True, "series")
@@ -84,6 +101,8 @@ def test_a_driven_diagnosis_finds_what_one_process_finds(real: Api, alone: Json)
     for kind, start in (("csv", b"rank,effects,"), ("netcdf", b"\x89HDF"), ("json", b"{")):
         exported = real.client.get(f"/v1/diagnoses/{one['id']}/export?format={kind}")
         assert (exported.status_code, exported.content[: len(start)]) == (200, start)
+        if kind == "netcdf":
+            check_netcdf(exported.content, found)
     assert real.client.post(f"/v1/drive/{one['id']}/results", json={"driver": "late", "results": [NOTHING]}).json() == {
         "taken": 0,
         "unknown": 1,

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 from typing import Any
 
+import h5netcdf
 import pytest
 
 import wingfit
@@ -53,7 +55,11 @@ def test_a_driven_run_estimates_what_one_process_estimates(tmp_path: Path, alone
         head, *rows = api.client.get(f"/v1/runs/{run}/export?format=csv").text.splitlines()
         assert head.startswith("sequence,stage,generation,best,mean,diversity,best_percent,")
         assert len(rows) == done["generations"]
-        assert api.client.get(f"/v1/runs/{run}/export?format=netcdf").content[:4] == b"\x89HDF"
+        content = api.client.get(f"/v1/runs/{run}/export?format=netcdf").content
+        with h5netcdf.File(io.BytesIO(content)) as file:
+            curves = api.get(f"/v1/runs/{run}/result")["curves"]
+            assert len(file["curves"]) == len(curves) > 0
+            assert list(file["curves/1/best"]) == curves[0]["best"]
         document = api.get(f"/v1/runs/{run}/export?format=json")
         again = api.client.post("/v1/runs?validate_only=true", json=document["request"])
         assert again.status_code == 200, again.text
