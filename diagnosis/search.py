@@ -9,13 +9,9 @@ from dataclasses import replace
 import numpy as np
 
 from wingfit.diagnosis.evidence.competing_fits import StartPoint, fit_from_estimates, start_points
-from wingfit.diagnosis.evidence.context import FitContext
 from wingfit.diagnosis.evidence.fit import FIT_ERRORS, Fit
 from wingfit.diagnosis.evidence.nominal import (
-    Nominal,
     choose_discretisation,
-    finer_change,
-    finer_is_promising,
     fit_nominal,
     improves,
 )
@@ -23,7 +19,6 @@ from wingfit.diagnosis.evidence.refit import (
     FINAL_STEPS,
     Refit,
     continue_fit,
-    fit_to_convergence,
     make_refit,
     partner_trials,
     refit_at,
@@ -34,6 +29,7 @@ from wingfit.diagnosis.evidence.refit import (
 )
 from wingfit.diagnosis.evidence.screen import Trial, score_tests
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
+from wingfit.diagnosis.refinement import MAX_CONTINUED, refine_with_effects
 from wingfit.diagnosis.search_state import SearchState
 from wingfit.diagnosis.spec import DiagnosisSpec
 from wingfit.diagnosis.subject import Subject
@@ -43,7 +39,6 @@ from wingfit.rigs.suspect import Suspect
 
 Steps = Iterator[tuple[float, str]]  # fraction of the work done, and the next stage
 
-MAX_CONTINUED = 2  # best refits that are continued until they converge
 MAX_RESTARTED = 3  # suspects that are also fitted from the estimates
 MAX_PARTNERS = 3  # second effects that are tried with the best hypothesis
 MAX_RIVALS = 3  # hypotheses for which a second effect is tried
@@ -73,6 +68,7 @@ def run_search(state: SearchState, free: tuple[str, ...]) -> Steps:
             yield 0.85 + 0.07 * fraction, stage
     yield 0.92, "comparing with a finer discretisation"
     yield from ((0.93, stage) for stage in _refine_and_extend(state))
+    yield from ((0.93, stage) for stage in _smaller_refits(state))
     yield 0.94, "continuing the best refits"
     if state.refits:
         _continue_best(state)
@@ -154,64 +150,6 @@ def _unconverged(weights: HypothesisWeights) -> Refit | None:
         if evidence[k] > evidence.max() - weights.policy.overtake and not rival.fit.converged:
             return rival
     return None
-
-
-def _refine_with_effects(state: SearchState) -> None:
-    """Take a finer discretisation for all hypotheses where the best hypothesis fits better with it.
-
-    The error of a discretisation may become visible only after a large effect is in the model.
-    """
-    data, nominal = state.data, state.fitted_nominal
-    best = min((nominal.refit, *state.refits), key=lambda one: one.excess)
-    if best is nominal.refit:
-        return
-    tried_finer = nominal.tried_finer
-    limit = data.policy.rivalry * best.excess + tolerated_excess(data, 0.0, 0.0)
-    leading = [one for one in state.by_excess if one.excess <= limit][:MAX_CONTINUED]
-    for finer in state.context.finer():
-        tried = [(one, _fit_at_finer(finer, one)) for one in leading]
-        known = [found for one, found in tried if found is not None and found is not one]
-        tried_finer = finer.subject.description if known else tried_finer
-        better = min(known, key=lambda one: one.excess, default=best)
-        if improves(data, better, best):
-            break
-    else:
-        state.nominal = replace(nominal, tried_finer=tried_finer)
-        return
-    first = refit_at(finer, nominal.refit)
-    if first is None:
-        return
-    first = fit_to_convergence(finer, first)
-    limit = data.policy.rivalry * better.excess + tolerated_excess(data, 0.0, 0.0)
-    near = [one for one in state.refits if one.excess <= limit or set(one.names) < set(better.names)]
-    others = [one for one in near if one.names not in {found.names for found in known}]
-    followed = [_follow(finer, one, better) for one in others]
-    descriptions = f"{finer.subject.description} replaces {state.subject.description}"
-    remark = f"with the effect added, the discretisation limits the model: {descriptions}"
-    remarks = (*nominal.remarks, remark)  # the error of the finer discretisation itself is not known
-    state.nominal = Nominal(finer.subject, first, None, "", remarks)
-    state.context, state.refits = finer, [one for one in (*known, *followed) if one is not None]
-
-
-def _fit_at_finer(finer: FitContext, refit: Refit) -> Refit | None:
-    """Return ``refit`` fitted at the ``finer`` discretisation, unchanged if not promising; None if that fails."""
-    changes, gain = finer_change(finer, refit)
-    if not changes:
-        return None
-    if not finer_is_promising(finer.data, changes, gain, refit):
-        return refit
-    found = refit_at(finer, refit)
-    if found is None or found.fit.converged or improves(finer.data, found, refit) or found.excess >= refit.excess:
-        return found
-    return continue_fit(finer, found)
-
-
-def _follow(finer: FitContext, refit: Refit, best: Refit) -> Refit | None:
-    """Fit ``refit`` at ``finer``, to convergence if ``best`` includes all its effects and more; None if that fails."""
-    found = refit_at(finer, refit)
-    if found is None or found.fit.converged or not set(refit.names) < set(best.names):
-        return found
-    return continue_fit(finer, found)
 
 
 def _try_suspects(state: SearchState, suspects: Sequence[Suspect], at_least: Refit | None = None) -> Steps:
@@ -318,7 +256,7 @@ def _refine_and_extend(state: SearchState) -> Iterator[str]:
     """Try a finer discretisation (its error may look like a second effect), then second effects; yields stages."""
     coarse = state.subject
     if state.spec.refine:
-        _refine_with_effects(state)
+        refine_with_effects(state)
     if state.beats_unknown_law and not state.is_explained:
         yield from _second_effects(state)
         if state.subject is coarse and not state.is_explained:
@@ -370,6 +308,19 @@ def _substituted_refits(state: SearchState) -> Iterator[str]:
         others = [trial for trial in best.trials if trial is not part]
         for trial in substitute_trials(state.context, best, part, state.trials, MAX_SUBSTITUTES):
             yield from _refit_untried(state, tried, [*others, trial])
+
+
+def _smaller_refits(state: SearchState) -> Iterator[str]:
+    """Refit the best of three effects or more without each of them: one that was added early may be needed no longer.
+
+    Of series only: the trials of wings, which never needed it, were done without it.
+    """
+    best = state.by_excess[0] if state.refits else None
+    if state.data.kind != "series" or best is None or len(best.trials) < 3:
+        return
+    tried = {frozenset(one.names) for one in state.refits}
+    for part in best.trials:
+        yield from _refit_untried(state, tried, [trial for trial in best.trials if trial is not part])
 
 
 def _continue_best(state: SearchState) -> bool:

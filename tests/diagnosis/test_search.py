@@ -17,7 +17,7 @@ from wingfit.diagnosis.evidence.context import FitContext
 from wingfit.diagnosis.evidence.screen import Trial
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.policy import POLICY
-from wingfit.diagnosis.search import _indistinguishable, _look_alikes, run_search
+from wingfit.diagnosis.search import _indistinguishable, _look_alikes, _smaller_refits, run_search
 from wingfit.diagnosis.search_state import SearchState
 from wingfit.workers.in_process import InProcessEvaluator
 
@@ -58,6 +58,24 @@ def state(*tried: Trial) -> Any:
 
 def names(start_points: Sequence[StartPoint]) -> list[tuple[str, ...]]:
     return [tuple(one.suspect.name for one in entry.trials) for entry in start_points]
+
+
+def test_a_series_is_refitted_without_each_of_three_effects(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An effect that was added first, because it imitates two others, may be needed no longer with both of them."""
+    mass, cubic, gain = (trial(name) for name in ("point_mass", "cubic", "gain"))
+    three, two = refit(mass, cubic, gain, excess=1.0), refit(mass, cubic, excess=5.0)
+    added: list[Any] = []
+    searched = state()
+    searched.data.kind, searched.refits, searched.by_excess = "series", [two, three], [three, two]
+    searched.context, searched.add = None, added.append
+    searched.fitted_nominal = SimpleNamespace(refit=refit())
+    monkeypatch.setattr("wingfit.diagnosis.search.refit_with", lambda _, __, trials, ___: refit(*trials))
+    assert list(_smaller_refits(searched)) == ["refit with cubic and gain", "refit with gain and point_mass"]
+    assert [set(one.names) for one in added] == [{"cubic", "gain"}, {"point_mass", "gain"}]
+    searched.by_excess = [two, three]
+    assert list(_smaller_refits(searched)) == []
+    searched.data.kind, searched.by_excess = "tracks", [three, two]
+    assert list(_smaller_refits(searched)) == []
 
 
 def test_indistinguishable_single_effects_compete() -> None:
