@@ -10,6 +10,7 @@ import numpy as np
 import scipy
 
 from wingfit.records.array_types import Array, ArrayLike, Float
+from wingfit.rigs.lsoda import lsoda
 from wingfit.rigs.ports import Law, Values
 
 RTOL = 1e-8
@@ -122,6 +123,11 @@ class Run:
         """Integrate with an error control, in steps no longer than the interval of an input, so that none is missed."""
         times = np.asarray(self.times, float)
         spacing = float(np.min(np.diff(self.input_times))) if self.inputs else np.inf
+        if method == "LSODA":
+            states, failed = lsoda(rate, start, times, rtol, atol, spacing)
+            if failed is not None:
+                raise SimulationError(f"the integration fails: {failed}")
+            return states
         found = scipy.integrate.solve_ivp(
             rate, (times[0], times[-1]), start, method, times, rtol=rtol, atol=atol, max_step=spacing
         )
@@ -138,7 +144,7 @@ class Run:
             calls += 1
             if calls > most:
                 raise SimulationError(f"the integration makes no progress at {t:.6g} s; {most} rates were evaluated")
-            if not (state.max() < ESCAPED and state.min() > -ESCAPED):
+            if not state @ state < ESCAPED**2:  # also if it is not a number
                 raise SimulationError(f"the motion grows without bound: its state escapes at {t:.6g} s")
             if not remembering:
                 return rate(t, state)
