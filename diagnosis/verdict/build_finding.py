@@ -28,10 +28,10 @@ from wingfit.diagnosis.verdict.proof import ResidualPair, predict_held_out, proo
 from wingfit.diagnosis.verdict.reservations import (
     accepted_sentence,
     doubted_by_held_out,
+    few_suffice,
     held_out_sentence,
     insufficient,
     noise_sentence,
-    none_suffices,
     remaining_sentence,
 )
 from wingfit.diagnosis.verdict.series_remarks import series_remarks
@@ -50,7 +50,7 @@ def build_finding(state: SearchState, name: str, held_out: Sequence[AnyRecording
     """
     nominal, weights = state.fitted_nominal.refit, state.final_weights
     decision = decide(weights)
-    if none_suffices(state.data, decision, weights.refits, _discretisation_error(state)):
+    if few_suffice(state.data, decision, weights, _discretisation_error(state)):
         decision = insufficient(decision)
     best = nominal if decision.verdict == "adequate" else decision.best
     yield 0.0, "computing the intervals of the genes", None

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +11,7 @@ from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.finding import Proof, Verdict, amount
 from wingfit.diagnosis.verdict.noise_doubt import noise_may_hide
 from wingfit.diagnosis.verdict.verdict import Decision
-from wingfit.diagnosis.verdict.weigh_hypotheses import nominal_refuted
+from wingfit.diagnosis.verdict.weigh_hypotheses import HypothesisWeights, nominal_refuted
 from wingfit.records import Series
 
 NAMING: tuple[Verdict, ...] = ("named", "ambiguous", "measurement fault")
@@ -48,21 +47,23 @@ def noise_sentence(data: WhitenedData, decision: Decision, nominal: Refit) -> st
     return " But the noise is not known well enough to exclude it: see the remarks."
 
 
-def none_suffices(data: WhitenedData, decision: Decision, refits: Sequence[Refit], floor: float) -> bool:
-    """Return whether each alternative of an ambiguous verdict on series leaves more than their accepted error.
+def few_suffice(data: WhitenedData, decision: Decision, weights: HypothesisWeights, floor: float) -> bool:
+    """Return whether alternatives of an ambiguous verdict on series that leave more than the accepted error prevail.
 
-    ``refits``: of all hypotheses; ``floor``: discretisation error. False where no accepted error is stated: then a
-    misfit that remains may be that of a law which is nearly right.
+    They do where they have most of the probability of all alternatives; ``floor``: discretisation error. False where no
+    accepted error is stated: then a misfit that remains may be that of a law which is nearly right.
     """
     if data.kind != "series" or decision.verdict != "ambiguous" or not data.accepted:
         return False
     possible = [frozenset(one) for one in decision.alternatives]
-    left = [one.excess for one in refits if frozenset(one.names) in possible]
-    return bool(left) and all(nominal_refuted(data, excess, floor) for excess in left)
+    each = zip(weights.refits, weights.probabilities.tolist(), strict=True)
+    listed = [(one.excess, probability) for one, probability in each if frozenset(one.names) in possible]
+    enough = sum(probability for excess, probability in listed if not nominal_refuted(data, excess, floor))
+    return enough < 0.5 * sum(probability for _, probability in listed)
 
 
 def insufficient(decision: Decision) -> Decision:
-    """Return ``decision`` as "unnamed": none of the alternatives that remain is an explanation."""
+    """Return ``decision`` as "unnamed": what could be named explains too little."""
     found = dict(decision.probabilities)
     given = sum(found[name] for name in NAMING)
     found.update(dict.fromkeys(NAMING, 0.0), unnamed=found["unnamed"] + given)

@@ -14,9 +14,9 @@ from wingfit.diagnosis.policy import POLICY
 from wingfit.diagnosis.verdict.reservations import (
     accepted_sentence,
     doubted_by_held_out,
+    few_suffice,
     held_out_sentence,
     insufficient,
-    none_suffices,
     remaining_sentence,
 )
 from wingfit.diagnosis.verdict.verdict import Decision
@@ -116,25 +116,27 @@ def replace_excess(found: Decision, excess: float) -> Decision:
     return Decision(found.verdict, found.probabilities, found.named, found.alternatives, best)
 
 
-def either(*excesses: float) -> tuple[Decision, list[Any]]:
-    """An ambiguous verdict between effects that leave ``excesses``, and the refits of all hypotheses."""
+def either(*excesses: float, first: float = 0.5) -> tuple[Decision, Any]:
+    """An ambiguous verdict between effects that leave ``excesses``, the ``first`` probability that of the first."""
     names = [f"effect {k}" for k in range(len(excesses))]
     refits: list[Any] = [SimpleNamespace(names=(), excess=400.0)]
     refits += [SimpleNamespace(names=(name,), excess=excess) for name, excess in zip(names, excesses, strict=True)]
-    return replace(decision("ambiguous"), alternatives=tuple((name,) for name in names)), refits
+    probabilities = np.array([0.01, first, *[(0.99 - first) / (len(excesses) - 1)] * (len(excesses) - 1)])
+    weights = SimpleNamespace(refits=tuple(refits), probabilities=probabilities)
+    return replace(decision("ambiguous"), alternatives=tuple((name,) for name in names)), weights
 
 
-def test_alternatives_that_all_leave_more_than_the_accepted_error_explain_nothing() -> None:
-    found, refits = either(36.0, 49.0)
-    assert none_suffices(data(accepted=5.0), found, refits, 0.0)
+def test_alternatives_that_leave_more_than_the_accepted_error_explain_nothing() -> None:
+    found, weights = either(36.0, 49.0)
+    assert few_suffice(data(accepted=5.0), found, weights, 0.0)
     after = insufficient(found)
     assert (after.verdict, after.named, after.alternatives) == ("unnamed", (), ())
     assert after.probabilities["unnamed"] == pytest.approx(1.0)
-    one_is_right, refits_of_it = either(16.0, 49.0)
-    assert not none_suffices(data(accepted=5.0), one_is_right, refits_of_it, 0.0)
-    assert not none_suffices(data(accepted=0.0), found, refits, 0.0)  # a law that is nearly right leaves a misfit too
-    assert not none_suffices(data("tracks", accepted=5.0), found, refits, 0.0)
-    assert not none_suffices(data(accepted=5.0), decision("named"), refits, 0.0)
+    for first, most_leave_more in ((0.6, False), (0.3, True)):  # the probability of one that explains enough
+        assert few_suffice(data(accepted=5.0), *either(16.0, 49.0, first=first), 0.0) is most_leave_more
+    assert not few_suffice(data(accepted=0.0), found, weights, 0.0)  # a law that is nearly right leaves a misfit too
+    assert not few_suffice(data("tracks", accepted=5.0), found, weights, 0.0)
+    assert not few_suffice(data(accepted=5.0), decision("named"), weights, 0.0)
 
 
 def test_a_model_that_is_adequate_by_the_accepted_error_alone_says_so() -> None:
