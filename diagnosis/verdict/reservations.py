@@ -59,7 +59,7 @@ def few_suffice(data: WhitenedData, decision: Decision, weights: HypothesisWeigh
     each = zip(weights.refits, weights.probabilities.tolist(), strict=True)
     listed = [(one.excess, probability) for one, probability in each if frozenset(one.names) in possible]
     enough = sum(probability for excess, probability in listed if not nominal_refuted(data, excess, floor))
-    return enough < 0.5 * sum(probability for _, probability in listed)
+    return bool(enough < 0.5 * sum(probability for _, probability in listed))
 
 
 def insufficient(decision: Decision) -> Decision:
