@@ -84,7 +84,9 @@ def cross_validated_excess(data: WhitenedData, fit: Fit) -> float | None:
     for experiment in data.experiments:
         left_gram, left_score = sum(grams[r] for r in experiment), sum(scores[r] for r in experiment)
         others, spread = sum(grams) - left_gram, np.linalg.inv(gram - likelihood_weight * left_gram)
-        move = np.clip(fit.unit - spread @ (score - likelihood_weight * left_score), 0.0, 1.0) - fit.unit
+        move = _move_within_bounds(
+            gram - likelihood_weight * left_gram, score - likelihood_weight * left_score, fit.unit
+        )
         noisy = likelihood_weight**2 * spread @ others @ spread
         for r in experiment:
             part = data.recording_slices[r]
@@ -97,6 +99,23 @@ def cross_validated_excess(data: WhitenedData, fit: Fit) -> float | None:
                 worse - data.policy.prediction_noise * by_noise, 0.0
             )
     return total
+
+
+def _move_within_bounds(gram: Float[Array, "F F"], score: Float[Array, " F"], unit: Float[Array, " F"]) -> Array:
+    """Return the move [F] of the genes ``unit``, in 0..1, to the minimum with curvature ``gram`` and slope ``score``.
+
+    Genes that would leave their bounds stay there, and the others move to their minimum with them there.
+    """
+    move, fixed = np.zeros(len(unit)), np.zeros(len(unit), bool)
+    for _ in range(len(unit)):
+        free = ~fixed
+        move[free] = -np.linalg.solve(gram[np.ix_(free, free)], score[free] + gram[np.ix_(free, fixed)] @ move[fixed])
+        beyond = free & ((unit + move < 0.0) | (unit + move > 1.0))
+        if not beyond.any():
+            break
+        move[beyond] = np.clip(unit + move, 0.0, 1.0)[beyond] - unit[beyond]
+        fixed |= beyond
+    return move
 
 
 def _refitted_alone(data: WhitenedData, fit: Fit, r: int, coefficients: Array) -> Array:
