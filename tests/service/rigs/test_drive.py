@@ -7,6 +7,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from importlib.metadata import EntryPoint, EntryPoints
 from pathlib import Path
 from typing import Any
@@ -107,6 +108,16 @@ def test_a_driven_diagnosis_finds_what_one_process_finds(real: Api, alone: Json)
         "taken": 0,
         "unknown": 1,
     }
+
+
+def test_suspects_of_a_request_are_the_only_ones_that_are_considered(real: Api) -> None:
+    faulty = declaration(replace(decay_rig.rig, faults=True))
+    one = real.diagnose(upload(real), rig=faulty, suspects=["gain.charge"])
+    with client_of(real) as client:
+        assert wingfit.drive(client, one["id"], replace(decay_rig.rig, faults=True))["state"] == "SUCCEEDED"
+    found = real.get(f"/v1/diagnoses/{one['id']}/finding")
+    assert {name for each in found["hypotheses"] for name in each["effects"]} == {"gain.charge"}
+    assert "leak" not in found["named"]
 
 
 def test_it_waits_for_a_driver_and_survives_the_death_of_either_side(tmp_path: Path, alone: Json) -> None:
