@@ -264,8 +264,9 @@ class _Run:
         state, ends, stage = self.state, self.state.ends, self.stage.name
         best, last = ends.best(), ends.agreed or ends.tried == starts
         part = 1.0 if last else _share(ends.iterations, 2 * EXPECTED_ITERATIONS)
-        if last and ends.doubt:
-            state.doubts = state.doubts | {stage: ends.doubt}
+        if last:  # an earlier version may have stored a doubt that a further start removes
+            others = {name: doubt for name, doubt in state.doubts.items() if name != stage}
+            state.doubts = others | ({stage: ends.doubt} if ends.doubt else {})
         evaluated, mean, moved = (step.evaluations, step.fitness, step.step) if step else (0, best.fitness, 0.0)
         return self._seen(
             state.base | best.values, evaluated, (state.stage + part) / len(self.stages), stage + NEWTON,

@@ -23,6 +23,7 @@ from wingfit.diagnosis.evidence.refit import (
     partner_trials,
     refit_at,
     refit_with,
+    refit_without,
     strongest_trials,
     substitute_trials,
     suspect_pairs,
@@ -320,7 +321,10 @@ def _smaller_refits(state: SearchState) -> Iterator[str]:
         return
     tried = {frozenset(one.names) for one in state.refits}
     for part in best.trials:
-        yield from _refit_untried(state, tried, [trial for trial in best.trials if trial is not part])
+        names = [name for name in best.names if name != part.suspect.name]
+        if frozenset(names) not in tried:
+            yield f"refit with {' and '.join(sorted(names))}"
+            state.add(refit_without(state.context, best, part))
 
 
 def _continue_best(state: SearchState) -> bool:

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import threading
-import warnings
 from collections.abc import Callable
 
 import numpy as np
-from scipy.integrate import ODEintWarning, odeint, solve_ivp
+from scipy.integrate import odeint, solve_ivp
 
 from wingfit.records.array_types import Array, ArrayLike, Float
 
@@ -30,6 +29,7 @@ def lsoda(
 
     ``rtol``, ``atol`` [N]: tolerances; ``longest``: step (s), infinity without a limit. No rate is evaluated beyond the
     last of ``times`` [T]. What ``rate`` raises is passed on. Within the rate of another integration, DOP853 is used.
+    Threads integrate one after the other, so a rate must not wait for another thread that integrates.
     """
     with _one_at_a_time:
         if getattr(_thread, "solving", False):
@@ -51,19 +51,17 @@ def _explicit(
 def _solved(
     rate: Callable[[float, Array], ArrayLike], start: Array, times: Array, rtol: float, atol: Array, longest: float
 ) -> tuple[Array, str | None]:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", ODEintWarning)
-        states, known = odeint(
-            lambda t, state: rate(t, np.array(state)),  # its own array is the solver's memory
-            start,
-            times,
-            tfirst=True,
-            full_output=True,
-            rtol=rtol,
-            atol=atol,
-            tcrit=times[-1:],
-            hmax=longest if np.isfinite(longest) else 0.0,
-            mxstep=MOST_STEPS,
-        )
+    states, known = odeint(
+        lambda t, state: rate(t, np.array(state)),  # its own array is the solver's memory
+        start,
+        times,
+        tfirst=True,
+        full_output=True,
+        rtol=rtol,
+        atol=atol,
+        tcrit=times[-1:],
+        hmax=longest if np.isfinite(longest) else 0.0,
+        mxstep=MOST_STEPS,
+    )
     failed = None if known["message"] == "Integration successful." else str(known["message"])
     return np.asarray(states).T, failed

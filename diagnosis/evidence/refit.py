@@ -7,6 +7,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 
 from wingfit.calibration.estimates.linearised import free_genes, values_at
 from wingfit.calibration.problem import Problem, base_genome
@@ -83,10 +84,10 @@ def cross_validated_excess(data: WhitenedData, fit: Fit) -> float | None:
     total = 0.0
     for experiment in data.experiments:
         left_gram, left_score = sum(grams[r] for r in experiment), sum(scores[r] for r in experiment)
-        others, spread = sum(grams) - left_gram, np.linalg.inv(gram - likelihood_weight * left_gram)
-        move = _move_within_bounds(
-            gram - likelihood_weight * left_gram, score - likelihood_weight * left_score, fit.unit
-        )
+        others, curvature = sum(grams) - left_gram, gram - likelihood_weight * left_gram
+        move, free = _move_within_bounds(curvature, score - likelihood_weight * left_score, fit.unit)
+        spread = np.zeros_like(curvature)
+        spread[np.ix_(free, free)] = np.linalg.inv(curvature[np.ix_(free, free)])
         noisy = likelihood_weight**2 * spread @ others @ spread
         for r in experiment:
             part = data.recording_slices[r]
@@ -101,21 +102,17 @@ def cross_validated_excess(data: WhitenedData, fit: Fit) -> float | None:
     return total
 
 
-def _move_within_bounds(gram: Float[Array, "F F"], score: Float[Array, " F"], unit: Float[Array, " F"]) -> Array:
-    """Return the move [F] of the genes ``unit``, in 0..1, to the minimum with curvature ``gram`` and slope ``score``.
+def _move_within_bounds(
+    curvature: Float[Array, "F F"], slope: Float[Array, " F"], unit: Float[Array, " F"]
+) -> tuple[Float[Array, " F"], Mask]:
+    """Return the move [F] of the genes ``unit``, in 0..1, to the minimum within bounds, and which are at no bound [F].
 
-    Genes that would leave their bounds stay there, and the others move to their minimum with them there.
+    ``curvature`` and ``slope``: of the cost, at no move.
     """
-    move, fixed = np.zeros(len(unit)), np.zeros(len(unit), bool)
-    for _ in range(len(unit)):
-        free = ~fixed
-        move[free] = -np.linalg.solve(gram[np.ix_(free, free)], score[free] + gram[np.ix_(free, fixed)] @ move[fixed])
-        beyond = free & ((unit + move < 0.0) | (unit + move > 1.0))
-        if not beyond.any():
-            break
-        move[beyond] = np.clip(unit + move, 0.0, 1.0)[beyond] - unit[beyond]
-        fixed |= beyond
-    return move
+    root = np.linalg.cholesky(curvature)
+    target = -scipy.linalg.solve_triangular(root, slope, lower=True)
+    found = scipy.optimize.lsq_linear(root.T, target, (-unit, 1.0 - unit), method="bvls")
+    return np.asarray(found.x), np.asarray(found.active_mask == 0)
 
 
 def _refitted_alone(data: WhitenedData, fit: Fit, r: int, coefficients: Array) -> Array:
@@ -195,6 +192,23 @@ def _fit_subset(context: FitContext, problem: Problem, start: Array, before: Fit
     unit, jacobian = start.copy(), np.zeros((len(found.coefficients), len(start)))
     unit[which], jacobian[:, which] = found.unit, found.jacobian
     return unit, jacobian[:, : len(before.unit)]
+
+
+def refit_without(context: FitContext, refit: Refit, left_out: Trial) -> Refit | None:
+    """Fit ``refit`` without the suspect of the trial ``left_out``, from its present genes; None if that fails."""
+    trials, fit = [trial for trial in refit.trials if trial is not left_out], refit.fit
+    names = {gene.name for gene in left_out.suspect.genes}
+    kept = np.array([name not in names for name in fit.problem.free])
+    model = context.subject.extended([trial.suspect.name for trial in trials])
+    known = fit.problem.base.replace(fit.values).as_dict()
+    values = {name: value for name, value in known.items() if name not in names}
+    free = tuple(name for name in fit.problem.free if name not in names)
+    try:
+        problem = context.problem(model, free, base_genome(model, values))
+        found = _fit_added_genes(context, problem, fit.unit[kept], fit.jacobian[:, kept])
+    except FIT_ERRORS:
+        return None
+    return make_refit(context.data, found, trials)
 
 
 def refit_at(context: FitContext, refit: Refit, start: Float[Array, " F"] | None = None) -> Refit | None:

@@ -121,14 +121,27 @@ class WhitenedData:
 
     @cached_property
     def accepted(self) -> float:
-        """Root mean square (of series: in scales) by which the user lets any model differ from the truth; 0 if none."""
-        squares = [np.zeros(1)]
+        """Root mean square (of series: in scales) by which the user lets any model differ from the truth; 0 if none.
+
+        In the measure of an :meth:`excess`; :attr:`accepted_of_samples` is that of the samples.
+        """
+        return float(np.sqrt(np.mean(np.concatenate([share * one for share, one in self._accepted_squares]))))
+
+    @cached_property
+    def accepted_of_samples(self) -> float:
+        """The same as :attr:`accepted`, root mean square over the samples."""
+        return float(np.sqrt(np.mean(np.concatenate([one for _, one in self._accepted_squares]))))
+
+    @cached_property
+    def _accepted_squares(self) -> list[tuple[float, Array]]:
+        """Of each recording, samples by coefficients, and the squares of the accepted errors, in scales."""
+        squares = list[tuple[float, Array]]()
         for one, fit in zip(self.recordings, self.reduced, strict=True):
             if isinstance(one, Series) and isinstance(fit, SeriesFit):
                 errors = np.array([channel.accepted_error or 0.0 for channel in one.quantities])[fit.used]
                 whole = len(one.times) / len(fit.weight)  # a model's error lies in the coefficients, fewer than samples
-                squares.append(whole * (errors / fit.scale[fit.used]) ** 2)
-        return float(np.sqrt(np.mean(np.concatenate(squares[1:] or squares))))
+                squares.append((whole, (errors / fit.scale[fit.used]) ** 2))
+        return squares or [(1.0, np.zeros(1))]
 
     @cached_property
     def drift(self) -> Float[Array, " R"]:

@@ -26,11 +26,11 @@ from wingfit.diagnosis.verdict.next_series import Candidate, rank_recordings, se
 from wingfit.diagnosis.verdict.noise_remarks import drift_sentence, noise_remarks
 from wingfit.diagnosis.verdict.proof import ResidualPair, predict_held_out, proof, recording_misfits
 from wingfit.diagnosis.verdict.reservations import (
+    accepted_error_sentence,
     accepted_sentence,
     doubted_by_held_out,
-    few_suffice,
     held_out_sentence,
-    insufficient,
+    judged_by_accepted_error,
     noise_sentence,
     remaining_sentence,
 )
@@ -49,9 +49,7 @@ def build_finding(state: SearchState, name: str, held_out: Sequence[AnyRecording
     ``name``: of the dataset; ``held_out``: recordings with which the result is validated.
     """
     nominal, weights = state.fitted_nominal.refit, state.final_weights
-    decision = decide(weights)
-    if few_suffice(state.data, decision, weights, _discretisation_error(state)):
-        decision = insufficient(decision)
+    decision = judged_by_accepted_error(decide(weights), state.data, weights, _discretisation_error(state))
     best = nominal if decision.verdict == "adequate" else decision.best
     yield 0.0, "computing the intervals of the genes", None
     best = replace(best, fit=with_measured_jacobian(state.context, best.fit))
@@ -155,7 +153,8 @@ def _finding(
         summary=summary(decision, suspects, _summary_texts(data, nominal, best, located, proved))
         + ("" if data.kind == "series" else drift_sentence(data))
         + remaining_sentence(data, decision, best, discretisation)
-        + accepted_sentence(data, decision, nominal)
+        + accepted_error_sentence(decide(weights), first)
+        + accepted_sentence(data, decision, nominal, discretisation)
         + noise_sentence(data, decision, nominal)
         + held_out_sentence(first, proved, data, refuted=refuted),
         probabilities=decision.probabilities,

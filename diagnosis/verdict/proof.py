@@ -150,7 +150,7 @@ def proof(predicted: ResidualPair, floor: float, unit: str, *, effects_added: bo
 
 def _least(noise: float, floor: float, data: WhitenedData) -> float:
     """Return the misfit to be expected of a right model: noise, discretisation error and the error that is accepted."""
-    return float(np.sqrt(noise**2 + floor**2 + data.accepted**2))
+    return float(np.sqrt(noise**2 + floor**2 + data.accepted_of_samples**2))
 
 
 def _relative_to_floor(interval: Interval, floor: float) -> Interval:

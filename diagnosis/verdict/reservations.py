@@ -30,10 +30,16 @@ def remaining_sentence(data: WhitenedData, decision: Decision, best: Refit, floo
     return f" A misfit of {rest} beyond the noise remains: the law has another form, or something else is missing too."
 
 
-def accepted_sentence(data: WhitenedData, decision: Decision, nominal: Refit) -> str:
-    """Return a sentence on the accepted error of series, if a model is adequate only because of it; else empty."""
-    beyond = nominal.excess > (data.policy.negligible * data.noise) ** 2
-    if decision.verdict != "adequate" or not data.accepted or not beyond:
+def accepted_sentence(data: WhitenedData, decision: Decision, nominal: Refit, floor: float) -> str:
+    """Return a sentence on the accepted error of series, if a model is adequate only because of it; else empty.
+
+    ``floor``: discretisation error.
+    """
+    if decision.verdict != "adequate" or not data.accepted:
+        return ""
+    beyond = nominal.excess - (data.policy.negligible * data.noise) ** 2 - floor**2
+    refuted_without = nominal_refuted(data, nominal.excess + data.accepted**2, floor)
+    if beyond > data.accepted**2 or not refuted_without:
         return ""
     stated = {c.name: c for one in data.recordings if isinstance(one, Series) for c in one.quantities}
     errors = ", ".join(f"{c.accepted_error:.3g} {c.unit} in {c.name}" for c in stated.values() if c.accepted_error)
@@ -47,27 +53,39 @@ def noise_sentence(data: WhitenedData, decision: Decision, nominal: Refit) -> st
     return " But the noise is not known well enough to exclude it: see the remarks."
 
 
-def few_suffice(data: WhitenedData, decision: Decision, weights: HypothesisWeights, floor: float) -> bool:
-    """Return whether alternatives of an ambiguous verdict on series that leave more than the accepted error prevail.
+def judged_by_accepted_error(
+    decision: Decision, data: WhitenedData, weights: HypothesisWeights, floor: float
+) -> Decision:
+    """Return an ambiguous ``decision`` on series without the probability of what leaves more than the accepted error.
 
-    They do where they have most of the probability of all alternatives; ``floor``: discretisation error. False where no
-    accepted error is stated: then a misfit that remains may be that of a law which is nearly right.
+    That probability becomes the one of an unnamed cause, which is the verdict if it prevails. ``floor``: discretisation
+    error. Nothing changes where no accepted error is stated: then a misfit that remains may be that of a law which is
+    nearly right.
     """
     if data.kind != "series" or decision.verdict != "ambiguous" or not data.accepted:
-        return False
+        return decision
     possible = [frozenset(one) for one in decision.alternatives]
     each = zip(weights.refits, weights.probabilities.tolist(), strict=True)
     listed = [(one.excess, probability) for one, probability in each if frozenset(one.names) in possible]
     enough = sum(probability for excess, probability in listed if not nominal_refuted(data, excess, floor))
-    return bool(enough < 0.5 * sum(probability for _, probability in listed))
+    return _without_names(decision, 1.0 - enough / sum(probability for _, probability in listed))
 
 
-def insufficient(decision: Decision) -> Decision:
-    """Return ``decision`` as "unnamed": what could be named explains too little."""
+def _without_names(decision: Decision, share: float = 1.0) -> Decision:
+    """Return ``decision`` with a ``share`` of the probability of all names given to an unnamed cause."""
     found = dict(decision.probabilities)
-    given = sum(found[name] for name in NAMING)
-    found.update(dict.fromkeys(NAMING, 0.0), unnamed=found["unnamed"] + given)
+    given = {name: share * found[name] for name in NAMING}
+    found.update({name: found[name] - given[name] for name in NAMING}, unnamed=found["unnamed"] + sum(given.values()))
+    if sum(found[name] for name in NAMING) > found["unnamed"]:
+        return replace(decision, probabilities=found)
     return replace(decision, verdict="unnamed", probabilities=found, named=(), alternatives=())
+
+
+def accepted_error_sentence(before: Decision, after: Decision) -> str:
+    """Return a sentence on an ambiguous decision ``before`` that :func:`judged_by_accepted_error` made unnamed."""
+    if before.verdict != "ambiguous" or after.verdict != "unnamed":
+        return ""
+    return " The effects that could be the cause leave more than the accepted error, except improbable ones."
 
 
 def doubted_by_held_out(
@@ -86,7 +104,7 @@ def doubted_by_held_out(
         moved = max(found["adequate"] - data.policy.doubted_noise, 0.0)
         found["adequate"], found["unnamed"] = found["adequate"] - moved, found["unnamed"] + moved
         return replace(decision, probabilities=found)
-    return insufficient(decision) if _useless(decision, proved, data) else decision
+    return _without_names(decision) if _useless(decision, proved, data) else decision
 
 
 def held_out_sentence(before: Decision, proved: Proof | None, data: WhitenedData, *, refuted: bool = False) -> str:

@@ -90,9 +90,9 @@ def _recordings(root: Any, found: Json) -> None:
     group.dimensions = {"recording": len(items)}
     nc.texts(group, "recording", "recording", "recording", (one["name"] for one in items))
     nc.flags(group, "held_out", "recording", "whether it was held out", (one["held_out"] for one in items))
-    for name, units, meaning in CONDITION if found["kind"] != "series" else ():
+    for name, units, meaning in CONDITION if found.get("kind") != "series" else ():
         nc.numbers(group, name, along, units, meaning, _all(items, name))
-    if settings := list(items[0]["settings"]):
+    if settings := list(dict.fromkeys(name for one in items for name in one.get("settings", ()))):
         group.dimensions["setting"] = len(settings)
         nc.texts(group, "setting", "setting", "setting of a recording", settings)
         values = np.array([nc.or_nan(one["settings"].get(name) for name in settings) for one in items])
@@ -108,7 +108,7 @@ def _recordings(root: Any, found: Json) -> None:
 
 def _channels(root: Any, found: Json) -> None:
     """Write a group with the misfit of each channel of a series, in its own unit, into ``root``."""
-    items, along = found["channels"], ("channel",)
+    items, along = found.get("channels", []), ("channel",)
     if not items:
         return
     group = root.create_group("channels")
@@ -128,7 +128,7 @@ def _channels(root: Any, found: Json) -> None:
 
 def _overlays(root: Any, found: Json) -> None:
     """Write the values over time of the channels of a series that the report shows into ``root``, a group for each."""
-    shown = [one for one in found["overlays"] if one["times"]]
+    shown = [one for one in found["overlays"] if one.get("times")]
     for number, one in enumerate(shown, 1):
         nc.curve(root.create_group(f"overlays/{number}"), one, one["times"], MODELS)
 

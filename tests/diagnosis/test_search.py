@@ -69,7 +69,11 @@ def test_a_series_is_refitted_without_each_of_three_effects(monkeypatch: pytest.
     searched.data.kind, searched.refits, searched.by_excess = "series", [two, three], [three, two]
     searched.context, searched.add = None, added.append
     searched.fitted_nominal = SimpleNamespace(refit=refit())
-    monkeypatch.setattr("wingfit.diagnosis.search.refit_with", lambda _, __, trials, ___: refit(*trials))
+
+    def without(_: object, best: Any, part: Trial) -> Any:
+        return refit(*(one for one in best.trials if one is not part))
+
+    monkeypatch.setattr("wingfit.diagnosis.search.refit_without", without)
     assert list(_smaller_refits(searched)) == ["refit with cubic and gain", "refit with gain and point_mass"]
     assert [set(one.names) for one in added] == [{"cubic", "gain"}, {"point_mass", "gain"}]
     searched.by_excess = [two, three]

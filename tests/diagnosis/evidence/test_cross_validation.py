@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-import scipy
 
 from wingfit.diagnosis.evidence.refit import _move_within_bounds
 
 
 def test_within_bounds_it_is_newtons_step() -> None:
     gram, score = np.array([[4.0, 1.0], [1.0, 3.0]]), np.array([0.4, -0.3])
-    move = _move_within_bounds(gram, score, np.array([0.5, 0.5]))
+    move, free = _move_within_bounds(gram, score, np.array([0.5, 0.5]))
     np.testing.assert_allclose(gram @ move, -score, atol=1e-14)
+    assert free.all()
 
 
 def test_genes_move_to_their_minimum_beside_one_that_stays_at_its_bound() -> None:
@@ -20,17 +20,29 @@ def test_genes_move_to_their_minimum_beside_one_that_stays_at_its_bound() -> Non
     gram, score = np.array([[1.0, -0.9], [-0.9, 1.0]]), np.array([-0.5, 0.45])
     newton = -np.linalg.solve(gram, score)
     assert newton[0] > 0.4
-    move = _move_within_bounds(gram, score, np.array([1.0, 0.5]))
+    move, free = _move_within_bounds(gram, score, np.array([1.0, 0.5]))
     np.testing.assert_allclose(move, [0.0, -0.45], atol=1e-14)
+    assert free.tolist() == [False, True]
+
+
+def test_a_gene_that_leaves_its_bounds_only_with_another_may_stay_within_them() -> None:
+    """Unbounded, both genes leave above; with the first at its bound, the minimum of the second is below."""
+    gram, score = np.array([[1.0, -0.9], [-0.9, 1.0]]), np.array([-0.5, 0.3])
+    assert np.all(-np.linalg.solve(gram, score) > 0.5)
+    np.testing.assert_allclose(_move_within_bounds(gram, score, np.array([1.0, 0.5]))[0], [0.0, -0.3], atol=1e-14)
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_the_minimum_is_that_of_a_bounded_least_squares_problem(seed: int) -> None:
-    """Where one gene leaves its bounds, against another algorithm."""
+def test_no_other_move_within_the_bounds_costs_less(seed: int) -> None:
+    """The conditions of Karush, Kuhn and Tucker, with several genes at their bounds."""
     rng = np.random.default_rng(seed)
-    slopes, unit = rng.standard_normal((30, 4)), np.array([0.98, 0.5, 0.5, 0.5])
-    residual = slopes @ np.array([-0.3, *rng.uniform(-0.1, 0.1, 3)]) + 0.01 * rng.standard_normal(30)
-    move = _move_within_bounds(slopes.T @ slopes, slopes.T @ residual, unit)
-    best = scipy.optimize.lsq_linear(slopes, -residual, (-unit, 1.0 - unit), tol=1e-14)
-    np.testing.assert_allclose(move, best.x, atol=1e-6)
-    assert unit[0] + move[0] == 1.0
+    slopes = rng.standard_normal((30, 6)) @ rng.standard_normal((6, 6))
+    unit, score = rng.choice([0.0, 0.3, 0.7, 1.0], 6), 30.0 * rng.standard_normal(6)
+    gram = slopes.T @ slopes + np.eye(6)
+    move, free = _move_within_bounds(gram, score, unit)
+    there, gradient = unit + move, score + gram @ move
+    assert np.all((there > -1e-12) & (there < 1.0 + 1e-12))
+    np.testing.assert_allclose(gradient[free], 0.0, atol=1e-8 * np.abs(score).max())
+    assert np.all(gradient[~free & (there < 0.5)] > -1e-8)
+    assert np.all(gradient[~free & (there > 0.5)] < 1e-8)
+    assert not free.all()

@@ -26,7 +26,13 @@ from wingfit.diagnosis.evidence.fit import (
 )
 from wingfit.diagnosis.evidence.intervals import covariance
 from wingfit.diagnosis.evidence.nominal import Nominal, finer_is_promising
-from wingfit.diagnosis.evidence.refit import cross_validated_excess, make_refit, refit_with, substitute_trials
+from wingfit.diagnosis.evidence.refit import (
+    cross_validated_excess,
+    make_refit,
+    refit_with,
+    refit_without,
+    substitute_trials,
+)
 from wingfit.diagnosis.evidence.screen import Nuisance, score_tests
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.policy import POLICY
@@ -271,6 +277,23 @@ def test_substitutes_reproduce_the_contribution_of_an_effect() -> None:
     offered = [*found, [twin]]
     assert substitute_trials(context(data), both, best["delay"], offered, 2) == [twin]
     assert substitute_trials(context(data), both, best["friction"], offered, 2) == []
+
+
+def test_a_refit_without_one_of_its_effects_ends_where_one_of_the_others_alone_does() -> None:
+    data = whitened_pendulum(friction_torque=2e-3, delay_time=4e-3)
+    nominal = fit(data)
+    best = {trials[0].suspect.name: trials[0] for _, trials in score_tests(context(data), nominal, RIG.suspects)}
+    three = refit_with(context(data), nominal, [best["friction"], best["delay"], best["gain"]])
+    two = refit_with(context(data), nominal, [best["friction"], best["delay"]])
+    assert three is not None
+    assert two is not None
+    found = refit_without(context(data), three, best["gain"])
+    assert found is not None
+    assert found.names == two.names == ("friction", "delay")
+    assert found.fit.problem.free == two.fit.problem.free
+    np.testing.assert_allclose(found.fit.unit, two.fit.unit, atol=2e-3)
+    assert found.fit.cost == pytest.approx(two.fit.cost, abs=0.1)
+    assert three.fit.cost <= found.fit.cost + 0.1
 
 
 def test_a_failed_subset_fit_does_not_end_a_refit(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -56,7 +56,7 @@ def test_an_accepted_error_is_part_of_the_misfit_to_be_expected() -> None:
     """Noise 1, accepted error 3, discretisation error 2: a right model misses by the root of their squares."""
     off = np.full((8, 1), 7.0)
     two = data("forces", 1, 1)
-    two.noise, two.accepted = 1.0, 3.0
+    two.noise, two.accepted_of_samples = 1.0, 3.0
     found = proof(ResidualPair(two, (off,), (off,)), 2.0, "noise", effects_added=False)
     assert found.floor == np.sqrt(1.0 + 9.0 + 4.0)
     assert found.before.value == 7.0 / found.floor
