@@ -163,7 +163,7 @@ def test_a_rig_is_needed_for_series(recorded: SeriesDataset) -> None:
         diagnose(recorded)
 
 
-@pytest.mark.parametrize("count", [100, 1600])
+@pytest.mark.parametrize("count", [100, 1600, 2500])
 def test_an_accepted_error_does_not_depend_on_the_sampling(count: int) -> None:
     """A residual of 2 mm counts as none where 3 mm are accepted, and as misfit where 1 mm is."""
     times: Array = np.linspace(0.0, 5.0, count)
@@ -174,6 +174,7 @@ def test_an_accepted_error_does_not_depend_on_the_sampling(count: int) -> None:
         data = WhitenedData.of([recording], series=SeriesReduction.of([recording]))
         excess = data.excess(data.coefficients_of([residual[:, None]]))
         assert nominal_refuted(data, excess, 0.0) is not small
+        assert data.accepted_of_samples == pytest.approx(accepted / 1e-4)  # the noise is 1e-4 rad
 
 
 def test_repeats_are_one_sample_of_a_models_error() -> None:

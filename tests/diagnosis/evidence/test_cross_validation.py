@@ -16,7 +16,7 @@ def test_within_bounds_it_is_newtons_step() -> None:
 
 
 def test_genes_move_to_their_minimum_beside_one_that_stays_at_its_bound() -> None:
-    """With the first gene free, the second would stay; as the first cannot move, the second does what is left to do."""
+    """With the first gene free, the second would stay; as the first cannot move, the second must."""
     gram, score = np.array([[1.0, -0.9], [-0.9, 1.0]]), np.array([-0.5, 0.45])
     newton = -np.linalg.solve(gram, score)
     assert newton[0] > 0.4
