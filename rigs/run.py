@@ -17,6 +17,7 @@ RTOL = 1e-8
 ATOL = 1e-9  # of the largest initial value, at least ATOL_LEAST
 ATOL_LEAST = 1e-12
 ESCAPED = 1e100  # in any unit: a state that large has escaped to infinity, which a solver never reaches
+FEW = 24  # states
 MOST_RATES = 200_000  # evaluations of the rate in one integration, and
 RATES_PER_SAMPLE = 1_000  # more for a long recording: a solver that needs more makes no progress
 BADLY_SCALED = 1e-6  # of the largest value of a state: if the absolute tolerance is more, it is set for each state
@@ -144,7 +145,7 @@ class Run:
             calls += 1
             if calls > most:
                 raise SimulationError(f"the integration makes no progress at {t:.6g} s; {most} rates were evaluated")
-            if not state @ state < ESCAPED**2:  # also if it is not a number
+            if _escaped(state):
                 raise SimulationError(f"the motion grows without bound: its state escapes at {t:.6g} s")
             if not remembering:
                 return rate(t, state)
@@ -160,6 +161,13 @@ class Run:
 
     def _place(self, law: Law) -> int:
         return next(k for k, one in enumerate(self._remembering) if one is law)
+
+
+def _escaped(state: Array) -> bool:
+    """Return whether a value is beyond ESCAPED, or not a number; for few states, numpy is slower than a loop."""
+    if len(state) > FEW:
+        return not (state.max() < ESCAPED and state.min() > -ESCAPED)
+    return any(not -ESCAPED < value < ESCAPED for value in state.tolist())
 
 
 def runge_kutta(

@@ -64,3 +64,15 @@ def test_a_single_small_state_is_exact() -> None:
     run = Run("charge", TIMES, {}, {}, TIMES)
     found = run.integrate(lambda _, y: [-3.0 * y[0]], [1e-11])
     np.testing.assert_allclose(found[0], 1e-11 * np.exp(-3.0 * TIMES), rtol=1e-5)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("count", [1, 2, 24, 25, 100])
+@pytest.mark.parametrize("value", [1e101, -1e200, np.inf, -np.inf, np.nan])
+def test_a_state_that_escapes_is_noticed_without_a_warning(count: int, value: float) -> None:
+    run = Run("one", TIMES, {}, {}, TIMES)
+    start = np.ones(count)
+    assert run.integrate(lambda _, y: np.zeros(len(y)), start, steps=1)[0, -1] == 1.0
+    start[count // 2] = value
+    with pytest.raises(SimulationError, match="grows without bound"):
+        run.integrate(lambda _, y: np.zeros(len(y)), start, steps=1)
