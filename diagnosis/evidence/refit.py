@@ -7,7 +7,6 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy
 
 from wingfit.calibration.estimates.linearised import free_genes, values_at
 from wingfit.calibration.problem import Problem, base_genome
@@ -23,6 +22,7 @@ from wingfit.diagnosis.evidence.fit import (
 )
 from wingfit.diagnosis.evidence.screen import Nuisance, Trial, off_units, size_columns
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
+from wingfit.inference.gauss_newton import Quadratic
 from wingfit.inference.score_test import explained
 from wingfit.records.array_types import Array, Float, Mask
 from wingfit.records.series import belongs_to
@@ -30,6 +30,7 @@ from wingfit.records.series import belongs_to
 REFIT_STEPS = 6  # of a refit
 CONTINUED_STEPS = 10  # of a refit that is continued
 FINAL_STEPS = 20  # of the best hypothesis, until it converges
+AT_BOUND = 1e-9  # from a bound, in genes scaled to 0..1: as far as rounding takes a gene that is at it
 MAX_HALVINGS = 3  # of the suspects' initial sizes if the start cannot be simulated
 
 
@@ -68,10 +69,10 @@ def make_refit(data: WhitenedData, fit: Fit, trials: Sequence[Trial] = ()) -> Re
 def cross_validated_excess(data: WhitenedData, fit: Fit) -> float | None:
     """Return the mean square beyond the noise (m^2 or N^2) of experiments that are each predicted from the others.
 
-    Each prediction is that of the linearised model, fitted to the recordings of other experiments. A prior limits how
-    far genes move, so that a gene that only one recording identifies does not count against the hypothesis; nor does
-    the move that noise in the other recordings makes. Genes that belong to the recording alone (an initial state) are
-    fitted to it again. None for a single experiment.
+    Each prediction is that of the linearised model, fitted to the recordings of other experiments within the bounds. A
+    prior limits how far genes move, so that a gene that only one recording identifies does not count against the
+    hypothesis; nor does the move that noise in the other recordings makes. Genes that belong to the recording alone (an
+    initial state) are fitted to it again. None for a single experiment.
     """
     if len(data.experiments) < 2:
         return None
@@ -85,7 +86,8 @@ def cross_validated_excess(data: WhitenedData, fit: Fit) -> float | None:
     for experiment in data.experiments:
         left_gram, left_score = sum(grams[r] for r in experiment), sum(scores[r] for r in experiment)
         others, curvature = sum(grams) - left_gram, gram - likelihood_weight * left_gram
-        move, free = _move_within_bounds(curvature, score - likelihood_weight * left_score, fit.unit)
+        move = Quadratic(curvature, score - likelihood_weight * left_score).step(fit.unit, np.zeros(len(fit.unit)))
+        free = np.abs(fit.unit + move - 0.5) < 0.5 - AT_BOUND
         spread = np.zeros_like(curvature)
         spread[np.ix_(free, free)] = np.linalg.inv(curvature[np.ix_(free, free)])
         noisy = likelihood_weight**2 * spread @ others @ spread
@@ -100,19 +102,6 @@ def cross_validated_excess(data: WhitenedData, fit: Fit) -> float | None:
                 worse - data.policy.prediction_noise * by_noise, 0.0
             )
     return total
-
-
-def _move_within_bounds(
-    curvature: Float[Array, "F F"], slope: Float[Array, " F"], unit: Float[Array, " F"]
-) -> tuple[Float[Array, " F"], Mask]:
-    """Return the move [F] of the genes ``unit``, in 0..1, to the minimum within bounds, and which are at no bound [F].
-
-    ``curvature`` and ``slope``: of the cost, at no move.
-    """
-    root = np.linalg.cholesky(curvature)
-    target = -scipy.linalg.solve_triangular(root, slope, lower=True)
-    found = scipy.optimize.lsq_linear(root.T, target, (-unit, 1.0 - unit), method="bvls")
-    return np.asarray(found.x), np.asarray(found.active_mask == 0)
 
 
 def _refitted_alone(data: WhitenedData, fit: Fit, r: int, coefficients: Array) -> Array:

@@ -1,48 +1,36 @@
-"""How far genes move where an experiment is left out: to the minimum, within their bounds."""
+"""Cross-validation where a gene is at its bound: the others do not move with it as if it were free."""
 
 from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
-from wingfit.diagnosis.evidence.refit import _move_within_bounds
+from wingfit.diagnosis.evidence.refit import cross_validated_excess
+from wingfit.diagnosis.policy import POLICY
 
 
-def test_within_bounds_it_is_newtons_step() -> None:
-    gram, score = np.array([[4.0, 1.0], [1.0, 3.0]]), np.array([0.4, -0.3])
-    move, free = _move_within_bounds(gram, score, np.array([0.5, 0.5]))
-    np.testing.assert_allclose(gram @ move, -score, atol=1e-14)
-    assert free.all()
-
-
-def test_genes_move_to_their_minimum_beside_one_that_stays_at_its_bound() -> None:
-    """With the first gene free, the second would stay; as the first cannot move, the second must."""
-    gram, score = np.array([[1.0, -0.9], [-0.9, 1.0]]), np.array([-0.5, 0.45])
-    newton = -np.linalg.solve(gram, score)
-    assert newton[0] > 0.4
-    move, free = _move_within_bounds(gram, score, np.array([1.0, 0.5]))
-    np.testing.assert_allclose(move, [0.0, -0.45], atol=1e-14)
-    assert free.tolist() == [False, True]
-
-
-def test_a_gene_that_leaves_its_bounds_only_with_another_may_stay_within_them() -> None:
-    """Unbounded, both genes leave above; with the first at its bound, the minimum of the second is below."""
-    gram, score = np.array([[1.0, -0.9], [-0.9, 1.0]]), np.array([-0.5, 0.3])
-    assert np.all(-np.linalg.solve(gram, score) > 0.5)
-    np.testing.assert_allclose(_move_within_bounds(gram, score, np.array([1.0, 0.5]))[0], [0.0, -0.3], atol=1e-14)
-
-
-@pytest.mark.parametrize("seed", range(20))
-def test_no_other_move_within_the_bounds_costs_less(seed: int) -> None:
-    """The conditions of Karush, Kuhn and Tucker, with several genes at their bounds."""
-    rng = np.random.default_rng(seed)
-    slopes = rng.standard_normal((30, 6)) @ rng.standard_normal((6, 6))
-    unit, score = rng.choice([0.0, 0.3, 0.7, 1.0], 6), 30.0 * rng.standard_normal(6)
-    gram = slopes.T @ slopes + np.eye(6)
-    move, free = _move_within_bounds(gram, score, unit)
-    there, gradient = unit + move, score + gram @ move
-    assert np.all((there > -1e-12) & (there < 1.0 + 1e-12))
-    np.testing.assert_allclose(gradient[free], 0.0, atol=1e-8 * np.abs(score).max())
-    assert np.all(gradient[~free & (there < 0.5)] > -1e-8)
-    assert np.all(gradient[~free & (there > 0.5)] < 1e-8)
-    assert not free.all()
+def test_genes_beside_one_at_its_bound_stay_where_they_fit_best() -> None:
+    """Two experiments agree that the first gene is at its bound, and where the second is then: nothing moves."""
+    slopes = np.array([[1.0, -0.9], [0.0, 0.5], [0.2, 0.1]])
+    outward = np.linalg.lstsq(slopes.T, np.array([-5.0, 0.0]), rcond=None)[0]  # no gradient of the second gene
+    data: Any = SimpleNamespace(
+        experiments=((0,), (1,)),
+        recordings=(SimpleNamespace(name="a"), SimpleNamespace(name="b")),
+        recording_slices=(slice(0, 3), slice(3, 6)),
+        scale=np.ones(6),
+        weight=np.full(6, 0.5),
+        variance=np.ones(6),
+        policy=POLICY,
+        likelihood_weight=lambda _: 100.0,
+    )
+    fit: Any = SimpleNamespace(
+        coefficients=np.tile(outward, 2),
+        jacobian=np.tile(slopes, (2, 1)),
+        unit=np.array([1.0, 0.5]),
+        problem=SimpleNamespace(free=("first", "second")),
+    )
+    fitted = float(data.weight @ (fit.coefficients**2 - data.variance))
+    assert cross_validated_excess(data, fit) == pytest.approx(fitted)
