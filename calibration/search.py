@@ -13,6 +13,7 @@ from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.genetic import FAILED
 from wingfit.calibration.preparation import Prepared, prepare
 from wingfit.calibration.problem import Problem, base_genome
+from wingfit.calibration.series.beginnings import from_beginnings
 from wingfit.calibration.spec import CalibrationSpec, model_for, resolved
 from wingfit.calibration.starts import SEARCHED, START_ERRORS, Ends, apart
 from wingfit.records import Dataset, Gene
@@ -84,7 +85,7 @@ def calibrate_prepared(
 ) -> Iterator[Generation]:
     """Run the calibration that is ``ready``, as :func:`calibrate`."""
     spec = ready.spec
-    state = _State.start(spec, ready.model) if checkpoint is None else _State.from_json(checkpoint, spec)
+    state = _begun(ready, evaluator) if checkpoint is None else _State.from_json(checkpoint, spec)
     while state.stage < len(ready.stages):
         run = _Run(ready, state, evaluator)
         if spec.method != "gauss_newton":
@@ -96,6 +97,20 @@ def calibrate_prepared(
         if spec.mode != "local":
             state.base |= {name: state.found[run.stage.name][name] for name in run.stage.free}
         state.stage, state.population, state.newton, state.ends = state.stage + 1, _empty(spec), None, Ends()
+
+
+def _begun(ready: Prepared, evaluator: Evaluator) -> _State:
+    """Return the state before the first generation, with genes that belong to a single series as its beginning shows.
+
+    What the request fixes stays as it is.
+    """
+    spec = ready.spec
+    state = _State.start(spec, ready.model)
+    for stage in ready.stages:
+        base = base_genome(ready.model, state.base)
+        problem = Problem(ready.model, stage.recordings, stage.free, base, spec.axes)
+        state.base |= from_beginnings(problem, evaluator, spec.fixed)
+    return state
 
 
 def found(spec: CalibrationSpec, dataset: Dataset, checkpoint: dict[str, Any]) -> dict[str, dict[str, float]]:

@@ -8,7 +8,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from wingfit.diagnosis.evidence.competing_fits import StartPoint, fit_from_estimates, start_points
+from wingfit.diagnosis.evidence.competing_fits import (
+    StartPoint,
+    fit_from_estimates,
+    large_start,
+    start_points,
+)
 from wingfit.diagnosis.evidence.fit import FIT_ERRORS, Fit
 from wingfit.diagnosis.evidence.nominal import (
     choose_discretisation,
@@ -40,6 +45,7 @@ from wingfit.rigs.suspect import Suspect
 
 Steps = Iterator[tuple[float, str]]  # fraction of the work done, and the next stage
 
+FAULTS = ("measurement", "input")  # families of suspects that do not act within the simulation
 MAX_RESTARTED = 3  # suspects that are also fitted from the estimates
 MAX_PARTNERS = 3  # second effects that are tried with the best hypothesis
 MAX_RIVALS = 3  # hypotheses for which a second effect is tried
@@ -226,7 +232,10 @@ def _refits_from_estimates(state: SearchState) -> Steps:
     for suspect, trials in score_tests(context, initial, select_suspects(context.subject, state.spec)):
         found.append(trials)
         yield 0.74, f"score test of {suspect.name} at the estimates"
-    starts = [entry for trial in _restart_trials(state.data, found) for entry in start_points(trial)]
+    if state.data.kind == "series":
+        starts = [large_start(trial) for trial in _series_restarts(state, found)]
+    else:
+        starts = [entry for trial in _restart_trials(state.data, found) for entry in start_points(trial)]
     yield from ((0.77, stage) for stage in _compete(state, starts))
 
 
@@ -235,6 +244,13 @@ def _restart_trials(data: WhitenedData, found: Sequence[list[Trial]]) -> list[Tr
     strongest = strongest_trials(data, found, MAX_RESTARTED)
     others = [trials[0] for trials in found if trials and all(trials[0] is not one for one in strongest)]
     return strongest + [one for one in others if one.suspect.location_genes and not one.suspect.candidate_shapes]
+
+
+def _series_restarts(state: SearchState, found: Sequence[list[Trial]]) -> list[Trial]:
+    """All suspects that act within the simulation, and the strongest of ``found`` among the faults of measurement."""
+    inside = [trials[0] for trials in state.trials if trials and trials[0].suspect.family not in FAULTS]
+    faults = [trials for trials in found if trials and trials[0].suspect.family in FAULTS]
+    return inside + strongest_trials(state.data, faults, MAX_RESTARTED)
 
 
 def _compete(state: SearchState, starts: Sequence[StartPoint]) -> Iterator[str]:

@@ -12,6 +12,7 @@ from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.genetic import first_generation
 from wingfit.calibration.preparation import Prepared
 from wingfit.calibration.problem import Problem
+from wingfit.calibration.series.beginnings import from_beginnings
 from wingfit.calibration.starts import START_ERRORS
 from wingfit.records import Genome, Series
 from wingfit.records.array_types import Array
@@ -45,8 +46,8 @@ class OwnGenes:
     def fitted(self, recording: Series, genome: Genome, evaluator: Evaluator) -> Genome:
         """Return ``genome`` with the genes of ``recording`` fitted to it alone; unchanged where that fails.
 
-        Gauss-Newton starts at ``genome``, or at a better one of random individuals, if the method of the calibration is
-        one that searches.
+        Gauss-Newton starts at what the beginning of the recording shows, or at a better one of random individuals, if
+        the method of the calibration is one that searches.
         """
         own = self.of(recording)
         if not own:
@@ -60,7 +61,8 @@ class OwnGenes:
 
     def _start(self, problem: Problem, recording: Series, evaluator: Evaluator) -> dict[str, float]:
         genes, spec = free_genes(problem), self.ready.spec
-        values: Array = np.array([problem.base[name] for name in problem.free])
+        known = problem.base.as_dict() | from_beginnings(problem, evaluator, {})
+        values: Array = np.array([known[name] for name in problem.free])
         if spec.method != "gauss_newton":
             unit = first_generation(spec.seed, recording.name, spec.population, unit_at(genes, values).tolist())
             batch = values_at(genes, unit)

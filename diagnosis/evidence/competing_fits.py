@@ -7,15 +7,18 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from wingfit.calibration.estimates.linearised import free_genes, values_at
 from wingfit.calibration.problem import base_genome
+from wingfit.calibration.series.beginnings import from_beginnings
 from wingfit.diagnosis.evidence.context import FitContext
 from wingfit.diagnosis.evidence.fit import FIT_ERRORS, SLOW_FACTOR, Fit, gauss_newton_fit, small_gain
 from wingfit.diagnosis.evidence.refit import Refit
-from wingfit.diagnosis.evidence.screen import Trial, size_columns, typical_units
+from wingfit.diagnosis.evidence.screen import Trial, off_units, size_columns, typical_units
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.verdict.weigh_hypotheses import tolerated_excess
 from wingfit.records.array_types import Array, Float
 
+LARGE = 3.0  # times the typical size: large, but well within the bounds of a law at a port
 MAX_STEPS = 14  # of a fit
 FIRST_STEPS = 5  # of each fit, its start included, before only the best continue
 SAME_FIT_DISTANCE = 0.05  # of a box: fits of the same suspects that are this near are the same
@@ -47,6 +50,19 @@ def start_points(trial: Trial, others: Sequence[Trial] = (), refit: Refit | None
     fitted = dict(zip(refit.fit.problem.free, refit.fit.unit.tolist(), strict=True)) if refit else {}
     known = [fitted[gene.name] for one in others for gene in one.suspect.genes]
     return [StartPoint((*others, trial), np.array([*known, *start])) for start in starts]
+
+
+def large_start(trial: Trial) -> StartPoint:
+    """Return a start at LARGE times the typical size of the suspect of ``trial``, with the sign of its score test.
+
+    A large effect changes the frequency of an oscillation so much that a fit with a small one does not come to it.
+    """
+    off, size = off_units(trial.suspect), size_columns(trial.suspect)
+    unit = start_points(trial)[0].unit.copy()
+    typical = np.abs(unit[size] - off[size])
+    sign = np.where(trial.start[size] < off[size], -1.0, 1.0)
+    unit[size] = np.clip(off[size] + LARGE * sign * typical, 0.0, 1.0)
+    return StartPoint((trial,), unit)
 
 
 def fit_from_estimates(
@@ -151,9 +167,18 @@ class _CompetingFit:
 
 
 def _from_estimates(context: FitContext, initial: Fit, start: StartPoint) -> Iterator[Fit]:
-    """Return the steps of a fit from ``initial`` and ``start``; InitialSimulationError if these cannot be simulated."""
+    """Return the steps of a fit from ``initial`` and ``start``; InitialSimulationError if these cannot be simulated.
+
+    Genes that belong to a single series start with what its beginning shows with the suspects of ``start``.
+    """
     suspects = [trial.suspect for trial in start.trials]
     model = context.subject.extended([suspect.name for suspect in suspects])
     free = (*initial.problem.free, *(gene.name for suspect in suspects for gene in suspect.genes))
     problem = context.problem(model, free, base_genome(model, initial.problem.base.as_dict()))
-    return gauss_newton_fit(context, problem, np.concatenate([initial.unit, start.unit]), MAX_STEPS)
+    unit, genes = np.concatenate([initial.unit, start.unit]), free_genes(problem)
+    added = genes[len(initial.unit) :]
+    values = dict(zip((gene.name for gene in added), values_at(added, start.unit[None])[0].tolist(), strict=True))
+    own = from_beginnings(problem, context.evaluator, values)
+    for k, gene in enumerate(genes):
+        unit[k] = float(gene.to_unit(own[gene.name])) if gene.name in own else unit[k]
+    return gauss_newton_fit(context, problem, unit, MAX_STEPS)

@@ -9,6 +9,7 @@ import numpy as np
 
 from wingfit.calibration.estimates.linearised import free_genes, unit_at
 from wingfit.calibration.problem import base_genome
+from wingfit.calibration.series.beginnings import from_beginnings
 from wingfit.diagnosis.evidence.context import FitContext
 from wingfit.diagnosis.evidence.fit import Fit, gauss_newton_fit
 from wingfit.diagnosis.evidence.refit import Refit, fit_to_convergence, make_refit, refit_at
@@ -46,13 +47,15 @@ class Nominal:
 def fit_nominal(context: FitContext, free: tuple[str, ...], values: Mapping[str, float]) -> Iterator[Fit]:
     """Fit the genes ``free`` of the nominal model; yields every step.
 
-    The fit starts with all genes at ``values`` (by name; others at their estimates). ValueError where the model cannot
+    The fit starts with all genes at ``values`` (by name; others at their estimates, those that belong to a single
+    series at what its beginning shows). ValueError where the model cannot
     be simulated there.
     """
     model = context.subject.model
     base = base_genome(model, values)
     problem = context.problem(model, free, base)
-    start = unit_at(free_genes(problem), np.array([base[name] for name in free]))
+    first = base.replace(from_beginnings(problem, context.evaluator, values))
+    start = unit_at(free_genes(problem), np.array([first[name] for name in free]))
     return gauss_newton_fit(context, problem, start, NOMINAL_STEPS)
 
 

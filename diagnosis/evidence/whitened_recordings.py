@@ -235,9 +235,10 @@ class WhitenedData:
         attributed. Only :attr:`effective_samples` values of that error are independent, and its size is unknown, so the
         likelihood depends on the logarithm of its mean square (as in Student's t).
         """
-        beyond = self._chi_squared_excess(coefficients)
         whole = ((coefficients / self.scale) ** 2).sum(axis=-1)
-        return np.asarray(whole - beyond + self.effective_samples * np.log1p(beyond / self.effective_samples))
+        by_noise = np.minimum(whole, len(self.scale))
+        beyond = self._chi_squared_excess(coefficients)
+        return np.asarray(by_noise + self.effective_samples * np.log1p(beyond / self.effective_samples))
 
     def likelihood_weight(self, coefficients: Float[Array, " D"]) -> float:
         """Return the derivative of :meth:`deviance` with respect to chi-squared at ``coefficients`` [D], at most 1.

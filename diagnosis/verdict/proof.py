@@ -9,6 +9,7 @@ import numpy as np
 
 from wingfit.calibration.estimates.linearised import free_genes, unit_at
 from wingfit.calibration.problem import Problem
+from wingfit.calibration.series.beginnings import from_beginnings
 from wingfit.diagnosis.evidence.context import FitContext
 from wingfit.diagnosis.evidence.fit import FIT_ERRORS, Fit, gauss_newton_fit
 from wingfit.diagnosis.evidence.intervals import CONFIDENCE
@@ -101,7 +102,8 @@ def with_own_genes(one: WhitenedData, context: FitContext, fit: Fit) -> tuple[Pr
     if own:
         base = problem.base.replace(fit.values)
         problem = replace(problem, free=own, base=base)
-        start = unit_at(free_genes(problem), np.array([base[name] for name in own]))
+        first = base.replace(from_beginnings(problem, context.evaluator, {}))
+        start = unit_at(free_genes(problem), np.array([first[name] for name in own]))
         *_, last = gauss_newton_fit(replace(context, data=one), problem, start, OWN_STEPS)
         values = last.individual
     return problem, values

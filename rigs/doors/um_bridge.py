@@ -14,6 +14,7 @@ import os
 import re
 import threading
 import time
+import weakref
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -236,6 +237,7 @@ class _Connection:
         with self._lock:
             if self._client is None or self._pid != os.getpid():
                 self._client, self._pid = httpx.Client(trust_env=False, follow_redirects=False), os.getpid()
+                weakref.finalize(self, self._client.close)
             return self._client
 
     def checked(self) -> set[int]:

@@ -79,7 +79,7 @@ def test_auto_is_the_default_and_reports_progress() -> None:
 
 
 def test_a_search_that_ends_early_says_so() -> None:
-    found = calibrated(three(), spec("genetic", finish=False, max_generations=3))
+    found = calibrated(three(), spec("genetic", finish=False, max_generations=1))
     assert any("ended before the minimum" in one and "use method 'auto'" in one for one in found.remarks)
 
 
