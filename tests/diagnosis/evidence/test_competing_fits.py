@@ -11,10 +11,16 @@ import numpy as np
 import pytest
 
 from tests.diagnosis.pendulum_rig import SUSPECTS
-from wingfit.diagnosis.evidence.competing_fits import FIRST_STEPS, _CompetingFits, fit_from_estimates, start_points
+from wingfit.diagnosis.evidence.competing_fits import (
+    FIRST_STEPS,
+    _CompetingFits,
+    fit_from_estimates,
+    large_start,
+    start_points,
+)
 from wingfit.diagnosis.evidence.context import FitContext
 from wingfit.diagnosis.evidence.fit import InitialSimulationError
-from wingfit.diagnosis.evidence.screen import Trial
+from wingfit.diagnosis.evidence.screen import Trial, off_units
 from wingfit.diagnosis.policy import POLICY
 
 NOTHING = cast("Any", None)
@@ -193,6 +199,18 @@ def test_start_points_are_the_trials_and_the_typical_location() -> None:
     other = trial("point_mass", [0.9, 0.2])
     placeless = replace(other, suspect=replace(other.suspect, location_genes={}))
     assert len(start_points(placeless)) == 1, "its second gene is then a shape, not a location"
+
+
+def test_a_large_start_has_the_sign_of_the_score_test() -> None:
+    """Three times 5 g of 30 g, at the location of the trial; a friction of either sign, within its bounds."""
+    mass = trial("point_mass", [0.9, 0.2])
+    np.testing.assert_allclose(large_start(mass).unit, [0.5, 0.2])
+    cubic = trial("cubic", [0.6])
+    (typical,) = start_points(cubic)
+    off = off_units(cubic.suspect)
+    for multiple, sign in ((1.0, 1.0), (-1.0, -1.0)):
+        start = large_start(replace(cubic, multiples=np.array([multiple])))
+        np.testing.assert_allclose(start.unit, np.clip(off + sign * 3.0 * np.abs(typical.unit - off), 0.0, 1.0))
 
 
 def test_other_effects_start_at_their_fitted_genes() -> None:
