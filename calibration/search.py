@@ -109,7 +109,8 @@ def _begun(ready: Prepared, evaluator: Evaluator) -> _State:
     for stage in ready.stages:
         base = base_genome(ready.model, state.base)
         problem = Problem(ready.model, stage.recordings, stage.free, base, spec.axes)
-        state.base |= from_beginnings(problem, evaluator, spec.fixed)
+        found = from_beginnings(problem, evaluator, spec.fixed)
+        state.base, state.evaluations = state.base | found.values, state.evaluations + found.evaluations
     return state
 
 

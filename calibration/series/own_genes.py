@@ -61,7 +61,7 @@ class OwnGenes:
 
     def _start(self, problem: Problem, recording: Series, evaluator: Evaluator) -> dict[str, float]:
         genes, spec = free_genes(problem), self.ready.spec
-        known = problem.base.as_dict() | from_beginnings(problem, evaluator, {})
+        known = problem.base.as_dict() | from_beginnings(problem, evaluator, {}).values
         values: Array = np.array([known[name] for name in problem.free])
         if spec.method != "gauss_newton":
             unit = first_generation(spec.seed, recording.name, spec.population, unit_at(genes, values).tolist())

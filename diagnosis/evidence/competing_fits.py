@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from wingfit.calibration.estimates.linearised import free_genes, values_at
+from wingfit.calibration.estimates.linearised import free_genes, unit_at, values_at
 from wingfit.calibration.problem import base_genome
 from wingfit.calibration.series.beginnings import from_beginnings
 from wingfit.diagnosis.evidence.context import FitContext
@@ -18,7 +18,7 @@ from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.verdict.weigh_hypotheses import tolerated_excess
 from wingfit.records.array_types import Array, Float
 
-LARGE = 3.0  # times the typical size: large, but well within the bounds of a law at a port
+LARGE = 3.0  # times the typical size; 0.6 of the bound of a law at a port
 MAX_STEPS = 14  # of a fit
 FIRST_STEPS = 5  # of each fit, its start included, before only the best continue
 SAME_FIT_DISTANCE = 0.05  # of a box: fits of the same suspects that are this near are the same
@@ -57,11 +57,10 @@ def large_start(trial: Trial) -> StartPoint:
 
     A large effect changes the frequency of an oscillation so much that a fit with a small one does not come to it.
     """
-    off, size = off_units(trial.suspect), size_columns(trial.suspect)
-    unit = start_points(trial)[0].unit.copy()
-    typical = np.abs(unit[size] - off[size])
+    off, typical, size = off_units(trial.suspect), typical_units(trial.suspect), size_columns(trial.suspect)
+    unit = trial.unit[0].copy()
     sign = np.where(trial.start[size] < off[size], -1.0, 1.0)
-    unit[size] = np.clip(off[size] + LARGE * sign * typical, 0.0, 1.0)
+    unit[size] = np.clip(off[size] + LARGE * sign * np.abs(typical[size] - off[size]), 0.0, 1.0)
     return StartPoint((trial,), unit)
 
 
@@ -167,18 +166,17 @@ class _CompetingFit:
 
 
 def _from_estimates(context: FitContext, initial: Fit, start: StartPoint) -> Iterator[Fit]:
-    """Return the steps of a fit from ``initial`` and ``start``; InitialSimulationError if these cannot be simulated.
+    """Yield the steps of a fit from ``initial`` and ``start``; InitialSimulationError if these cannot be simulated.
 
-    Genes that belong to a single series start with what its beginning shows with the suspects of ``start``.
+    Genes that belong to a single series start with what its beginning shows, the suspects of ``start`` being there.
     """
     suspects = [trial.suspect for trial in start.trials]
     model = context.subject.extended([suspect.name for suspect in suspects])
-    free = (*initial.problem.free, *(gene.name for suspect in suspects for gene in suspect.genes))
-    problem = context.problem(model, free, base_genome(model, initial.problem.base.as_dict()))
-    unit, genes = np.concatenate([initial.unit, start.unit]), free_genes(problem)
-    added = genes[len(initial.unit) :]
+    added = [gene for suspect in suspects for gene in suspect.genes]
     values = dict(zip((gene.name for gene in added), values_at(added, start.unit[None])[0].tolist(), strict=True))
-    own = from_beginnings(problem, context.evaluator, values)
-    for k, gene in enumerate(genes):
-        unit[k] = float(gene.to_unit(own[gene.name])) if gene.name in own else unit[k]
-    return gauss_newton_fit(context, problem, unit, MAX_STEPS)
+    free = (*initial.problem.free, *values)
+    problem = context.problem(model, free, base_genome(model, initial.problem.base.as_dict()))
+    own = from_beginnings(problem, context.evaluator, values).values
+    shown = unit_at(free_genes(problem), np.array([own.get(name, problem.base[name]) for name in free]))
+    unit = np.where([name in own for name in free], shown, np.concatenate([initial.unit, start.unit]))
+    yield from gauss_newton_fit(context, problem, unit, MAX_STEPS)

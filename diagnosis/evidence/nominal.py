@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from wingfit.calibration.estimates.likelihood import iterate
 from wingfit.calibration.estimates.linearised import free_genes, unit_at
-from wingfit.calibration.problem import base_genome
+from wingfit.calibration.problem import Problem, base_genome
 from wingfit.calibration.series.beginnings import from_beginnings
 from wingfit.diagnosis.evidence.context import FitContext
-from wingfit.diagnosis.evidence.fit import Fit, gauss_newton_fit
+from wingfit.diagnosis.evidence.fit import COST_TOLERANCE, FIT_ERRORS, Fit, gauss_newton_fit
 from wingfit.diagnosis.evidence.refit import Refit, fit_to_convergence, make_refit, refit_at
 from wingfit.diagnosis.evidence.screen import Nuisance
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.subject import Subject
+from wingfit.diagnosis.verdict.weigh_hypotheses import tolerated_excess
+from wingfit.inference.differences import NotSimulatedError
+from wingfit.records.array_types import Array, Float
 
 NOMINAL_STEPS = 20
 MAX_REFINEMENTS = 3  # successive finer discretisations
@@ -45,18 +50,47 @@ class Nominal:
 
 
 def fit_nominal(context: FitContext, free: tuple[str, ...], values: Mapping[str, float]) -> Iterator[Fit]:
-    """Fit the genes ``free`` of the nominal model; yields every step.
+    """Fit the genes ``free`` of the nominal model; yields every step, the best last.
 
     The fit starts with all genes at ``values`` (by name; others at their estimates, those that belong to a single
-    series at what its beginning shows). ValueError where the model cannot
-    be simulated there.
+    series at what its beginning shows). A fit to series that ends beyond the noise is repeated from where the
+    iterations of a calibration end, from both starts. ValueError where the model cannot be simulated.
     """
     model = context.subject.model
-    base = base_genome(model, values)
-    problem = context.problem(model, free, base)
-    first = base.replace(from_beginnings(problem, context.evaluator, values))
-    start = unit_at(free_genes(problem), np.array([first[name] for name in free]))
-    return gauss_newton_fit(context, problem, start, NOMINAL_STEPS)
+    problem = context.problem(model, free, base_genome(model, values))
+    shown = from_beginnings(problem, context.evaluator, values).values
+    last: Fit | None = None
+    for last in gauss_newton_fit(context, problem, _start(problem, shown), NOMINAL_STEPS):
+        yield last
+    if last is None or context.data.kind != "series" or not _is_beyond_noise(context.data, last):
+        return
+    for found in _calibrated(context, problem, [shown, {}] if shown else [{}]):
+        if found.cost < last.cost - COST_TOLERANCE:
+            last = found
+    yield last
+
+
+def _start(problem: Problem, values: Mapping[str, float]) -> Float[Array, " F"]:
+    """Return the free genes of ``problem`` scaled to 0..1, at ``values`` (by name) or at the base."""
+    base = problem.base.replace(values)
+    return unit_at(free_genes(problem), np.array([base[name] for name in problem.free]))
+
+
+def _is_beyond_noise(data: WhitenedData, fit: Fit) -> bool:
+    return data.excess(fit.coefficients) > tolerated_excess(data, 0.0, 0.0)
+
+
+def _calibrated(context: FitContext, problem: Problem, starts: Sequence[Mapping[str, float]]) -> Iterator[Fit]:
+    """Yield the fits that start where the iterations of a calibration from each of ``starts`` end, unless these fail.
+
+    The iterations estimate the noise from the residual, so that they go on where a fit with the known noise, far above
+    it, takes small gains for none.
+    """
+    for start in starts:
+        with suppress(*FIT_ERRORS, NotSimulatedError):
+            *_, step = iterate(problem, context.evaluator, start)
+            *_, found = gauss_newton_fit(context, problem, _start(problem, step.values), NOMINAL_STEPS)
+            yield found
 
 
 def choose_discretisation(context: FitContext, fit: Fit, *, refine: bool) -> Nominal:

@@ -102,7 +102,7 @@ def with_own_genes(one: WhitenedData, context: FitContext, fit: Fit) -> tuple[Pr
     if own:
         base = problem.base.replace(fit.values)
         problem = replace(problem, free=own, base=base)
-        first = base.replace(from_beginnings(problem, context.evaluator, {}))
+        first = base.replace(from_beginnings(problem, context.evaluator, {}).values)
         start = unit_at(free_genes(problem), np.array([first[name] for name in own]))
         *_, last = gauss_newton_fit(replace(context, data=one), problem, start, OWN_STEPS)
         values = last.individual

@@ -229,6 +229,7 @@ class _Connection:
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._client: httpx.Client | None = None
+        self._closing: weakref.finalize[[], _Connection] | None = None
         self._checked: set[int] = set()
         self._pid = 0
 
@@ -236,8 +237,10 @@ class _Connection:
         """Return the client of this process."""
         with self._lock:
             if self._client is None or self._pid != os.getpid():
+                if self._closing is not None:  # a forked process leaves the connection of its parent open
+                    self._closing.detach()
                 self._client, self._pid = httpx.Client(trust_env=False, follow_redirects=False), os.getpid()
-                weakref.finalize(self, self._client.close)
+                self._closing = weakref.finalize(self, self._client.close)
             return self._client
 
     def checked(self) -> set[int]:
