@@ -46,6 +46,7 @@ from wingfit.rigs.suspect import Suspect
 Steps = Iterator[tuple[float, str]]  # fraction of the work done, and the next stage
 
 FAULTS = ("measurement", "input")  # families of suspects that do not act within the simulation
+MAX_INNER = 12  # suspects that are fitted from a large size
 MAX_RESTARTED = 3  # suspects that are also fitted from the estimates
 MAX_PARTNERS = 3  # second effects that are tried with the best hypothesis
 MAX_RIVALS = 3  # hypotheses for which a second effect is tried
@@ -223,7 +224,8 @@ def _single_refits(state: SearchState) -> Steps:
 def _refits_from_estimates(state: SearchState) -> Steps:
     """Refit from the estimates of the genes: suspects with the strongest score tests there, and those with a location.
 
-    At the nominal fit a score test cannot see what the nominal genes have absorbed, such as a heavy mass.
+    At the nominal fit a score test cannot see what the nominal genes have absorbed, such as a heavy mass. To a series,
+    suspects that act within the simulation are also fitted from a large size.
     """
     if state.initial_fit is None:
         raise ValueError("the nominal model has not been fitted")
@@ -232,10 +234,9 @@ def _refits_from_estimates(state: SearchState) -> Steps:
     for suspect, trials in score_tests(context, initial, select_suspects(context.subject, state.spec)):
         found.append(trials)
         yield 0.74, f"score test of {suspect.name} at the estimates"
+    starts = [entry for trial in _restart_trials(state.data, found) for entry in start_points(trial)]
     if state.data.kind == "series":
-        starts = [large_start(trial) for trial in _series_restarts(state, found)]
-    else:
-        starts = [entry for trial in _restart_trials(state.data, found) for entry in start_points(trial)]
+        starts += [large_start(trial) for trial in _inner_trials(state)]
     yield from ((0.77, stage) for stage in _compete(state, starts))
 
 
@@ -246,11 +247,10 @@ def _restart_trials(data: WhitenedData, found: Sequence[list[Trial]]) -> list[Tr
     return strongest + [one for one in others if one.suspect.location_genes and not one.suspect.candidate_shapes]
 
 
-def _series_restarts(state: SearchState, found: Sequence[list[Trial]]) -> list[Trial]:
-    """All suspects that act within the simulation, and the strongest of ``found`` among the faults of measurement."""
-    inside = [trials[0] for trials in state.trials if trials and trials[0].suspect.family not in FAULTS]
-    faults = [trials for trials in found if trials and trials[0].suspect.family in FAULTS]
-    return inside + strongest_trials(state.data, faults, MAX_RESTARTED)
+def _inner_trials(state: SearchState) -> list[Trial]:
+    """Return the best trial at the nominal fit of each suspect that acts within the simulation, at most MAX_INNER."""
+    inner = [trials[0] for trials in state.trials if trials and trials[0].suspect.family not in FAULTS]
+    return sorted(inner, key=lambda trial: -trial.gain)[:MAX_INNER]
 
 
 def _compete(state: SearchState, starts: Sequence[StartPoint]) -> Iterator[str]:
