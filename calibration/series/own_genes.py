@@ -28,17 +28,18 @@ class OwnGenes:
     rig: Rig
 
     def of(self, recording: Series) -> tuple[str, ...]:
-        """Return the genes of ``recording`` to fit to it alone: those that are free in a fitted recording, not fixed.
+        """Return the genes of ``recording`` to fit to it alone: those that the request does not fix or leave out.
 
-        None for a recording that is fitted.
+        Left out are genes that are fitted in no recording and fixed in none. None for a recording that is fitted.
         """
         (stage,) = self.ready.stages
         if recording.name in (one.name for one in stage.recordings):
             return ()
+        meant = {*stage.free, *self.ready.spec.fixed}
         free = [
             gene.name
             for gene in self.rig.recording_genes
-            if any(recording_gene(gene.name, one.name) in stage.free for one in stage.recordings)
+            if any(recording_gene(gene.name, one.name) in meant for one in stage.recordings)
         ]
         names = (recording_gene(name, recording.name) for name in free)
         return tuple(name for name in names if name not in self.ready.spec.fixed)

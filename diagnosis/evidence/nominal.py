@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,6 +22,7 @@ from wingfit.inference.differences import NotSimulatedError
 from wingfit.records.array_types import Array, Float
 
 NOMINAL_STEPS = 20
+CALIBRATION_STEPS = 12  # iterations of a calibration, after which a fit goes on
 MAX_REFINEMENTS = 3  # successive finer discretisations
 
 
@@ -54,7 +54,7 @@ def fit_nominal(context: FitContext, free: tuple[str, ...], values: Mapping[str,
 
     The fit starts with all genes at ``values`` (by name; others at their estimates, those that belong to a single
     series at what its beginning shows). A fit to series that ends beyond the noise is repeated from where the
-    iterations of a calibration end, from both starts. ValueError where the model cannot be simulated.
+    iterations of a calibration end. ValueError where the model cannot be simulated.
     """
     model = context.subject.model
     problem = context.problem(model, free, base_genome(model, values))
@@ -64,9 +64,9 @@ def fit_nominal(context: FitContext, free: tuple[str, ...], values: Mapping[str,
         yield last
     if last is None or context.data.kind != "series" or not _is_beyond_noise(context.data, last):
         return
-    for found in _calibrated(context, problem, [shown, {}] if shown else [{}]):
-        if found.cost < last.cost - COST_TOLERANCE:
-            last = found
+    found = _calibrated(context, problem, shown)
+    if found is not None and found.cost < last.cost - COST_TOLERANCE:
+        last = found
     yield last
 
 
@@ -80,17 +80,18 @@ def _is_beyond_noise(data: WhitenedData, fit: Fit) -> bool:
     return data.excess(fit.coefficients) > tolerated_excess(data, 0.0, 0.0)
 
 
-def _calibrated(context: FitContext, problem: Problem, starts: Sequence[Mapping[str, float]]) -> Iterator[Fit]:
-    """Yield the fits that start where the iterations of a calibration from each of ``starts`` end, unless these fail.
+def _calibrated(context: FitContext, problem: Problem, start: Mapping[str, float]) -> Fit | None:
+    """Return the fit that starts where the iterations of a calibration from ``start`` end; None where that fails.
 
     The iterations estimate the noise from the residual, so that they go on where a fit with the known noise, far above
     it, takes small gains for none.
     """
-    for start in starts:
-        with suppress(*FIT_ERRORS, NotSimulatedError):
-            *_, step = iterate(problem, context.evaluator, start)
-            *_, found = gauss_newton_fit(context, problem, _start(problem, step.values), NOMINAL_STEPS)
-            yield found
+    try:
+        *_, step = iterate(problem, context.evaluator, start, iterations=CALIBRATION_STEPS)
+        *_, found = gauss_newton_fit(context, problem, _start(problem, step.values), NOMINAL_STEPS)
+    except (*FIT_ERRORS, NotSimulatedError):
+        return None
+    return found
 
 
 def choose_discretisation(context: FitContext, fit: Fit, *, refine: bool) -> Nominal:

@@ -67,6 +67,6 @@ def test_what_is_missing_is_named_with_its_size() -> None:
 def test_without_the_iterations_of_a_calibration_the_fit_stays_in_a_local_minimum(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(nominal, "_calibrated", lambda *_: iter(()))
+    monkeypatch.setattr(nominal, "_calibrated", lambda *_: None)
     one = replace(swings(), recordings=swings().recordings[:2], held_out=("b",))
     assert wingfit.diagnose(one, rig=RIG).verdict == "unnamed"
