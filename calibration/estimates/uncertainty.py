@@ -153,13 +153,31 @@ def unit_covariance(problem: Problem, linear: Linearised, noise: list[Noise]) ->
         meat = sum(part.from_beat_to_beat(bread) for part in parts) * widening(beats)
     else:
         meat = _from_samples(parts, bread)
-    covariance[np.ix_(known, known)] = bread @ (meat + prior) @ bread
+    found = bread @ (meat + prior) @ bread
+    if any(record.kind == "series" for record in records):
+        samples = sum(int(part.seen.sum()) for part in parts)
+        if samples <= len(known):
+            return covariance, (
+                f"{samples} samples do not determine {len(known)} genes: no standard error is known; record more, or "
+                "fix some genes",
+            )
+        found = _as_large(found, bread) * (samples / (samples - len(known)))
+    covariance[np.ix_(known, known)] = found
     few = [p for p in parts if p.record.kind == "forces" and len(p.scores) < FEWEST]
     return covariance, tuple(
         f"recording {part.record.name!r} has {len(part.scores)} whole beats, and fewer than {FEWEST} say little "
         "about how much beats differ: standard errors may be too small"
         for part in few
     )
+
+
+def _as_large(covariance: Array, least: Array) -> Array:
+    """Return ``covariance`` [F, F] with every variance at least that in ``least`` [F, F]; correlations stay.
+
+    The residuals of a recording with hardly more samples than genes of its own are small and say nothing about noise.
+    """
+    factor = np.sqrt(np.maximum(np.diag(least) / np.maximum(np.diag(covariance), 1e-300), 1.0))
+    return np.asarray(covariance * factor * factor[:, None])
 
 
 @dataclass(frozen=True)

@@ -160,3 +160,23 @@ def test_a_nominal_model_that_cannot_be_simulated_is_refused_by_gauss_newton() -
     found = calibrated(three(), spec("auto"), rig=stiff)
     assert genes(found)["stiffness"].best == pytest.approx(TRUTH["stiffness"], rel=0.01)
     assert found.before is None
+
+
+@pytest.mark.parametrize("samples", [1, 2, 4])
+def test_a_short_recording_has_no_small_errors(samples: int) -> None:
+    """Its own genes fit it exactly, so that its residuals say nothing about the noise."""
+    times = np.linspace(0.0, 1.0, samples) if samples > 1 else np.zeros(1)
+    found = []
+    for seed in range(12):
+        short = recorded("a", seed, times=times, estimates={})
+        start = genes(calibrated(dataset(short, recorded("b", seed))))["start[a]"]
+        assert start.absolute_error is not None
+        found.append((start.best - STARTS["a"]) / start.absolute_error)
+    assert np.sqrt(np.mean(np.square(found))) < 1.8
+
+
+def test_no_more_samples_than_genes_give_no_error() -> None:
+    one = recorded("a", times=np.linspace(0.0, 1.0, 2), estimates={})
+    found = calibrated(dataset(one))
+    assert not any(gene.identifiable for gene in found.genes)
+    assert any("4 samples do not determine 4 genes" in remark for remark in found.remarks)
