@@ -14,7 +14,7 @@ from wingfit.records import Gene, Series, SeriesDataset
 from wingfit.records.array_types import Array
 from wingfit.records.series import belongs_to
 from wingfit.rigs.dataset_model import model_of
-from wingfit.rigs.rig import Rig
+from wingfit.rigs.rig import Rig, required_rig
 from wingfit.rigs.rig_model import RigModel
 from wingfit.rigs.run import Run
 from wingfit.rigs.suspect import Suspect
@@ -38,7 +38,7 @@ class CheckResult:
 def check_rig(rig: Rig, dataset: SeriesDataset) -> Iterator[CheckResult]:
     """Check ``rig`` on the first recording of ``dataset``; yields one result for each requirement of the contract."""
     try:
-        model = model_of(rig, dataset)
+        model = model_of(required_rig(rig), dataset)
     except ValueError as error:
         yield CheckResult("fits the dataset", "fail", str(error))
         return

@@ -38,6 +38,11 @@ class Gene:
     share_of: str | None = None
 
     def __post_init__(self) -> None:
+        if not (math.isfinite(self.lower) and math.isfinite(self.upper)):
+            raise ValueError(
+                f"gene '{self.name}': its bounds are {self.lower} and {self.upper}; give finite ones, since a search "
+                "draws values between them"
+            )
         if not self.lower < self.upper:
             raise ValueError(f"gene '{self.name}': lower bound {self.lower} must be below upper bound {self.upper}")
         if self.scale == "log" and self.lower <= 0:

@@ -13,6 +13,7 @@ from wingfit.records.limits import LARGEST, SMALLEST
 
 Locate = Callable[[int], str]
 SHOWN = 3
+GENE_BRACKETS = "[]"
 SAMPLES_PER_PERIOD = 2  # at least; fewer show not even the first harmonic
 IN_RANGE = f"from -{LARGEST:g} to {LARGEST:g}"
 
@@ -64,6 +65,9 @@ class _Dataset(_Named, Protocol):
 def check_recording(recording: _Recording) -> None:
     """Raise DatasetError unless shapes fit, times increase, and inputs, settings and estimates are finite."""
     where, faults = f"recording {recording.name!r}", Faults()
+    if set(recording.name) & set(GENE_BRACKETS):
+        message = "has a bracket, which marks the recording in the name of a gene, as in angle0[first]; rename it"
+        faults.add(f"{where}: name", recording.name, message)
     _check_shapes(recording, where, faults)
     faults.raise_any()
     check_samples(recording.times, recording.values, recording.inputs, f"{where}, sample {{}}".format, faults)

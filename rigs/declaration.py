@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, StrictBool
 from wingfit.records import Gene
 from wingfit.records.array_types import Array
 from wingfit.rigs.ports import Port
-from wingfit.rigs.rig import Rig
+from wingfit.rigs.rig import Rig, required_rig
 from wingfit.rigs.run import Run, SimulationError
 from wingfit.rigs.suspect import Suspect
 
@@ -110,6 +110,7 @@ class RigDeclaration(_Declared):
 
 def declaration(rig: Rig) -> dict[str, Any]:
     """Return the :class:`RigDeclaration` of ``rig`` as JSON."""
+    required_rig(rig)
     return {
         "name": rig.name,
         "genes": [_gene_json(gene) for gene in rig.genes],

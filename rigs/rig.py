@@ -61,8 +61,19 @@ class Rig:
         return reload_rig, ({one.name: getattr(self, one.name) for one in fields(self) if one.name != "simulate"},)
 
     def __post_init__(self) -> None:
-        for name in ("genes", "suspects", "recording_genes", "ports"):
-            object.__setattr__(self, name, tuple(getattr(self, name)))
+        for name, kind in (("genes", Gene), ("suspects", Suspect), ("recording_genes", Gene), ("ports", Port)):
+            parts = tuple(getattr(self, name))
+            if wrong := [part for part in parts if not isinstance(part, kind)]:
+                raise TypeError(
+                    f"rig {self.name!r}: {name} has {wrong[0]!r}; give a list of wingfit.{kind.__name__} objects"
+                )
+            object.__setattr__(self, name, parts)
+        for name in ("channels", "inputs", "settings"):
+            if not isinstance(getattr(self, name), Mapping):
+                raise TypeError(
+                    f"rig {self.name!r}: {name} is {getattr(self, name)!r}; give a unit for each name, such as "
+                    "{'angle': 'rad'}"
+                )
         if not (self.genes or self.recording_genes):
             raise ValueError(f"rig {self.name!r} has no gene; give at least one parameter to fit")
         if not self.channels:
@@ -103,3 +114,13 @@ class Rig:
         both = sorted(set(self.channels) & set(self.inputs))
         if both:
             raise ValueError(f"rig {self.name!r}: {both[0]!r} is a channel and an input; give one of them another name")
+
+
+def required_rig(rig: object) -> Rig:
+    """Return ``rig``; TypeError if it is something else, such as the path of the file that defines it."""
+    if not isinstance(rig, Rig):
+        raise TypeError(
+            f"rig is a {type(rig).__name__}; give a wingfit.Rig, such as the one that its file defines: "
+            "wingfit.rigs.load.load_rig('my_rig.py')"
+        )
+    return rig

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 from wingfit.calibration.forces.result import ForceResult
@@ -16,7 +17,7 @@ from wingfit.calibration.summary import summarise, summarise_rig
 from wingfit.diagnosis import DiagnosisSpec, Finding, Progress, diagnose_rig
 from wingfit.diagnosis import diagnose as steps_of
 from wingfit.records import AnyDataset, SeriesDataset, wing_or_vehicle
-from wingfit.rigs.rig import Rig
+from wingfit.rigs.rig import Rig, required_rig
 from wingfit.workers import RunningEvaluator, make_evaluator
 
 OnProgress = Callable[[float, str], object]
@@ -115,12 +116,12 @@ def _steps(
 
 def _series_of(dataset: AnyDataset, rig: Rig | None) -> tuple[SeriesDataset, Rig] | None:
     """Return series with the rig that simulates them; None for a wing or vehicle. ValueError if one is missing."""
+    if isinstance(dataset, str | Path):
+        raise TypeError(f"dataset is {str(dataset)!r}; give the recordings themselves: wingfit.load_dataset(...)")
     if isinstance(dataset, SeriesDataset):
         if rig is None:
             raise ValueError(f"dataset {dataset.name!r} has series of rig {dataset.rig!r}; give its simulation as rig")
-        if not isinstance(rig, Rig):
-            raise TypeError(f"rig is a {type(rig).__name__}; give a wingfit.Rig, such as the one that its file defines")
-        return dataset, rig
+        return dataset, required_rig(rig)
     if rig is not None:
         raise ValueError(f"dataset {dataset.name!r} describes a {dataset.kind} rig of its own; leave out rig")
     return None

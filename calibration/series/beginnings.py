@@ -26,6 +26,7 @@ MODEL_ERROR = 0.02  # of the range of a channel: error with which a model not ye
 PRIOR_SD = 0.5  # of a gene, scaled to 0..1
 SINGULAR = 1e-9  # of the largest curvature, added so that none is singular
 DIFFERENCE = 1e-3  # of a gene, scaled to 0..1
+STEEPEST = 1e100  # of a whitened residual by a gene: squares beyond it are not finite
 PARTS = np.array([1.0, 0.25])  # of a step that are tried
 STEPS = 3  # in each window
 
@@ -181,7 +182,7 @@ def _fitted(
 def _move(
     part: _Beginning, now: Misfit, beside: Misfit, unit: Float[Array, " F"], displaced: Float[Array, "K F"]
 ) -> Float[Array, " K"]:
-    """Return the step [K] of the own genes of a recording; zero where an individual failed or no step is finite."""
+    """Return the step [K] of the own genes of a recording; zero where an individual failed, or is absurd."""
     own, none = unit[part.columns], np.zeros(len(part.columns))
     white = part.whitened(now, 0)
     others = [part.whitened(beside, k) for k in range(len(own))]
@@ -190,10 +191,9 @@ def _move(
         return none
     amounts = [displaced[k, column] - unit[column] for k, column in enumerate(part.columns)]
     slopes = np.stack([(other - white) / by for other, by in zip(seen, amounts, strict=True)], axis=1)
+    if float(np.abs(slopes).max()) > STEEPEST:
+        return none
     curvature = slopes.T @ slopes + np.eye(len(own)) / PRIOR_SD**2
     slope = slopes.T @ white + (own - part.start) / PRIOR_SD**2
     damping = np.full(len(own), SINGULAR * float(curvature.max()))
-    try:
-        return Quadratic(curvature, slope).step(own, damping)
-    except (np.linalg.LinAlgError, ValueError):  # not finite, or not positive definite
-        return none
+    return Quadratic(curvature, slope).step(own, damping)

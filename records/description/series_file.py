@@ -58,7 +58,7 @@ class ChannelFile(Strict):
         Annotated[
             Decimal,
             limits(
-                "[1e-300, 1e300]",
+                "[1e-50, 1e50]",
                 "standard deviation of the noise of one sample, in the unit of the channel",
                 "give it in the unit of the channel, or leave it out if it is not known",
             ),
@@ -69,7 +69,7 @@ class ChannelFile(Strict):
         Annotated[
             Decimal,
             limits(
-                "[1e-300, 1e300]",
+                "[1e-50, 1e50]",
                 "error that the simulation may have, in the unit of the channel",
                 "give it in the unit of the channel, or leave it out",
             ),

@@ -80,6 +80,7 @@ def with_recordings(*recordings: Series) -> SeriesDataset:
         (r"the input 'voltage' of the dataset is missing; add it", lambda: with_recordings(changed(inputs={}))),
         (r"does not state the setting 'gear'; add", lambda: with_recordings(changed(settings={"mass": 0.1}))),
         (r"are not the channels", lambda: with_recordings(changed(quantities=(Channel("angle", "deg"),) * 3))),
+        (r"name: has a bracket, which marks the recording in the name of a gene", lambda: changed(name="x[a")),
         (r"no recording is called 'heavyest'; did you mean", lambda: replace(arm_dataset(), held_out=("heavyest",))),
     ],
 )

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import pickle
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from tests.rigs import oscillator
 from tests.rigs.oscillator import DRAG, GENES, PORT, RIG, simulate
+from wingfit.diagnosis.rig_check import check_rig
 from wingfit.records import Gene
+from wingfit.rigs.declaration import declaration
 from wingfit.rigs.load import RigError, load_rig
 from wingfit.rigs.rig import Rig
 from wingfit.rigs.suspect import Suspect
@@ -126,3 +131,24 @@ def test_a_replaced_simulation_is_the_one_that_other_processes_run(tmp_path: Pat
     path.write_text(FILE)
     changed = replace(load_rig(str(path)), simulate=simulate)
     assert pickle.loads(pickle.dumps(changed)).simulate is simulate  # noqa: S301
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"genes": "abc"}, "genes has 'a'"),
+        ({"suspects": GENES}, "suspects has Gene"),
+        ({"ports": ["slide"]}, "ports has 'slide'"),
+        ({"channels": ["position"]}, r"channels is \['position'\]"),
+        ({"inputs": "push"}, "inputs is 'push'"),
+    ],
+)
+def test_parts_of_another_type_are_refused(changes: dict[str, Any], words: str) -> None:
+    with pytest.raises(TypeError, match=words):
+        replace(RIG, **changes)
+
+
+@pytest.mark.parametrize("use", [declaration, lambda rig: list(check_rig(rig, oscillator.dataset(oscillator.blank())))])
+def test_a_path_is_no_rig(use: Callable[[Any], Any]) -> None:
+    with pytest.raises(TypeError, match=r"rig is a str; give a wingfit\.Rig"):
+        use("my_rig.py")

@@ -81,6 +81,17 @@ def test_genes_that_act_alike_do_not_end_a_calibration() -> None:
     assert found.after == pytest.approx(1.0, abs=0.1)
 
 
+def test_absurd_values_do_not_end_a_calibration() -> None:
+    """Their squares are not finite, though they are."""
+
+    def absurd(genes: Mapping[str, float], run: Run) -> dict[str, Array]:
+        return {name: 1e152 * values for name, values in RIG.simulate(genes, run).items()}
+
+    one = replace(problem(*swings()), model=model_of(replace(RIG, simulate=absurd), dataset(*swings())))
+    found = from_beginnings(one, HERE, {}).values
+    assert found == pytest.approx({"start[a]": 0.08, "speed[a]": 0.0, "start[b]": 0.08, "speed[b]": 0.0})
+
+
 def test_individuals_are_counted() -> None:
     found = from_beginnings(problem(*swings()), HERE, {})
     assert found.evaluations > 0

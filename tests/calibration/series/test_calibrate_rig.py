@@ -94,6 +94,14 @@ def test_it_is_deterministic_and_resumes_with_the_same_bits(method: str) -> None
     assert results[0] == results[1]
 
 
+def test_fixing_a_gene_of_one_recording_leaves_those_of_others_free() -> None:
+    """Held-out recording c starts elsewhere than a, whose start is known."""
+    fixed = {"start[a]": STARTS["a"], "speed[a]": 0.1, "start[b]": STARTS["b"], "speed[b]": 0.1}
+    found = calibrated(three(estimates={}), spec(fixed=fixed))
+    assert found.held_out_after == pytest.approx(1.0, abs=0.2)
+    assert genes(found)["start[c]"].best == pytest.approx(STARTS["c"], abs=0.002)
+
+
 def test_two_processes_give_the_same_bits() -> None:
     assert calibrated(three(), spec("auto"), workers=2) == calibrated(three(), spec("auto"))
 
