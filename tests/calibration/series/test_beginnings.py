@@ -137,7 +137,7 @@ def hardening() -> tuple[Series, ...]:
     """Oscillations on a hardening spring, whose frequency doubles with the amplitude."""
     rng, found = np.random.default_rng(3), []
     for name, (start, speed) in STATES.items():
-        one = blank(name, samples=400, last=8.0)
+        one = blank(name, samples=200, last=5.0)
         model = RigModel(OSCILLATOR, (one,), (HARD,))
         genome = base_genome(model, TRUE | {f"start[{name}]": start, f"speed[{name}]": speed})
         values = model.observe(np.array([[genome[gene.name] for gene in model.genes]]), one).channels[0]
@@ -148,7 +148,9 @@ def hardening() -> tuple[Series, ...]:
 
 def test_a_calibration_starts_in_the_right_valley(monkeypatch: pytest.MonkeyPatch) -> None:
     data = oscillations(*hardening())
-    spec = CalibrationSpec(method="gauss_newton", effects=(HARD,), fixed={f"{HARD}.size": TRUE[f"{HARD}.size"]})
+    spec = CalibrationSpec(
+        method="gauss_newton", max_generations=12, effects=(HARD,), fixed={f"{HARD}.size": TRUE[f"{HARD}.size"]}
+    )
     found = calibrate(data, spec, rig=OSCILLATOR)
     assert isinstance(found, SeriesResult)
     assert found.after == pytest.approx(1.0, abs=0.05)
