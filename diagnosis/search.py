@@ -8,12 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from wingfit.diagnosis.evidence.competing_fits import (
-    StartPoint,
-    fit_from_estimates,
-    large_start,
-    start_points,
-)
+from wingfit.diagnosis.evidence.competing_fits import StartPoint, fit_from_estimates, large_start, start_points
 from wingfit.diagnosis.evidence.fit import FIT_ERRORS, Fit
 from wingfit.diagnosis.evidence.nominal import (
     choose_discretisation,
