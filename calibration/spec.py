@@ -8,7 +8,7 @@ from typing import Literal, get_args
 
 from wingfit.calibration.limits import REAL, WHOLE, refuse_number
 from wingfit.records import Dataset
-from wingfit.records.name_lists import refuse_text
+from wingfit.records.name_lists import refuse_no_mapping, refuse_text
 from wingfit.sim.solver.numerics import ACCURACY, Numerics
 from wingfit.sim.vehicle.blade_element_wing import BladeElementWing
 from wingfit.sim.vehicle.terms import chosen
@@ -87,6 +87,7 @@ class CalibrationSpec:
 
     def __post_init__(self) -> None:
         refuse_text(self, "recordings", "genes", "without", "axes", "effects")
+        refuse_no_mapping(self, "fixed")
 
 
 class SearchDivisionError(ValueError):

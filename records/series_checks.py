@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from numbers import Real
 from typing import Protocol
 
 import numpy as np
@@ -73,7 +74,7 @@ def check_recording(recording: _Recording) -> None:
     check_samples(recording.times, recording.values, recording.inputs, f"{where}, sample {{}}".format, faults)
     for what, numbers in (("settings", recording.settings), ("estimates", recording.estimates)):
         for name, value in numbers.items():
-            if not abs(value) <= LARGEST:
+            if not isinstance(value, Real) or not abs(value) <= LARGEST:
                 faults.add(f"{where}: {what}.{name}", value, f"is {_plain(value)}; give a finite number, {IN_RANGE}")
     step = float(np.median(np.diff(recording.times))) if len(recording.times) > 1 else 0.0
     if recording.period is not None and not SMALLEST <= recording.period <= LARGEST:
@@ -206,5 +207,7 @@ def _check_quantities(recording: _Recording, dataset: _Dataset, faults: Faults) 
             faults.add(f"{where}: inputs", None, f"the input {name!r} of the dataset is missing; add it")
 
 
-def _plain(value: float) -> str:
-    return "NaN" if np.isnan(value) else f"{value:g}"
+def _plain(value: object) -> str:
+    if not isinstance(value, Real):
+        return repr(value)
+    return "NaN" if np.isnan(float(value)) else f"{float(value):g}"

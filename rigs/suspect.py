@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from wingfit.records import Gene
+from wingfit.records.name_lists import refuse_no_mapping, refuse_text
 
 Family = Literal["structure", "inertia", "actuation", "aerodynamics", "measurement", "physics", "input"]
 TYPICAL_PART = 0.2  # of the larger bound: size of an effect whose typical size is not stated
@@ -47,6 +48,8 @@ class Suspect:
     candidate_shapes: tuple[tuple[float, ...], ...] = ()
 
     def __post_init__(self) -> None:
+        refuse_text(self, "size_genes", "confused_with")
+        refuse_no_mapping(self, "typical", "location_genes")
         genes = tuple(self.genes)
         if not genes:
             raise ValueError(f"suspect {self.name!r} has no gene; give at least one that switches it off at zero")

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 import wingfit
-from wingfit import CalibrationSpec, DiagnosisSpec
+from wingfit import CalibrationSpec, DiagnosisSpec, Gene, Suspect
 from wingfit.rigs.load import load_rig
 
 FOLDER = Path(__file__).parents[2] / "examples" / "pendulum"
@@ -26,6 +26,16 @@ def test_a_name_alone_is_no_list_of_names(make: Any, name: str) -> None:
     assert getattr(make(**{name: ("x",)}), name) == ("x",)
     with pytest.raises(TypeError, match=rf"^{name} is the text 'x'; give a sequence of names: \('x',\)$"):
         make(**{name: "x"})
+
+
+def test_a_text_is_no_mapping_of_names_to_values() -> None:
+    wrong: Any = "stiffness"
+    with pytest.raises(TypeError, match=r"^fixed is 'stiffness'; give a mapping of names to values, such as"):
+        CalibrationSpec(fixed=wrong)
+    with pytest.raises(TypeError, match=r"^typical is 'stiffness'; give a mapping"):
+        Suspect("friction", genes=(Gene("friction", "N", 0.0, 0.0, 1.0),), typical=wrong)
+    with pytest.raises(TypeError, match=r"^size_genes is the text 'stiffness'"):
+        Suspect("friction", genes=(Gene("friction", "N", 0.0, 0.0, 1.0),), size_genes=wrong)
 
 
 def test_held_out_recordings_are_a_list() -> None:

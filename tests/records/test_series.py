@@ -71,6 +71,8 @@ def with_recordings(*recordings: Series) -> SeriesDataset:
             lambda: changed(settings={"mass": np.inf}),
         ),
         (r"recording 'light-1': estimates.angle0: is NaN; give", lambda: changed(estimates={"angle0": np.nan})),
+        (r"estimates.angle0: is '1'; give a finite number", lambda: changed(estimates={"angle0": "1"})),
+        (r"settings.mass: is None; give a finite number", lambda: changed(settings={"mass": None})),
         (r"period: is 0 s; give a positive number of seconds, or None", lambda: changed(period=0.0)),
         (r"period: is 1e-05 s, but samples are .* s apart; a period needs at least 2", lambda: changed(period=1e-5)),
         (r"a channel is 1e\+60; give a number from -1e\+50", lambda: changed(values=np.full((12, 3), 1e60))),
