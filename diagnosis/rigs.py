@@ -171,7 +171,8 @@ class VehicleSubject(_Rig):
     @cached_property
     def suspects(self) -> tuple[Suspect, ...]:
         """Effects that apply to the vehicle and are in the nominal model neither as an effect nor as a term."""
-        known = {*self.model.effects, *self.model.terms}
+        unfit = {name for name, effect in EFFECTS.items() if not effect.fits(self.model.terms)}
+        known = unfit.union(self.model.effects)
         return _suspects(self.model.vehicle, known if self.model.vehicle.claps else known | {"clap_and_peel"})
 
     @property

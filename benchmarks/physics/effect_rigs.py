@@ -51,8 +51,8 @@ class Rig:
 
         A model with that effect, and the one that it is compared with, omit this term.
         """
-        known = self.kind == "vehicle" and effect.name in BladeElementWing(delfly()).terms
-        return effect.name if known else ""
+        known = self.kind == "vehicle" and effect.term in BladeElementWing(delfly()).terms
+        return effect.term if known else ""
 
     def model(self, effect: Effect | None, *, without: str = "") -> AnyModel:
         """Return the rig's model with ``effect``, or without any effect.

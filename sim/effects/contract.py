@@ -8,7 +8,7 @@ calibration searches like any other.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Literal
@@ -57,6 +57,7 @@ class Parameter:
         of: the measure of the rig that scales bounds and typical value: its span (m), its mean chord (m) or the mass of
             the wing (kg).
         place: whether the parameter is a position on the wing where the effect acts.
+        wing_only: whether a vehicle does not have the parameter.
         scale: how a search spreads over the bounds, "linear" or "log".
     """
 
@@ -68,6 +69,7 @@ class Parameter:
     description: str
     of: Measure | None = None
     place: bool = False
+    wing_only: bool = False
     scale: Scale = "linear"
 
 
@@ -94,6 +96,10 @@ class Effect:
         signature: one line: how it shows in a recording.
         confused_with: names of effects with a similar signature.
         wing, vehicle: functions that change the input of a simulation, a scene; None where the effect does not apply.
+        term: term of a vehicle's model (:data:`wingfit.sim.vehicle.terms.TERMS`) that the effect is; it is for models
+            without that term only. "" if it is none.
+        of_term: term of a vehicle's model that the effect changes; it is for models with that term only. "" if it
+            changes none.
         observe: function that changes a simulated beat before it is compared with a recording; only for the port
             "observation".
         observed: kinds of recording that ``observe`` acts on.
@@ -113,6 +119,8 @@ class Effect:
     memory: str = ""
     wing: Callable[[WingScene, Values], None] | None = None
     vehicle: Callable[[VehicleScene, Values], None] | None = None
+    term: str = ""
+    of_term: str = ""
     observe: Callable[[Sampling, Values], None] | None = None
     observed: tuple[Literal["tracks", "forces"], ...] = ()
 
@@ -151,18 +159,27 @@ class Effect:
         """Return whether the effect applies to ``rig``."""
         return ("wing" if isinstance(rig, Wing) else "vehicle") in self.rigs
 
+    def fits(self, terms: Collection[str]) -> bool:
+        """Return whether the effect can be added to a vehicle's model of these ``terms``."""
+        return self.term not in terms and (not self.of_term or self.of_term in terms)
+
+    def parameters_of(self, rig: Wing | Vehicle) -> tuple[Parameter, ...]:
+        """Return the parameters that the effect has on ``rig``."""
+        return tuple(p for p in self.parameters if isinstance(rig, Wing) or not p.wing_only)
+
     def genes(self, rig: Wing | Vehicle) -> tuple[Gene, ...]:
         """Return the genes of all parameters for ``rig``: sizes nominally zero, the others at their typical values."""
-        return tuple(self._gene(parameter, rig) for parameter in self.parameters)
+        return tuple(self._gene(parameter, rig) for parameter in self.parameters_of(rig))
 
     def typical(self, rig: Wing | Vehicle) -> dict[str, float]:
         """Return the typical values of all genes for ``rig``, in their units, by the names of the genes."""
-        return {f"{self.name}.{p.name}": p.typical * measure(rig, p.of) for p in self.parameters}
+        return {f"{self.name}.{p.name}": p.typical * measure(rig, p.of) for p in self.parameters_of(rig)}
 
     def values(self, genes: tuple[Gene, ...], genomes: Array) -> dict[str, Array]:
         """Return the parameters [B] by their short names, from ``genomes`` [B, G], whose columns are ``genes``."""
         column = {gene.name: k for k, gene in enumerate(genes)}
-        return {p.name: genomes[:, column[f"{self.name}.{p.name}"]] for p in self.parameters}
+        names = {p.name: f"{self.name}.{p.name}" for p in self.parameters}
+        return {short: genomes[:, column[name]] for short, name in names.items() if name in column}
 
     def on(self, genes: tuple[Gene, ...], genomes: Array) -> Mask:
         """Return True [B] where any size of the effect is nonzero in ``genomes`` [B, G] with the columns ``genes``."""

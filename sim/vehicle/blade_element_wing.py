@@ -259,12 +259,13 @@ class BladeElementWing:
         curves = len(CURVE_ROWS) if "steady_curves" in self.terms else 0
         found = np.zeros((len(scene), len(ROWS) + curves, 2, n // LANES, LANES))
         rows = scene.rows(first)
-        if "effective_chord" not in self.terms:
-            rows[:, PEELED] = 1.0
+        apart, together = rows[:, PEELED], scene.together[:, None]
+        rows[:, PEELED] = np.where(together == 0.0, 1.0, apart + (1.0 - together) * (1.0 - apart))
         masses, loading = scene.mass_factor[:, None] * mass, scene.loading[:, : len(r)].copy()
         grouped = rows.reshape(*rows.shape[:2], -1, LANES)
         for side in scene.each_side(rows):
-            wing_forces(grouped, side, r, chord, masses, scene.density.copy(), loading, constants, found)
+            air = (scene.density.copy(), scene.carried.copy())
+            wing_forces(grouped, side, r, chord, masses, *air, loading, constants, found)
         each = found.reshape(len(found), -1, 2, n)
         each *= mirrored(vehicle)
         peel = scene.angles.peel[:, None] * ("clap_and_peel" in self.terms)
@@ -273,6 +274,10 @@ class BladeElementWing:
             factor = {"rotation": 1.0 - peel, "clap_and_peel": peel}.get(name)
             row = each[:, _INDEX[name]]
             out[:, k] = row if factor is None else row * factor
+        turning = ROTATION_POINT - vehicle.pitch_axis
+        for name, gene in scene.included.items():
+            row = each[:, ROWS.index(name)] * scene.genes[gene][:, None, None]
+            scene.added += row * (turning * (1.0 - peel)) if name == "rotation" else row
         if scene.fling.any():
             scene.added -= scene.fling[:, None, None] * scene.angles.peel[:, None] * each[:, ROWS.index("rotation")]
         return out
@@ -311,8 +316,13 @@ _COEFFICIENTS = {name for _, name in _ROWS.values() if name}
 def _check_effects(model: BladeElementWing) -> None:
     """Raise ValueError if an effect is unknown, already a term of ``model``, or needs wings that meet where none do."""
     for effect in registry.chosen(model.effects, model.vehicle):
-        if effect.name in model.terms:
+        if effect.term in model.terms:
             raise ValueError(f"effect {effect.name!r} is a term of this model already; remove the effect, or the term")
+        if not effect.fits(model.terms):
+            raise ValueError(
+                f"effect {effect.name!r} changes the term {effect.of_term!r}, which this model does not have: add the "
+                "term, or remove the effect"
+            )
         if effect.name == "clap_and_peel" and not model.vehicle.claps:
             raise ValueError("effect 'clap_and_peel' needs wings that meet, but vehicle.claps is false: remove it")
 

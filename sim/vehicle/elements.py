@@ -86,16 +86,16 @@ def velocities(
 
 @inlined
 def _element_forces(
-    motion: Array, side: Side, r: Array, chord: Array, mass: Array, rho: float, loading: Array, constants: Constants,
-    out: Array,
+    motion: Array, side: Side, r: Array, chord: Array, mass: Array, rho: float, carried: float, loading: Array,
+    constants: Constants, out: Array,
 ) -> None:  # fmt: skip
     """Add to ``out`` [7, 2, n / W, W] the forces (N, body x and z) of one wing at n instants, in the order of ROWS.
 
-    ``motion`` [14, n / W, W]: rows FLAP_RATE to DOWNWARD; ``rho``: density of the air, kg/m^3; ``mass`` [E] and
-    ``loading`` [E]: of this individual; others as in :func:`wing_forces`.
+    ``motion`` [14, n / W, W]: rows FLAP_RATE to DOWNWARD; ``rho``: density of the air, kg/m^3; ``carried``,
+    ``mass`` [E] and ``loading`` [E]: of this individual; others as in :func:`wing_forces`.
     """
     dr, d = constants.width, constants.point
-    m11 = 0.25 * math.pi * rho * constants.thickness**2  # Eq. 10
+    m11 = 0.25 * math.pi * rho * carried * constants.thickness**2  # Eq. 10
     for g in range(motion.shape[1]):
         flap_rate, flap_acceleration = load(motion, FLAP_RATE, g), load(motion, FLAP_ACCELERATION, g)
         pitch_rate, pitch_acceleration = load(motion, PITCH_RATE, g), load(motion, PITCH_ACCELERATION, g)
@@ -105,7 +105,7 @@ def _element_forces(
         w_rate = lam_rate * (downward * (1.0 - side.printed))
         whole, whole_rate = lam * side.printed + (1.0 - side.printed), lam_rate * side.printed
         peeled = load(motion, PEELED, g)
-        added = peeled * peeled * (0.25 * math.pi * rho)  # m22 / c^2, Eq. 10
+        added = peeled * peeled * (0.25 * math.pi * rho * carried)  # m22 / c^2, Eq. 10
         ct, st = load(motion, COSINE, g), load(motion, SINE, g)
         step_ct, step_st = load(motion, STEP_COSINE, g), load(motion, STEP_SINE, g)
         x0 = lam * 0.0
@@ -199,18 +199,19 @@ def _curve_forces(
 
 @kernel
 def wing_forces(
-    motion: Array, side: Side, r: Array, chord: Array, mass: Array, density: Array, loading: Array,
+    motion: Array, side: Side, r: Array, chord: Array, mass: Array, density: Array, carried: Array, loading: Array,
     constants: Constants, out: Array,
 ) -> None:  # fmt: skip
     """Add the forces of one wing of each of B individuals to ``out`` [B, 7 or 9, 2, n / W, W] along body x and z, N.
 
     ``motion`` [B, 14, n / W, W]: rows FLAP_RATE to DOWNWARD; ``r`` [E]: distances of E elements from the flapping axis
     in equal steps, m; ``chord`` [E], m; ``mass`` [B, E] of the wing per length, kg/m; ``density`` [B] of the air,
-    kg/m^3; ``loading`` [B, E]: factor on the circulation. ``out`` is in the order of ROWS, then of CURVE_ROWS if it has
+    kg/m^3; ``carried`` [B]: factor on the mass of the air that it accelerates; ``loading`` [B, E]: factor on the
+    circulation. ``out`` is in the order of ROWS, then of CURVE_ROWS if it has
     9 rows.
     """
     for b in range(len(motion)):
-        _element_forces(motion[b], side, r, chord, mass[b], density[b], loading[b], constants, out[b])
+        _element_forces(motion[b], side, r, chord, mass[b], density[b], carried[b], loading[b], constants, out[b])
         if out.shape[1] > len(ROWS):
             _curve_forces(motion[b], side, r, chord, density[b], loading[b], constants, out[b, len(ROWS) :])
 

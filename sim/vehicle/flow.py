@@ -107,10 +107,14 @@ class StationedWings:
         lever = 0.5 * self.places.chord**2 * self.places.twist * self.loading
         return np.asarray(rate[:, :, None] * lever[:, None])
 
+    def circulation(self, along: Array, normal: Array) -> tuple[Array, Array]:
+        """Speed (m/s) and quasi-steady circulation (m^2/s) at velocities ``along`` and ``normal`` (m/s), as in Flow."""
+        places, speed, found = self.places, np.empty_like(along), np.empty_like(along)
+        for k in range(len(self.sides)):
+            velocity, wing = (along[k], normal[k]), (places.twist, places.chord, self.loading)
+            stations.station_circulation(*velocity, self.turning, self.lift, *wing, speed[k], found[k])
+        return speed, found
+
     def _circulate(self, flow: Flow) -> None:
         """Set ``flow.speed`` and the quasi-steady ``flow.circulation`` from ``flow.along`` and ``flow.normal``."""
-        places = self.places
-        for k in range(len(self.sides)):
-            velocity, wing = (flow.along[k], flow.normal[k]), (places.twist, places.chord, self.loading)
-            found = flow.speed[k], flow.circulation[k]
-            stations.station_circulation(*velocity, self.turning, self.lift, *wing, *found)
+        flow.speed, flow.circulation = self.circulation(flow.along, flow.normal)

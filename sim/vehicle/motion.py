@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -29,6 +30,21 @@ _PITCH_GENES = (
     ("flap_rate", "C_theta2", "s", 0.02, "wing pitch per flap rate (Eq. 17)"),
     ("flap_rate_squared", "C_theta3", "s^2", 0.001, "wing pitch per flap rate squared (Eq. 17)"),
 )
+
+
+_VALUE = np.array([1.0, 0.0, 0.0])[:, None]  # of an angle and its two derivatives, the angle
+
+
+class PitchError(NamedTuple):
+    """How the wing's pitch at the pitch station differs from that described, for B individuals, [B] each.
+
+    ``zero``: rad, added; ``part``: relative increase of its deviation from that at rest
+    (:class:`PassivePitch`) or from its mean (:class:`FourierPitch`); ``lag``: beats of delay.
+    """
+
+    zero: Array
+    part: Array
+    lag: Array
 
 
 @dataclass(frozen=True)
@@ -59,17 +75,17 @@ def motion_genes(motion: WingMotion) -> tuple[Gene, ...]:
 
 def angles_of(
     series: Complex, motion: WingMotion, values: Mapping[str, Array], frequency: float, instants: int, claps: bool,
-    peel_width: float,
+    peel_width: float, error: PitchError | None = None,
 ) -> Angles:  # fmt: skip
     """Flap angle, pitch and peel over one beat of ``instants`` equal steps at ``frequency`` (Hz), for B individuals.
 
     The flap angle is a ``series`` [B, K + 1] (:func:`flap_series`). ``values`` are genes [B] of the motion; other
     parameters have the motion's own values. Wings peel only if they touch at t* = 0 (``claps``). ``peel_width`` is the
     time, in beats, in which rotational circulation replaces fling circulation; at 0 it is one step, as printed
-    (Armanini et al. 2016, Eq. 7).
+    (Armanini et al. 2016, Eq. 7). ``error``: of the described pitch; None for none.
     """
     flap = _derivatives(series, frequency, instants, 3)
-    pitch = _pitch(motion.pitch, values, flap, frequency, instants)
+    pitch = _pitch(motion.pitch, values, series, flap, frequency, instants, error)
     t_star = np.arange(instants) / instants
     peel, peeled = np.zeros((len(series), instants)), np.ones(instants)
     if claps:
@@ -122,14 +138,31 @@ def split_cycle_series(delta: Array, harmonics: int) -> Complex:
     return np.asarray(series)
 
 
-def _pitch(pitch: Pitch, values: Mapping[str, Array], flap: Array, frequency: float, instants: int) -> Array:
+def _pitch(
+    pitch: Pitch, values: Mapping[str, Array], series: Complex, flap: Array, frequency: float, instants: int,
+    error: PitchError | None,
+) -> Array:  # fmt: skip
     """Wing pitch theta_w (rad) at the pitch station and its first two derivatives by time (s): [B, 3, n] (Eq. 17).
 
-    ``flap`` [B, 4, n]: flap angle and its first three derivatives.
+    ``flap`` [B, 4, n]: flap angle, of the Fourier ``series``, and its first three derivatives.
     """
+    late = error is not None and bool(error.lag.any())
+    own = np.tile(pitch.series, (len(flap), 1)) if isinstance(pitch, FourierPitch) else series
+    if error is not None and late:
+        own = own * np.exp(-2j * np.pi * np.arange(own.shape[1]) * error.lag[:, None])
     if isinstance(pitch, FourierPitch):
-        series = np.tile(pitch.series, (len(flap), 1))
-        return _derivatives(series, frequency, instants, 2)
+        found, rest = _derivatives(own, frequency, instants, 2), own[:, :1].real
+    else:
+        rest = np.pi / 2 + _column(values, "C_theta0", pitch.constant)
+        found = _passive_pitch(pitch, values, _derivatives(own, frequency, instants, 3) if late else flap)
+    if error is None:
+        return found
+    zero = _VALUE * rest[:, :, None]
+    return np.asarray(found + error.part[:, None, None] * (found - zero) + error.zero[:, None, None] * _VALUE)
+
+
+def _passive_pitch(pitch: PassivePitch, values: Mapping[str, Array], flap: Array) -> Array:
+    """Wing pitch and its derivatives [B, 3, n] as :func:`_pitch`, from the flap angle with three derivatives."""
     own = {"C_theta0": pitch.constant, "C_theta1": pitch.flap, "C_theta2": pitch.flap_rate}
     c0, c1, c2, c3 = (_column(values, n, v) for n, v in (*own.items(), ("C_theta3", pitch.flap_rate_squared)))
     angle, rate, acceleration, jerk = np.moveaxis(flap, 1, 0)

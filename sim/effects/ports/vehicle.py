@@ -14,7 +14,7 @@ from wingfit.records.array_types import Array, Complex
 from wingfit.sim.atmosphere import density
 from wingfit.sim.vehicle.elements import PROJECTION, Side
 from wingfit.sim.vehicle.flow import Flow, StationedWings
-from wingfit.sim.vehicle.motion import Angles, angles_of, flap_series
+from wingfit.sim.vehicle.motion import Angles, PitchError, angles_of, flap_series
 from wingfit.sim.vehicle.rows import mirrored, motion_rows, set_side, uppers
 from wingfit.sim.vehicle.states import followed
 from wingfit.sim.vehicle.stations import STATIONS, Stations, span_sums, stations
@@ -69,6 +69,12 @@ class VehicleScene:
         fling: [B]: coefficient C of an additional circulation 1/2 C c^2 (-theta_w') while the wings peel apart (chord
             c, wing pitch theta_w).
         added: [B, 2, n]: forces of all wings along body x and z besides those of the model's terms, N.
+        included: names of forces of the elements (:data:`wingfit.sim.vehicle.elements.ROWS`) that effects add to those
+            of the model's terms, each with the name of its coefficient in ``genes``.
+        together: [B]: how much of the chord that has not come apart yet (:attr:`Angles.peeled`) carries no added mass;
+            1: all of it, 0: none.
+        carried: [B]: factor on the mass of the air that a wing accelerates.
+        pitch: errors of the described wing pitch.
     """
 
     setting: Setting
@@ -81,6 +87,10 @@ class VehicleScene:
     loading: Array
     fling: Array
     added: Array
+    together: Array
+    carried: Array
+    pitch: PitchError
+    included: dict[str, str] = field(default_factory=dict)
     _waiting: dict[Stage, list[Callable[[], None]]] = field(default_factory=dict, repr=False)
     _base: Array | None = field(default=None, repr=False)
 
@@ -95,7 +105,22 @@ class VehicleScene:
         loading = np.ones((count, len(setting.r) + STATIONS))
         inflow, added = np.zeros((count, n)), np.zeros((count, 2, n))
         one, none = np.ones(count), np.zeros(count)
-        return cls(setting, genes, flap, airspeed, rho, one, inflow, loading, none, added)
+        together = np.full(count, float("effective_chord" in setting.terms))
+        return cls(
+            setting,
+            genes,
+            flap,
+            airspeed,
+            rho,
+            one,
+            inflow,
+            loading,
+            none,
+            added,
+            together,
+            one,
+            PitchError(none, none, none),
+        )
 
     def __len__(self) -> int:
         """Number of individuals B."""
@@ -129,7 +154,19 @@ class VehicleScene:
         """Motion of the wings (flap angle, pitch, peeling); the flap angle is read-only after the first access."""
         self.flap.setflags(write=False)
         own, frequency = self.setting, self.setting.condition.flap_frequency
-        return angles_of(self.flap, own.motion, self.genes, frequency, own.instants, own.vehicle.claps, own.peel_width)
+        about = own.instants, own.vehicle.claps, own.peel_width
+        return angles_of(self.flap, own.motion, self.genes, frequency, *about, self.pitch)
+
+    # -- for effects that are terms of other models -----------------------------------------------------------------
+
+    def include(self, row: str, coefficient: Array, gene: str = "") -> None:
+        """Add ``coefficient`` [B] times the forces of the elements called ``row``, as if the model had that term.
+
+        ``gene``: name of the term's coefficient, from which the flow at the stations is computed too; "" for none.
+        """
+        name = gene or row
+        self.genes = {**self.genes, name: self.genes.get(name, 0.0) + coefficient}
+        self.included[row] = name
 
     # -- for effects of the loading ----------------------------------------------------------------------------
 

@@ -48,7 +48,7 @@ def bare(kind: str, effect: str = "") -> AnyModel:
     if kind == "wing":
         return wing_model()
     model = vehicle_model()
-    return replace(model, terms=tuple(term for term in model.terms if term != effect))
+    return replace(model, terms=tuple(term for term in model.terms if not effect or term != EFFECTS[effect].term))
 
 
 @cache

@@ -24,7 +24,7 @@ from wingfit.sim.vehicle.terms import PRESETS, chosen
 Array = npt.NDArray[np.float64]
 
 ALL = tuple(name for name, effect in EFFECTS.items() if effect.vehicle)
-FREE = tuple(name for name in ALL if name != "clap_and_peel")  # the nominal model has that term
+FREE = tuple(name for name in ALL if EFFECTS[name].fits(chosen("proposed")))  # no term of the nominal model
 REC = recording(12.5, 0.5, 1.2)
 
 

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from wingfit.records import Station
 from wingfit.sim.effects.contract import Effect, Parameter, Values
+from wingfit.sim.effects.ports.vehicle import VehicleScene
 from wingfit.sim.effects.ports.wing import WingScene
 from wingfit.sim.wing.division import MAX_STRIPS
 from wingfit.sim.wing.structure import Structure
@@ -27,6 +28,10 @@ def _wing(scene: WingScene, values: Values) -> None:
             for j in range(count):
                 block = joined[6 * i : 6 * i + 6, 6 * j : 6 * j + 6]
                 scene.add_air(first + i, first + j, block[:, :, None] * scale)
+
+
+def _vehicle(scene: VehicleScene, values: Values) -> None:
+    scene.include("added_mass", values["k"])
 
 
 def strip_matrix(structure: Structure, strip: int) -> Array:
@@ -113,5 +118,7 @@ EFFECT = Effect(
     signature="the wing swings later and wider, as if it were heavier when it moves along its normal, and the change "
     "grows with air density and acceleration but little with airspeed",
     confused_with=("lumped_mass", "rotational_circulation"),
+    term="added_mass",
     wing=_wing,
+    vehicle=_vehicle,
 )

@@ -30,10 +30,7 @@ def fling_near(distance: Array) -> Array:
 
 
 def _vehicle(scene: VehicleScene, values: Values) -> None:
-    vehicle, motion = scene.setting.vehicle, scene.setting.motion
-    r = motion.pitch_station * vehicle.span
-    chord = float(np.interp(r, [s.r for s in vehicle.stations], [s.chord for s in vehicle.stations]))
-    scene.fling = scene.fling + values["coefficient"] * fling_near(r / chord * np.sin(values["clearance"]))
+    scene.fling = scene.fling + values["coefficient"]
 
 
 def _law(frame: Any, moment: int) -> None:
@@ -71,20 +68,20 @@ def _wing(scene: WingScene, values: Values) -> None:
 
 
 _TEXT = "circulation while the wings peel, in units of c^2 (-theta') / 2 (C_F + C_R in Armanini et al. 2016)"
+_CLEARANCE = "angle between wing and mirror plane at the top of the stroke; of a wing only"
 
 EFFECT = effect_of_air(
     name="clap_and_peel",
     title="Clap and peel",
     size=(Parameter("coefficient", "1", 0.0, 8.0, 2.7, _TEXT),),
-    shape=(
-        Parameter("clearance", "rad", 0.0, 0.5, 0.0, "angle between wing and mirror plane at the top of the stroke"),
-    ),
+    shape=(Parameter("clearance", "rad", 0.0, 0.5, 0.0, _CLEARANCE, wing_only=True),),
     law="Gamma_f = (coefficient / 2) c^2 max(-theta', 0) g(h / c) max(1 - 2^(1/2) sin chi, 0)\n"
     "g(d) = 1 / (1 + (d / 0.2)^2)",
     source="Armanini et al. (2016), Eq. 7: fling from t* = 0 until the wings stop peeling; Weis-Fogh (1973) and "
     "Lighthill (1973): potential flow of two opening plates, for the decay with gap and angle on a wing",
     signature="the force has a peak at the start of the beat, while the wings open, and is unchanged after it",
     confused_with=("wake_capture", "drive_harmonics"),
+    term="clap_and_peel",
     wing=_wing,
     vehicle=_vehicle,
 )

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from wingfit.sim.effects.contract import Parameter, Values, effect_of_air
+from wingfit.sim.effects.contract import Array, Parameter, Values, effect_of_air
 from wingfit.sim.effects.ports.vehicle import VehicleScene, deferred
 from wingfit.sim.effects.ports.wing import WingScene
 from wingfit.sim.kernels.arrays import ALPHA, CIRCULATION, LIFT_SLOPE, MEAN_CHORD, SPEED
@@ -27,12 +27,17 @@ def _stall(scene: VehicleScene, values: Values) -> None:
     travelled; X_0 is that of steady flow (:func:`wingfit.sim.vehicle.states.steady_attachment`); share, delay and
     advance are parameters of the effect.
     """
+    attached = attached_fraction(scene, values)
+    separate(attached, values["share"], scene.wings.rotation, scene.flow.circulation)
+
+
+def attached_fraction(scene: VehicleScene, values: Values) -> Array:
+    """Return X [sides, B, n, 8] of :func:`_stall`."""
     flow, chord = scene.flow, scene.stations.chord
     stall = np.stack([values["angle"], values["width"], values["advance"]], axis=1)
     steady = np.empty_like(flow.speed)
     steady_attachment(flow.along, flow.normal, flow.speed, chord, stall, scene.step, steady)
-    attached = scene.follow(1.0 / (values["delay"][:, None] * chord), steady)
-    separate(attached, values["share"], scene.wings.rotation, flow.circulation)
+    return scene.follow(1.0 / (values["delay"][:, None] * chord), steady)
 
 
 def _law(frame: Any, moment: int) -> None:

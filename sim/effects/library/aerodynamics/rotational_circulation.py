@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from wingfit.sim.effects.contract import Parameter, Values, effect_of_air
+from wingfit.sim.effects.ports.vehicle import VehicleScene
 from wingfit.sim.effects.ports.wing import WingScene
 from wingfit.sim.kernels.arrays import CIRCULATION, MEAN_CHORD, PITCH_RATE
 from wingfit.sim.kernels.lanes.vector import load, store
@@ -32,6 +33,10 @@ def _wing(scene: WingScene, values: Values) -> None:
     scene.add_strip_law(_law, [values["coefficient"]])
 
 
+def _vehicle(scene: VehicleScene, values: Values) -> None:
+    scene.include("rotation", values["coefficient"], "C_r")
+
+
 EFFECT = effect_of_air(
     name="rotational_circulation",
     title="Rotational circulation",
@@ -46,5 +51,7 @@ EFFECT = effect_of_air(
     signature="a force across the stream acts where the wing pitches fast, at the ends of the stroke, and grows with "
     "air density, pitch rate and speed",
     confused_with=("added_mass", "wake_capture", "circulation_lag"),
+    term="rotation",
     wing=_wing,
+    vehicle=_vehicle,
 )

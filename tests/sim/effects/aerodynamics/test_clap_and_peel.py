@@ -8,14 +8,13 @@ import pytest
 
 from tests.oracles.plates import loaded
 from tests.sim.effects.moved import Motion, Moved
-from tests.sim.effects.rigs import bare, force_recording
+from tests.sim.effects.rigs import bare, force_recording, rig_of, vehicle_model
 from tests.sim.kernels.marching import CHORD, LENGTH, plank
 from wingfit.records import Condition, FourierDrive, Hinge
 from wingfit.sim.effects.library.aerodynamics.clap_and_peel import EFFECT, fling_near
 from wingfit.sim.effects.ports.wing import WingScene
 from wingfit.sim.kernels import LANES
 from wingfit.sim.kernels.arrays import CHORD_X, CIRCULATION, NORMAL_X, STREAM_C, STREAM_N
-from wingfit.sim.vehicle.blade_element_wing import BladeElementWing
 from wingfit.sim.wing.division import Division
 from wingfit.sim.wing.structure import build
 
@@ -141,20 +140,12 @@ def test_the_plane_stands_over_the_mean_of_both_rods() -> None:
     np.testing.assert_allclose(np.arctan2(sine, cosine), 0.1 + 0.4 * np.cos(lag / 2) + 0.05, atol=2e-5)
 
 
-def test_a_vehicles_fling_falls_with_the_clearance_by_the_same_law() -> None:
-    model = bare("vehicle", "clap_and_peel").with_effects("clap_and_peel")
-    own = np.array([gene.nominal for gene in model.genes])
-    names = [gene.name for gene in model.genes]
-    rows = []
-    for coefficient, clearance in ((0.0, 0.0), (2.7, 0.0), (2.7, 0.1)):
-        row = own.copy()
-        row[names.index("clap_and_peel.coefficient")] = coefficient
-        row[names.index("clap_and_peel.clearance")] = clearance
-        rows.append(row)
-    none, touching, apart = model.observe(np.array(rows), force_recording()).channels
-    assert isinstance(model, BladeElementWing)
-    vehicle = model.vehicle
-    r = vehicle.motion.pitch_station * vehicle.span
-    chord = float(np.interp(r, [s.r for s in vehicle.stations], [s.chord for s in vehicle.stations]))
-    part = fling_near(np.asarray(r / chord * np.sin(0.1)))
-    np.testing.assert_allclose(apart - none, part * (touching - none), atol=1e-9)
+def test_a_vehicles_fling_is_that_of_the_term() -> None:
+    """C_F + C_R of Eq. 7 while the wings peel, and no clearance, which would only multiply it."""
+    whole, model = vehicle_model(), bare("vehicle", "clap_and_peel").with_effects("clap_and_peel")
+    assert [gene.name for gene in EFFECT.genes(rig_of(model))] == ["clap_and_peel.coefficient"]
+    values = {gene.name: gene.nominal for gene in whole.genes}
+    fling = values.pop("C_F") + 0.75 * values["C_r"]
+    expected = whole.observe(np.array([[g.nominal for g in whole.genes]]), force_recording()).channels
+    found = model.observe(np.array([[*values.values(), fling]]), force_recording()).channels
+    np.testing.assert_allclose(found, expected, atol=1e-9)

@@ -1,0 +1,29 @@
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from tests.sim.effects.flown import DELFLY, density, flown
+from tests.sim.vehicle.vehicles import recording
+from wingfit.sim.vehicle.lift_drag import lift_drag
+
+AREA = 0.137 * (0.085 + 2 * 0.0835 + 0.056) / 4  # of one wing, by trapezia
+
+
+@pytest.mark.parametrize(("speed", "pitch"), [(0.0, 0.5), (0.5, 1.2), (2.0, 0.5), (4.0, -0.1)])
+def test_it_is_drag_alone_and_grows_with_the_square_of_the_airspeed(speed: float, pitch: float) -> None:
+    rec = recording(12.5, speed, pitch)
+    more = lift_drag(flown(DELFLY, rec, body_drag__area=0.4) - flown(DELFLY, rec), pitch)
+    drag = 0.4 * AREA * 0.5 * density(rec) * speed**2
+    np.testing.assert_allclose(more, np.broadcast_to([0.0, drag], more.shape), atol=1e-6 * drag + 1e-15)
+
+
+def test_it_meets_the_air_that_there_is() -> None:
+    """A faster stream of denser air, by other effects, drags more."""
+    rec = recording(12.5, 2.0, math.radians(30))
+    gust = {"airspeed_error__part": 0.1, "residual_air__density": 0.05}
+    more = flown(DELFLY, rec, body_drag__area=0.4, **gust) - flown(DELFLY, rec, **gust)
+    drag = 0.4 * AREA * 0.5 * (density(rec) + 0.05) * 2.2**2
+    np.testing.assert_allclose(np.hypot(*more.T), drag, rtol=1e-5)
