@@ -19,6 +19,7 @@ from wingfit.diagnosis.evidence.refit import (
     FINAL_STEPS,
     Refit,
     continue_fit,
+    fit_to_convergence,
     make_refit,
     partner_trials,
     refit_at,
@@ -45,6 +46,7 @@ MAX_INNER = 12  # suspects that are fitted from a large size
 MAX_RESTARTED = 3  # suspects that are also fitted from the estimates
 MAX_PARTNERS = 3  # second effects that are tried with the best hypothesis
 MAX_RIVALS = 3  # hypotheses for which a second effect is tried
+EXTENDED = {"tracks": (1, 1), "series": (1, 1), "forces": (6, 2)}  # hypotheses that get a further effect, and rounds
 MAX_SUBSTITUTES = 2  # effects that are tried in place of each effect of a combined hypothesis
 
 
@@ -265,26 +267,53 @@ def _compete(state: SearchState, starts: Sequence[StartPoint]) -> Iterator[str]:
 
 
 def _refine_and_extend(state: SearchState) -> Iterator[str]:
-    """Try a finer discretisation (its error may look like a second effect), then second effects; yields stages."""
+    """Try a finer discretisation (its error may look like a second effect), then further effects; yields stages."""
     coarse = state.subject
     if state.spec.refine:
         refine_with_effects(state)
-    if state.beats_unknown_law and not state.is_explained:
-        yield from _second_effects(state)
-        if state.subject is coarse and not state.is_explained:
-            yield from _combined_refits(state)
+    if state.is_explained or not (state.beats_unknown_law or state.data.kind == "forces"):
+        return
+    yield from _further_effects(state)
+    if state.subject is coarse and not state.is_explained:
+        yield from _combined_refits(state)
 
 
-def _second_effects(state: SearchState) -> Iterator[str]:
-    """Refit the best hypothesis together with each second effect that score tests at its fit propose."""
-    best = state.by_excess[0]
-    others, found = [one for one in select_suspects(state.subject, state.spec) if one.name not in best.names], []
-    for suspect, trials in score_tests(state.context, best.fit, others, best.names):
+def _further_effects(state: SearchState) -> Iterator[str]:
+    """Refit the leading hypotheses together with each further effect that score tests at their own fits propose.
+
+    At the nominal fit, an effect may change nothing that it changes beside another one.
+    """
+    bases, rounds = EXTENDED[state.data.kind]
+    extended: set[frozenset[str]] = set()
+    for _ in range(rounds):
+        for base in _leading(state, bases):
+            if frozenset(base.names) not in extended:
+                extended.add(frozenset(base.names))
+                yield from _with_further_effect(state, base)
+        if state.is_explained:
+            return
+
+
+def _leading(state: SearchState, count: int) -> list[Refit]:
+    """Return the refit with the least excess, then those with most evidence, ``count`` in all."""
+    first = state.by_excess[0]
+    weights = weigh(state.data, state.fitted_nominal.refit, state.refits, 0.0, len(state.subject.suspects))
+    order = np.argsort(-weights.evidence[1:], kind="stable")
+    return [first, *(one for k in order if (one := state.refits[k]) is not first)][:count]
+
+
+def _with_further_effect(state: SearchState, base: Refit) -> Iterator[str]:
+    """Refit ``base`` together with each of the effects that score tests at its fit propose; yields stages."""
+    if state.data.kind == "forces":
+        base = fit_to_convergence(state.context, base)
+        state.add(base)
+    others, found = [one for one in select_suspects(state.subject, state.spec) if one.name not in base.names], []
+    for suspect, trials in score_tests(state.context, base.fit, others, base.names):
         found.append(trials)
-        yield f"score test of {suspect.name} together with {' and '.join(best.names)}"
-    for trial in partner_trials(state.data, best, found)[:MAX_PARTNERS]:
-        yield f"refit with {' and '.join((*best.names, trial.suspect.name))}"
-        state.add(refit_with(state.context, best.fit, [*best.trials, trial], best.fit))
+        yield f"score test of {suspect.name} together with {' and '.join(base.names)}"
+    for trial in partner_trials(state.data, base, found)[:MAX_PARTNERS]:
+        yield f"refit with {' and '.join((*base.names, trial.suspect.name))}"
+        state.add(refit_with(state.context, base.fit, [*base.trials, trial], base.fit))
 
 
 def _combined_refits(state: SearchState) -> Iterator[str]:

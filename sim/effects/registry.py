@@ -12,19 +12,23 @@ from wingfit.sim.effects.contract import Effect
 _FILES = (
     # changes of the springs before effects in proportion to their stiffness
     ("structure", "damage cubic_stiffness rod_slip hysteresis viscoelastic tether"),
-    ("inertia", "lumped_mass mass_offset inertial wing_acceleration"),
+    ("inertia", "lumped_mass mass_offset"),
+    ("terms", "inertial wing_acceleration"),
     ("actuation", "stroke_amplitude stroke_bias drive_harmonics phase_lag_error"),
     ("actuation", "wing_pitch_zero wing_pitch_amplitude wing_pitch_phase"),
     ("actuation", "hinge_tilt hinge_offset compliant_drive backlash"),
     # each acts on the result of those before: stream, coefficients of the angle of attack, circulation, wake
-    ("aerodynamics", "residual_air airspeed_error body_drag tail_lift added_mass added_mass_error effective_chord"),
-    ("aerodynamics", "translation viscous zero_lift_angle leading_edge_vortex viscous_drag plate_drag"),
-    ("aerodynamics", "dynamic_stall stall_vortex rotational_circulation circulation_lag clap_and_peel"),
-    ("aerodynamics", "varying_coefficients tip_loss wake_tip_loss induced_inflow wake_capture downwash"),
+    ("stream", "residual_air airspeed_error body_pitch_error body_drag tail_lift"),
+    ("aerodynamics", "added_mass"),
+    ("terms", "added_mass_error effective_chord translation viscous"),
+    ("aerodynamics", "zero_lift_angle leading_edge_vortex viscous_drag plate_drag dynamic_stall stall_vortex"),
+    ("aerodynamics", "rotational_circulation circulation_lag clap_and_peel varying_coefficients"),
+    ("wake", "tip_loss wake_tip_loss induced_inflow wake_capture downwash"),
     # along the path of the signal: wing, image, tracker, frame
     ("cameras", "marker_slip rolling_shutter camera_desync lens_distortion"),
     ("cameras", "marker_swap tracker_lag camera_rotation camera_shift"),
     # axes, mount, amplifier
+    ("balance", "phase_reference axis_sign axis_swap unit_error"),
     ("balance", "balance_tilt balance_resonance filter_delay balance_offset balance_drift"),
     ("recording", "scale_error clock_offset strobe_rate"),
 )

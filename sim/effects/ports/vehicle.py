@@ -62,6 +62,7 @@ class VehicleScene:
         genes: coefficients and parameters of the motion by name, [B]; zero for a term that is off.
         flap: series [B, K + 1] of the flap angle in rad, Re sum_k flap_k exp(2 pi i k t*).
         airspeed: [B], m/s.
+        incidence: [B], rad: angle between the stream and the body (body pitch in level flight).
         density: [B] of the air, kg/m^3.
         mass_factor: [B], factor on the mass of the wings.
         inflow: [B, n], m/s: added to the stream along body x over the beat.
@@ -81,6 +82,7 @@ class VehicleScene:
     genes: Mapping[str, Array]
     flap: Complex
     airspeed: Array
+    incidence: Array
     density: Array
     mass_factor: Array
     inflow: Array
@@ -101,26 +103,17 @@ class VehicleScene:
         flap = flap_series(setting.motion.flap, genes, count, n)
         if len(flap) < count:
             flap = np.repeat(flap, count, axis=0)
-        airspeed, rho = np.full(count, air.airspeed), np.full(count, density(air.pressure, air.temperature))
+        airspeed, incidence = np.full(count, air.airspeed), np.full(count, air.angle_of_attack)
+        rho = np.full(count, density(air.pressure, air.temperature))
         loading = np.ones((count, len(setting.r) + STATIONS))
         inflow, added = np.zeros((count, n)), np.zeros((count, 2, n))
-        one, none = np.ones(count), np.zeros(count)
         together = np.full(count, float("effective_chord" in setting.terms))
+        one, none = np.ones(count), np.zeros(count)
         return cls(
-            setting,
-            genes,
-            flap,
-            airspeed,
-            rho,
-            one,
-            inflow,
-            loading,
-            none,
-            added,
-            together,
-            one,
-            PitchError(none, none, none),
-        )
+            setting=setting, genes=genes, flap=flap, airspeed=airspeed, incidence=incidence, density=rho,
+            mass_factor=one, inflow=inflow, loading=loading, fling=none, added=added, together=together, carried=one,
+            pitch=PitchError(none, none, none),
+        )  # fmt: skip
 
     def __len__(self) -> int:
         """Number of individuals B."""
@@ -243,7 +236,7 @@ class VehicleScene:
 
         The motion ``rows`` [B, 14, n] is changed in place to that of the side.
         """
-        below = self.airspeed * np.sin(self.setting.condition.angle_of_attack)
+        below = self.airspeed * np.sin(self.incidence)
         for upper in uppers(self.setting.vehicle):
             yield set_side(rows, self.setting.vehicle, self._flap, below, upper)
 
@@ -255,7 +248,7 @@ class VehicleScene:
 
     def forward(self, inflow: Array) -> Array:
         """Return the speed of the stream [B, n] (m/s) along body x, including an ``inflow`` [B, n] (m/s)."""
-        return np.asarray((self.airspeed * np.cos(self.setting.condition.angle_of_attack))[:, None] + inflow)
+        return np.asarray((self.airspeed * np.cos(self.incidence))[:, None] + inflow)
 
     @cached_property
     def _flap(self) -> tuple[Array, Array, Array]:

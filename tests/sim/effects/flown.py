@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from tests.sim.vehicle.vehicles import COEFFICIENTS, DELFLY, genome, plate, recording
+from tests.sim.vehicle.vehicles import COEFFICIENTS, genome, plate, recording
+from tests.sim.vehicle.vehicles import DELFLY as DELFLY
 from wingfit.records import FourierFlap, FourierPitch, Recording, Vehicle
 from wingfit.sim.effects.registry import EFFECTS
 from wingfit.sim.vehicle.blade_element_wing import BladeElementWing

@@ -12,8 +12,8 @@ import pytest
 from tests.sim.vehicle.vehicles import COEFFICIENTS, DELFLY, PASSIVE, genome, plate, recording
 from wingfit.records import FourierFlap, FourierPitch, LowPass, Recording, Vehicle
 from wingfit.sim.effects.library.aerodynamics.circulation_lag import wagner
-from wingfit.sim.effects.library.aerodynamics.induced_inflow import apparent_mass, swept_area
-from wingfit.sim.effects.library.aerodynamics.tip_loss import prandtl
+from wingfit.sim.effects.library.wake.induced_inflow import apparent_mass, swept_area
+from wingfit.sim.effects.library.wake.tip_loss import prandtl
 from wingfit.sim.effects.ports.vehicle import Setting, VehicleScene
 from wingfit.sim.effects.registry import EFFECTS
 from wingfit.sim.filtering import low_passed

@@ -37,11 +37,11 @@ def _induce(scene: VehicleScene, values: Values) -> None:
     second instant, because it is smooth. The force of added mass in the model does not include the rate of change of
     the inflow.
     """
-    vehicle, air, wings = scene.setting.vehicle, scene.setting.condition, scene.wings.every(2)
+    vehicle, wings = scene.setting.vehicle, scene.wings.every(2)
     flap, share = scene.angles.flap[:, 0], values["share"][:, None]
     area = swept_area(vehicle.span, flap.max(axis=1) - flap.min(axis=1), vehicle.wings)
     flux, mass = 2.0 * scene.density * area, apparent_mass(scene.density, area) * values["inertia"]
-    stream = scene.airspeed[:, None] * [np.cos(air.angle_of_attack), np.sin(air.angle_of_attack)]
+    stream = scene.airspeed[:, None] * np.stack([np.cos(scene.incidence), np.sin(scene.incidence)], axis=1)
     met = scene.forward(scene.inflow)[:, ::2]
 
     def thrust(inflow: Array | float) -> Array:

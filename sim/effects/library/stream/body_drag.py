@@ -20,7 +20,7 @@ def stream_force(scene: VehicleScene) -> Array:
 
 
 def _vehicle(scene: VehicleScene, values: Values) -> None:
-    angle = scene.setting.condition.angle_of_attack
+    angle = scene.incidence[:, None]
     drag = (values["area"] * stream_force(scene))[:, None]
     scene.added[:, 0] -= drag * np.cos(angle)
     scene.added[:, 1] -= drag * np.sin(angle)

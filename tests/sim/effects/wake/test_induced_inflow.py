@@ -8,7 +8,7 @@ import pytest
 
 from tests.sim.effects.moved import Motion, Moved
 from tests.sim.kernels.marching import LENGTH
-from wingfit.sim.effects.library.aerodynamics.induced_inflow import slices
+from wingfit.sim.effects.library.wake.induced_inflow import slices
 from wingfit.sim.kernels import LANES
 from wingfit.sim.kernels.arrays import CIRCULATION, NORMAL_X, STREAM_C, STREAM_N
 

@@ -8,7 +8,7 @@ import pytest
 from tests.sim.effects.moved import Motion, Moved
 from tests.sim.kernels.marching import LENGTH, plank
 from wingfit.sim.effects.contract import measure
-from wingfit.sim.effects.library.aerodynamics.tip_loss import prandtl, strip_factors
+from wingfit.sim.effects.library.wake.tip_loss import prandtl, strip_factors
 from wingfit.sim.kernels import LANES
 from wingfit.sim.kernels.arrays import CIRCULATION, DRAG, LIFT_SLOPE
 from wingfit.sim.wing.division import Division

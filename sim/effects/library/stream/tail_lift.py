@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from wingfit.sim.effects.contract import Parameter, Values, effect_of_air
-from wingfit.sim.effects.library.aerodynamics.body_drag import stream_force
+from wingfit.sim.effects.library.stream.body_drag import stream_force
 from wingfit.sim.effects.ports.vehicle import VehicleScene
 
 
 def _vehicle(scene: VehicleScene, values: Values) -> None:
-    angle = scene.setting.condition.angle_of_attack
-    coefficient = values["constant"] + values["slope"] * np.sin(angle)
-    lift = (coefficient * stream_force(scene))[:, None]
+    angle = scene.incidence[:, None]
+    coefficient = values["constant"][:, None] + values["slope"][:, None] * np.sin(angle)
+    lift = coefficient * stream_force(scene)[:, None]
     scene.added[:, 0] += lift * np.sin(angle)
     scene.added[:, 1] -= lift * np.cos(angle)
 

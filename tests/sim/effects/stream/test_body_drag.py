@@ -23,7 +23,7 @@ def test_it_is_drag_alone_and_grows_with_the_square_of_the_airspeed(speed: float
 def test_it_meets_the_air_that_there_is() -> None:
     """A faster stream of denser air, by other effects, drags more."""
     rec = recording(12.5, 2.0, math.radians(30))
-    gust = {"airspeed_error__part": 0.1, "residual_air__density": 0.05}
-    more = flown(DELFLY, rec, body_drag__area=0.4, **gust) - flown(DELFLY, rec, **gust)
+    before = flown(DELFLY, rec, airspeed_error__part=0.1, residual_air__density=0.05)
+    after = flown(DELFLY, rec, airspeed_error__part=0.1, residual_air__density=0.05, body_drag__area=0.4)
     drag = 0.4 * AREA * 0.5 * (density(rec) + 0.05) * 2.2**2
-    np.testing.assert_allclose(np.hypot(*more.T), drag, rtol=1e-5)
+    np.testing.assert_allclose(np.hypot(*(after - before).T), drag, rtol=1e-5)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.sim.effects.flown import DELFLY, FAST, flown
-from wingfit.sim.effects.library.aerodynamics.wake_tip_loss import wake_speed
+from wingfit.sim.effects.library.wake.wake_tip_loss import wake_speed
 
 
 def test_the_wake_of_a_hovering_disc() -> None:

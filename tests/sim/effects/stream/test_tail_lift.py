@@ -3,8 +3,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.sim.effects.aerodynamics.test_body_drag import AREA
 from tests.sim.effects.flown import DELFLY, density, flown
+from tests.sim.effects.stream.test_body_drag import AREA
 from tests.sim.vehicle.vehicles import recording
 from wingfit.sim.vehicle.lift_drag import lift_drag
 

@@ -6,8 +6,8 @@ import numpy as np
 
 from wingfit.records.dataset import STANDARD_GRAVITY
 from wingfit.sim.effects.contract import Array, Parameter, Values, effect_of_air
-from wingfit.sim.effects.library.aerodynamics.induced_inflow import swept_area
-from wingfit.sim.effects.library.aerodynamics.tip_loss import prandtl
+from wingfit.sim.effects.library.wake.induced_inflow import swept_area
+from wingfit.sim.effects.library.wake.tip_loss import prandtl
 from wingfit.sim.effects.ports.vehicle import VehicleScene
 
 _ROUNDS = 60
@@ -31,7 +31,7 @@ def _vehicle(scene: VehicleScene, values: Values) -> None:
     stroke = 2.0 * np.abs(scene.flap[:, 1:]).sum(axis=1)
     area = swept_area(vehicle.span, stroke, vehicle.wings)
     ratio = vehicle.mass * STANDARD_GRAVITY / (2.0 * np.maximum(scene.density, 1e-9) * area)
-    axial, across = scene.airspeed * np.cos(air.angle_of_attack), scene.airspeed * np.sin(air.angle_of_attack)
+    axial, across = scene.airspeed * np.cos(scene.incidence), scene.airspeed * np.sin(scene.incidence)
     spacing = values["share"] * np.maximum(wake_speed(axial, across, ratio), 0.0) / (2.0 * air.flap_frequency)
     scene.load(lambda r: prandtl(vehicle.span - r, np.maximum(spacing, 1e-9)[:, None]))
 

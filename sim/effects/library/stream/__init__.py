@@ -1,0 +1,1 @@
+"""Effects of the air stream, and of what it does to body and tail."""

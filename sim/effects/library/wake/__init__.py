@@ -1,0 +1,1 @@
+"""Effects of the vortices and the moving air behind a wing."""
