@@ -16,7 +16,8 @@ from wingfit.calibration.spec import CalibrationSpec
 from wingfit.calibration.summary import summarise, summarise_rig
 from wingfit.diagnosis import DiagnosisSpec, Finding, Progress, diagnose_rig
 from wingfit.diagnosis import diagnose as steps_of
-from wingfit.records import AnyDataset, SeriesDataset, wing_or_vehicle
+from wingfit.records import AnyDataset, Dataset, SeriesDataset, wing_or_vehicle
+from wingfit.records.files.assemble import checked_description
 from wingfit.rigs.rig import Rig, required_rig
 from wingfit.workers import RunningEvaluator, make_evaluator
 
@@ -57,7 +58,7 @@ def calibrate(
         if own is not None:
             ready = prepare_rig(spec, own[1], own[0])
             return summarise_rig(ready, own[1], own[0], evaluator, _last_checkpoint(ready, evaluator, on_progress))
-        known = wing_or_vehicle(dataset)
+        known = _checked(dataset)
         checkpoint = _last_checkpoint(prepare(spec, known), evaluator, on_progress)
         return summarise(spec, known, evaluator, checkpoint)
 
@@ -111,7 +112,13 @@ def _steps(
     dataset: AnyDataset, rig: Rig | None, spec: DiagnosisSpec, evaluator: RunningEvaluator
 ) -> Iterator[Progress]:
     own = _series_of(dataset, rig)
-    return diagnose_rig(own[1], own[0], spec, evaluator) if own else steps_of(wing_or_vehicle(dataset), spec, evaluator)
+    return diagnose_rig(own[1], own[0], spec, evaluator) if own else steps_of(_checked(dataset), spec, evaluator)
+
+
+def _checked(dataset: AnyDataset) -> Dataset:
+    """Return ``dataset``, of a wing or a vehicle, checked as one that is read from files; DatasetError lists errors."""
+    checked_description(dataset)
+    return wing_or_vehicle(dataset)
 
 
 def _series_of(dataset: AnyDataset, rig: Rig | None) -> tuple[SeriesDataset, Rig] | None:

@@ -8,6 +8,7 @@ from wingfit.records import limits
 from wingfit.records.array_types import Array, Float
 from wingfit.records.dataset import STANDARD_GRAVITY, Recording
 from wingfit.records.errors import Faults
+from wingfit.records.files.flap_frequency import check_frequency
 from wingfit.records.series_checks import SHOWN, Locate, check_times
 from wingfit.records.vehicle import Vehicle
 from wingfit.records.wing import Wing
@@ -26,6 +27,7 @@ def check_numbers(recording: Recording, rig: Wing | Vehicle, where: str, at: Loc
     markers = len(recording.markers)
     if isinstance(rig, Wing) and not 1 <= markers <= limits.MAX_MARKERS:
         faults.add(where, markers, f"{markers} markers; it must be 1 to {limits.MAX_MARKERS}: add or remove some")
+    known = faults.count
     increasing = check_times(times, at, faults)
     infinite = np.flatnonzero(np.isinf(values).any(axis=1))
     for row in infinite[:SHOWN]:
@@ -37,10 +39,12 @@ def check_numbers(recording: Recording, rig: Wing | Vehicle, where: str, at: Loc
         return
     if isinstance(rig, Wing):
         _check_positions(values, recording.markers, rig, where, faults)
-        return
-    _check_forces(recording, rig, where, faults)
-    if increasing and frames >= limits.MIN_FRAMES:
-        _check_clock(recording, where, at, faults)
+    else:
+        _check_forces(recording, rig, where, faults)
+        if increasing and frames >= limits.MIN_FRAMES:
+            _check_clock(recording, where, at, faults)
+    if faults.count == known:
+        check_frequency(recording, where, faults)
 
 
 def check_frames(frames: int, where: str, faults: Faults, what: str = "frames") -> None:
