@@ -255,6 +255,7 @@ def _suspect(effect: Effect, rig: Wing | Vehicle) -> Suspect:
         location_genes=location_genes,
         confused_with=effect.confused_with,
         candidate_shapes=shapes,
+        positions={f"{effect.name}.{p.name}": p.positions for p in effect.size if p.positions},
     )
 
 

@@ -11,7 +11,7 @@ from wingfit.calibration.problem import Evaluation, Problem
 from wingfit.diagnosis.evidence.context import FitContext
 from wingfit.diagnosis.evidence.fit import COST_TOLERANCE, Fit
 from wingfit.diagnosis.evidence.nominal import Nominal
-from wingfit.diagnosis.evidence.refit import Refit
+from wingfit.diagnosis.evidence.refit import Refit, is_in_position
 from wingfit.diagnosis.evidence.screen import Trial
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.spec import DiagnosisSpec
@@ -82,12 +82,12 @@ class SearchState:
         self.context = replace(self.context, data=judged_noise(self.data, nominal))
 
     def add(self, refit: Refit | None) -> None:
-        """Store ``refit`` unless it is None.
+        """Store ``refit`` unless it is None or has the size of a choice between its positions.
 
         Of two with the same suspects, only the one with the lower cost is stored; a converged one may cost
         COST_TOLERANCE more.
         """
-        if refit is None:
+        if refit is None or not is_in_position(refit):
             return
         for k, stored in enumerate(self.refits):
             if set(stored.names) == set(refit.names):

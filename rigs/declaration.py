@@ -63,6 +63,7 @@ class SuspectDeclaration(_Declared):
     ] = {}
     confused_with: Annotated[list[Name], Field(max_length=MOST)] = []
     candidate_shapes: Annotated[list[Annotated[list[Number], Field(max_length=MOST)]], Field(max_length=MOST)] = []
+    positions: Annotated[dict[Name, Annotated[list[Number], Field(max_length=MOST)]], Field(max_length=MOST)] = {}
 
 
 class PortDeclaration(_Declared):
@@ -131,11 +132,12 @@ def _genes(declared: list[GeneDeclaration]) -> list[Gene]:
 
 def _suspect(declared: SuspectDeclaration) -> Suspect:
     return Suspect(
-        **declared.model_dump(exclude={"genes", "size_genes", "confused_with", "candidate_shapes"}),
+        **declared.model_dump(exclude={"genes", "size_genes", "confused_with", "candidate_shapes", "positions"}),
         genes=tuple(_genes(declared.genes)),
         size_genes=tuple(declared.size_genes),
         confused_with=tuple(declared.confused_with),
         candidate_shapes=tuple(tuple(one) for one in declared.candidate_shapes),
+        positions={name: tuple(values) for name, values in declared.positions.items()},
     )
 
 
@@ -156,6 +158,7 @@ def _suspect_json(suspect: Suspect) -> dict[str, Any]:
         "location_genes": dict(suspect.location_genes),
         "confused_with": list(suspect.confused_with),
         "candidate_shapes": [list(one) for one in suspect.candidate_shapes],
+        "positions": {name: list(values) for name, values in suspect.positions.items()},
     }
 
 

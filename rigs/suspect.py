@@ -33,6 +33,8 @@ class Suspect:
         confused_with: names of suspects that look similar in a recording.
         candidate_shapes: values of the shape genes (:attr:`shape_genes`), a tuple for each trial of the score test;
             empty means that the score test spreads its own trials.
+        positions: values that a size gene can have besides zero, by its name, where it is a choice rather than an
+            amount (a wrong sign): a fit that ends between them is no hypothesis.
     """
 
     name: str
@@ -46,15 +48,16 @@ class Suspect:
     location_genes: Mapping[Literal["span", "chord"], str] = field(default_factory=dict)
     confused_with: tuple[str, ...] = ()
     candidate_shapes: tuple[tuple[float, ...], ...] = ()
+    positions: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         refuse_text(self, "size_genes", "confused_with")
-        refuse_no_mapping(self, "typical", "location_genes")
+        refuse_no_mapping(self, "typical", "location_genes", "positions")
         genes = tuple(self.genes)
         if not genes:
             raise ValueError(f"suspect {self.name!r} has no gene; give at least one that switches it off at zero")
         sizes = self.size_genes or tuple(gene.name for gene in genes if gene.nominal == 0.0)
-        unknown = sorted({*sizes, *self.typical} - {gene.name for gene in genes})
+        unknown = sorted({*sizes, *self.typical, *self.positions} - {gene.name for gene in genes})
         if unknown:
             raise ValueError(
                 f"suspect {self.name!r} has no gene {unknown[0]!r}; it has {', '.join(g.name for g in genes)}"

@@ -58,6 +58,8 @@ class Parameter:
             the wing (kg).
         place: whether the parameter is a position on the wing where the effect acts.
         wing_only: whether a vehicle does not have the parameter.
+        positions: of a size that is a choice rather than an amount: the values that it can have besides zero. A fit may
+            pass between them, and a diagnosis rejects what ends there. Empty: any value.
         scale: how a search spreads over the bounds, "linear" or "log".
     """
 
@@ -70,6 +72,7 @@ class Parameter:
     of: Measure | None = None
     place: bool = False
     wing_only: bool = False
+    positions: tuple[float, ...] = ()
     scale: Scale = "linear"
 
 

@@ -14,7 +14,7 @@ def _observe(sampling: Sampling, values: Values) -> None:
 EFFECT = fault_of_forces(
     name="axis_swap",
     title="Axes of the forces swapped",
-    size=(Parameter("part", "1", 0.0, 1.0, 1.0, "1: the forces along x and z are recorded in each other's place"),),
+    size=(Parameter("part", "1", 0.0, 1.0, 1.0, "1: both forces are in each other's place", positions=(1.0,)),),
     law="X' = X + part (Z - X)\nZ' = Z + part (X - Z)",
     source="AIAA R-091A (2020), Calibration and Use of Internal Strain-Gage Balances: order of the components",
     signature="the force along x has the shape that is expected of that along z, and the reverse",

@@ -18,7 +18,7 @@ def _observe(sampling: Sampling, values: Values) -> None:
 EFFECT = fault_of_forces(
     name="phase_reference",
     title="Wrong start of the beat",
-    size=(Parameter("share", "1", 0.0, 1.0, 1.0, "1: times count from the phase below instead of from the start"),),
+    size=(Parameter("share", "1", 0.0, 1.0, 1.0, "1: times count from the phase below", positions=(1.0,)),),
     shape=(Parameter("phase", "1", 0.1, 0.9, 0.5, "phase of the beat at which time is zero, in beats"),),
     law="F'(t*) = F(t*) + share (F(t* + phase) - F(t*))",
     source="Armanini et al. (2016), section 3.2.2: the phase of the beat comes from a sensor on the mechanism, whose "

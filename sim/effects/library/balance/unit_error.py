@@ -21,6 +21,7 @@ EFFECT = fault_of_forces(
             10_000.0,
             101.0,
             "relative error: 101 for gram-force instead of newtons, 999 for millinewtons, -0.78 for pounds",
+            positions=(100.97, 999.0, -0.7752),
         ),
     ),
     law="F' = (1 + part) F",

@@ -15,7 +15,9 @@ EFFECT = effect_of_air(
     title="Body pitch error",
     size=(
         Parameter("angle", "rad", -0.5, 0.5, 0.05, "angle added to the body pitch"),
-        Parameter("part", "1", -2.0, 60.0, 56.3, "relative error; -2: wrong sign, 56.3: degrees instead of radians"),
+        Parameter(
+            "part", "1", -2.0, 60.0, 56.3, "-2: wrong sign, 56.3: degrees instead of radians", positions=(-2.0, 56.3)
+        ),
     ),
     law="alpha' = (1 + part) alpha + angle",
     source="Armanini et al. (2016), Table 4 and Eqs. 18 and 19: the body pitch gives the direction of the stream",

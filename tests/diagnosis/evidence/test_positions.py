@@ -1,0 +1,35 @@
+"""A size that is a choice, such as a wrong sign, is one of its positions or zero; a fit between them is rejected."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from wingfit import Gene, Suspect
+from wingfit.diagnosis.evidence.refit import is_in_position
+
+SIGN = Suspect(
+    "sign", genes=(Gene("sign.part", "1", 0.0, -2.0, 60.0),), positions={"sign.part": (-2.0, 56.3)}
+)  # fmt: skip
+
+
+def fitted(value: float) -> Any:
+    trial = SimpleNamespace(suspect=SIGN)
+    return SimpleNamespace(trials=(trial,), fit=SimpleNamespace(values={"sign.part": value}))
+
+
+@pytest.mark.parametrize(("value", "accepted"), [(-2.0, True), (-1.6, True), (58.9, True), (0.001, True)])
+def test_near_a_position(value: float, accepted: bool) -> None:
+    assert is_in_position(fitted(value)) == accepted
+
+
+@pytest.mark.parametrize("value", [-1.0, -0.1, 0.1, 3.0, 40.0])
+def test_between_positions(value: float) -> None:
+    assert not is_in_position(fitted(value))
+
+
+def test_positions_are_of_genes_that_exist() -> None:
+    with pytest.raises(ValueError, match=r"suspect 'sign' has no gene 'other'"):
+        Suspect("sign", genes=SIGN.genes, positions={"other": (1.0,)})
