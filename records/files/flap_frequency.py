@@ -9,7 +9,7 @@ from wingfit.records.dataset import Recording
 from wingfit.records.errors import Faults
 
 HARMONICS = 4  # of the flap frequency that are fitted
-LEAST_BEATS = 3.0  # with fewer, frequencies cannot be told apart well
+LEAST_BEATS = 3.0  # with fewer, close frequencies look alike
 SAMPLES_PER_BEAT = 2 * HARMONICS + 4  # with fewer, harmonics are aliased
 RANGE = 1.6  # frequencies from the stated one divided by this to the stated one times this are tried, and half of it
 COLUMNS, ROWS = 12, 3000  # most that are used
