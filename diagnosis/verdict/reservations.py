@@ -20,14 +20,23 @@ NOT_PREDICTED = 2.0  # times the floor: the lower end of a held-out misfit from 
 
 
 def remaining_sentence(data: WhitenedData, decision: Decision, best: Refit, floor: float) -> str:
-    """Return a sentence on a misfit that the named effects leave; empty if none is significant.
+    """Return a sentence on the misfit that the named effects leave; empty if it is negligible, or nothing is named.
 
     ``floor`` (m or N): discretisation error.
     """
-    if decision.verdict in ("adequate", "unnamed") or not nominal_refuted(data, best.excess, floor):
+    size = float(np.sqrt(max(best.excess, 0.0)))
+    if decision.verdict in ("adequate", "unnamed") or size <= data.policy.negligible * data.noise:
         return ""
-    rest = amount(float(np.sqrt(best.excess)), data.unit)
-    return f" A misfit of {rest} beyond the noise remains: the law has another form, or something else is missing too."
+    share = "" if data.unit == "noise" else f", {size / data.noise:.2g} times the noise"
+    if nominal_refuted(data, best.excess, floor):
+        return (
+            f" A misfit of {amount(size, data.unit)} beyond the noise remains{share}: the law has another form, or "
+            "something else is missing too."
+        )
+    return (
+        f" A misfit of {amount(size, data.unit)} beyond the noise remains{share}, no more than errors of the noise "
+        "and of the discretisation explain."
+    )
 
 
 def accepted_sentence(data: WhitenedData, decision: Decision, nominal: Refit, floor: float) -> str:

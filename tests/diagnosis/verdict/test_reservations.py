@@ -109,6 +109,8 @@ def test_a_misfit_that_remains_is_stated() -> None:
     assert remaining_sentence(data(), decision("adequate"), found.best, 0.0) == ""
     exact = replace_excess(found, 0.01)
     assert remaining_sentence(data(), exact, exact.best, 0.0) == ""
+    small = replace_excess(found, 0.2)
+    assert "remains, no more than errors of the noise and of the" in remaining_sentence(data(), small, small.best, 1.0)
 
 
 def replace_excess(found: Decision, excess: float) -> Decision:
