@@ -26,7 +26,7 @@ _FILES = (
     ("wake", "tip_loss wake_tip_loss induced_inflow wake_capture downwash"),
     # along the path of the signal: wing, image, tracker, frame
     ("cameras", "marker_slip rolling_shutter camera_desync lens_distortion"),
-    ("cameras", "marker_swap tracker_lag camera_rotation camera_shift"),
+    ("cameras", "marker_swap tracker_lag exponential_smoothing camera_rotation camera_shift"),
     # axes, mount, amplifier
     ("balance", "phase_reference axis_sign axis_swap unit_error"),
     ("balance", "balance_tilt balance_resonance filter_delay balance_offset balance_drift"),
