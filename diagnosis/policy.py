@@ -45,6 +45,14 @@ class Policy:
         0.6, "probability", "most that a model is adequate where missing physics may hide in the assumed noise"
     )
     least_evidence: float = _threshold(2.0, "evidence", "no effect is searched for, or added to the model, for less")
+    most_left: float = _threshold(
+        0.14,
+        "nominal excess",
+        "recordings with a beat: a right effect leaves less; omissions outside the library are imitated up to 0.84",
+    )
+    imitation: float = _threshold(
+        2.0, "effective samples, relative", "how steeply a hypothesis that leaves more becomes improbable"
+    )
     single: float = _threshold(0.85, "probability", "share of all effects from which one hypothesis is named")
     listed: float = _threshold(
         0.75, "probability", "share of the library in all missing physics, below which the verdict is unnamed"

@@ -31,7 +31,7 @@ REFIT_STEPS = 6  # of a refit
 CONTINUED_STEPS = 10  # of a refit that is continued
 FINAL_STEPS = 20  # of the best hypothesis, until it converges
 AT_BOUND = 1e-9  # from a bound, in genes scaled to 0..1: as far as rounding takes a gene that is at it
-NEAR_POSITION, NEAR_ZERO = 0.25, 0.01  # relative distance from a position of a choice, and from zero
+NEAR_POSITION, NEAR_ZERO = 0.25, 0.002  # relative distance from a position of a choice, and from zero
 MAX_HALVINGS = 3  # of the suspects' initial sizes if the start cannot be simulated
 
 
@@ -68,13 +68,19 @@ def make_refit(data: WhitenedData, fit: Fit, trials: Sequence[Trial] = ()) -> Re
 
 
 def is_in_position(refit: Refit) -> bool:
-    """Return whether each size that is a choice (:attr:`Suspect.positions`) is near zero or one of its positions."""
+    """Return whether each size that is a choice (:attr:`Suspect.positions`) is zero or near one of its positions.
+
+    A suspect all of whose sizes are choices must have one that is not zero.
+    """
     for trial in refit.trials:
+        chosen = []
         for name, positions in trial.suspect.positions.items():
             value = refit.fit.values[name]
-            near = [abs(value - one) <= NEAR_POSITION * abs(one) for one in positions]
-            if not any(near) and abs(value) > NEAR_ZERO * min(map(abs, positions)):
+            chosen.append(any(abs(value - one) <= NEAR_POSITION * abs(one) for one in positions))
+            if not chosen[-1] and abs(value) > NEAR_ZERO * min(map(abs, positions)):
                 return False
+        if chosen and not any(chosen) and len(chosen) == len(trial.suspect.size_genes):
+            return False
     return True
 
 

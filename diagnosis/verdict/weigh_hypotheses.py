@@ -12,7 +12,9 @@ may have (:func:`tolerated_excess`), likewise divided; nu the effective number o
 compete with the effects: *no physics is missing*, and *physics outside the library*, which is assumed to explain all
 but a fraction of the residual (`Policy.unknown_residual`) at the cost of the genes of a new law. If noise does not
 explain the residual of the nominal model, only hypotheses that are worth their genes compete with the second. Those
-that are hardly worth them are possible if they explain most of the residual and their sizes cannot all be zero.
+that are hardly worth them are possible if they explain most of the residual and their sizes cannot all be zero. With a
+beat, a hypothesis that leaves too much is less probable (`Policy.most_left`): almost any smooth omission is imitated in
+part by some effect.
 """
 
 from __future__ import annotations
@@ -76,7 +78,8 @@ def weigh(
             possible[k] = not absent(data, hypotheses[k])
     if drift_alone:
         possible &= [_explains_drift(data, nominal, one) for one in hypotheses]
-    weight = np.where(possible, evidence, -np.inf)
+    imitates = _imitation(data, hypotheses, floor, error)
+    weight = np.where(possible, evidence - imitates, -np.inf)
     top = max(weight.max(), unknown)
     weight, other = np.exp(weight - top), np.exp(unknown - top)
     total = weight.sum() + other
@@ -85,6 +88,23 @@ def weigh(
         doubted = max(probabilities[0] - policy.doubted_noise, 0.0)
         probabilities[0], unknown = probabilities[0] - doubted, unknown + doubted
     return HypothesisWeights(hypotheses, evidence - evidence[0], probabilities, unknown, excess, data.policy)
+
+
+def _imitation(data: WhitenedData, hypotheses: Sequence[Refit], floor: float, error: float) -> Array:
+    """Return what [H] to subtract from the log evidence of hypotheses that leave more than `Policy.most_left`.
+
+    Almost any smooth omission is imitated in part by some effect; how much a right effect leaves, and how well effects
+    imitate omissions outside the library, was measured (docs/diagnosis.md). Only with a beat. ``floor`` (m or N):
+    discretisation error; ``error``: standard error of the noise.
+    """
+    policy, nominal = data.policy, max(hypotheses[0].excess, 0.0)
+    found = np.zeros(len(hypotheses))
+    if data.kind == "series" or nominal == 0.0:
+        return found
+    most = policy.most_left * nominal + tolerated_excess(data, 0.0, floor, error)
+    beyond = np.array([max(one.excess, 0.0) / most for one in hypotheses[1:]])
+    found[1:] = 0.5 * policy.imitation * data.effective_samples * np.log(np.maximum(beyond, 1.0))
+    return found
 
 
 def noise_error(data: WhitenedData, hypotheses: Sequence[Refit]) -> float:

@@ -20,7 +20,7 @@ def fitted(value: float) -> Any:
     return SimpleNamespace(trials=(trial,), fit=SimpleNamespace(values={"sign.part": value}))
 
 
-@pytest.mark.parametrize(("value", "accepted"), [(-2.0, True), (-1.6, True), (58.9, True), (0.001, True)])
+@pytest.mark.parametrize(("value", "accepted"), [(-2.0, True), (-1.6, True), (58.9, True), (0.001, False)])
 def test_near_a_position(value: float, accepted: bool) -> None:
     assert is_in_position(fitted(value)) == accepted
 
@@ -28,6 +28,14 @@ def test_near_a_position(value: float, accepted: bool) -> None:
 @pytest.mark.parametrize("value", [-1.0, -0.1, 0.1, 3.0, 40.0])
 def test_between_positions(value: float) -> None:
     assert not is_in_position(fitted(value))
+
+
+def test_zero_will_do_beside_an_amount() -> None:
+    """A body pitch may have the wrong zero and the right sign."""
+    both = Suspect("pitch", genes=(*SIGN.genes, Gene("pitch.angle", "rad", 0.0, -1.0, 1.0)), positions=SIGN.positions)
+    refit = fitted(0.001)
+    refit.trials[0].suspect = both
+    assert is_in_position(refit)
 
 
 def test_positions_are_of_genes_that_exist() -> None:

@@ -256,7 +256,7 @@ def test_an_excess_far_beyond_noise_counts_even_with_few_recordings(
 
 def test_an_effect_no_more_probable_than_an_unknown_law_is_not_named() -> None:
     shares = []
-    for left in np.linspace(0.5, 0.9, 41):
+    for left in np.linspace(0.5, 0.9, 401):
         every = weigh(data(), refit(2.0), [refit(left, ("a",))], 0.0, 40)
         share = every.probabilities[1] / (every.probabilities[1] + every.unknown)
         assert decide(every).verdict == ("named" if share >= POLICY.listed else "unnamed")
@@ -321,6 +321,16 @@ def test_no_verdict_depends_on_the_unit_of_length(unit: float, nominal: float, e
     assert flags == others
 
 
+def test_an_imitation_of_another_cause_is_not_named() -> None:
+    """An effect of one gene that leaves a sixth of the misfit: smooth omissions are imitated as well as that."""
+    assert verdict(4.0, refit(4.0 * 0.10**0.5, ("a",))) == ("named", ("a",))
+    assert verdict(4.0, refit(4.0 * 0.17**0.5, ("a",)))[0] == "unnamed"
+    series = cast("Any", data())
+    series.kind = "series"
+    alone = replace(refit(4.0 * 0.17**0.5, ("a",)), predicted=None)
+    assert decide(weigh(series, refit(4.0), [alone], 0.0, 40)).verdict == "named"
+
+
 def test_more_genes_must_be_worth_their_cost() -> None:
     assert verdict(2.0, refit(0.32, ("a",), 1), refit(0.30, ("b",), 8)) == ("named", ("a",))
 
@@ -333,7 +343,8 @@ def test_an_excess_below_the_discretisation_error_is_adequate() -> None:
 def test_probabilities_change_smoothly() -> None:
     """As an effect explains more, its probability rises from near zero to near one without a jump."""
     found = [
-        weigh(data(), refit(2.0), [refit(left, ("a",))], 0.0, 40).probabilities[1] for left in np.linspace(1.6, 0.1, 80)
+        weigh(data(), refit(2.0), [refit(left, ("a",))], 0.0, 40).probabilities[1]
+        for left in np.linspace(1.6, 0.1, 400)
     ]
     assert found[0] < 0.05
     assert found[-1] > 0.95

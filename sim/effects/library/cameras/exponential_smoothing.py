@@ -25,7 +25,7 @@ def _observe(sampling: Sampling, values: Values) -> None:
 EFFECT = fault_of_tracks(
     name="exponential_smoothing",
     title="Exponential smoothing of tracks",
-    size=(Parameter("weight", "1", 0.0, 0.95, 0.3, "weight of the smoothed position of the frame before"),),
+    size=(Parameter("weight", "1", 0.0, 0.8, 0.3, "weight of the smoothed position of the frame before"),),
     memory="the smoothed position of each marker",
     law="y_n = weight y_(n-1) + (1 - weight) p_n",
     source="Brown (1963), Smoothing, Forecasting and Prediction of Discrete Time Series, ch. 7: simple exponential "
