@@ -327,8 +327,8 @@ def test_an_imitation_of_another_cause_is_not_named() -> None:
     assert verdict(4.0, refit(4.0 * 0.17**0.5, ("a",)))[0] == "unnamed"
     series = cast("Any", data())
     series.kind = "series"
-    alone = replace(refit(4.0 * 0.17**0.5, ("a",)), predicted=None)
-    assert decide(weigh(series, refit(4.0), [alone], 0.0, 40)).verdict == "named"
+    imitated = refit(4.0), refit(4.0 * 0.17**0.5, ("a",))
+    assert not weigh_hypotheses._imitation(series, imitated, 0.0, 0.0).any(), "with a beat only"
 
 
 def test_more_genes_must_be_worth_their_cost() -> None:
