@@ -16,7 +16,7 @@ EFFECT = fault_of_forces(
     name="axis_sign",
     title="Wrong sign of a force",
     size=tuple(
-        Parameter(axis, "1", 0.0, 1.0, 1.0, f"1: the force along {axis} is recorded with the wrong sign")
+        Parameter(axis, "1", 0.0, 1.0, 1.0, f"1: the force along {axis} has the wrong sign", positions=(1.0,))
         for axis in "xz"
     ),
     law="X' = (1 - 2 x) X\nZ' = (1 - 2 z) Z",
