@@ -48,7 +48,7 @@ class Policy:
     most_left: float = _threshold(
         0.14,
         "nominal excess",
-        "recordings with a beat: a right effect leaves less; omissions outside the library are imitated up to 0.84",
+        "recordings with a beat: most right effects leave less, and many imitations of another cause leave more",
     )
     imitation: float = _threshold(
         2.0, "effective samples, relative", "how steeply a hypothesis that leaves more becomes improbable"

@@ -297,7 +297,10 @@ def _further_effects(state: SearchState) -> Iterator[str]:
 def _leading(state: SearchState, count: int) -> list[Refit]:
     """Return the refit with the least excess, then those with most evidence, ``count`` in all."""
     first = state.by_excess[0]
-    weights = weigh(state.data, state.fitted_nominal.refit, state.refits, 0.0, len(state.subject.suspects))
+    if count == 1:
+        return [first]
+    suspects = len(select_suspects(state.subject, state.spec))
+    weights = weigh(state.data, state.fitted_nominal.refit, state.refits, 0.0, suspects)
     order = np.argsort(-weights.evidence[1:], kind="stable")
     return [first, *(one for k in order if (one := state.refits[k]) is not first)][:count]
 

@@ -70,22 +70,24 @@ def _wing(scene: WingScene, values: Values) -> None:
     scene.add_strip_law(_law, [values[name] for name in names], states=[_METRES, _METRES])
 
 
+SEPARATION = (
+    Parameter(
+        "angle", "rad", 0.15, 1.2, 0.4, "angle of attack at which steady flow is separated from half of the chord"
+    ),
+    Parameter(
+        "width", "rad", 0.02, 0.3, 0.08, "range of angles of attack over which steady flow separates", scale="log"
+    ),
+    Parameter("delay", "1", 0.2, 10.0, 0.5, "time constant of separation, in chords travelled", scale="log"),
+    Parameter("advance", "1", 0.0, 10.0, 2.0, "delay of the onset of stall while alpha grows, in chords travelled"),
+)  # parameters of X
+
 EFFECT = effect_of_air(
     name="dynamic_stall",
     title="Dynamic stall",
     size=(
         Parameter("share", "1", 0.0, 1.0, 0.5, "fraction of Kirchhoff's loss of lift that occurs; 1 is the full loss"),
     ),
-    shape=(
-        Parameter(
-            "angle", "rad", 0.15, 1.2, 0.4, "angle of attack at which steady flow is separated from half of the chord"
-        ),
-        Parameter(
-            "width", "rad", 0.02, 0.3, 0.08, "range of angles of attack over which steady flow separates", scale="log"
-        ),
-        Parameter("delay", "1", 0.2, 10.0, 0.5, "time constant of separation, in chords travelled", scale="log"),
-        Parameter("advance", "1", 0.0, 10.0, 2.0, "delay of the onset of stall while alpha grows, in chords travelled"),
-    ),
+    shape=SEPARATION,
     memory="the attached fraction of the chord at each station of a vehicle's wing or strip of a flexible wing; for "
     "each strip also its last angle of attack",
     law="(delay c / V) X' = X_0(alpha - advance (c / V) alpha') - X\n"

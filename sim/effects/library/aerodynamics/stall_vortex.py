@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from wingfit.sim.effects.contract import Parameter, Values, effect_of_air
-from wingfit.sim.effects.library.aerodynamics.dynamic_stall import attached_fraction
+from wingfit.sim.effects.library.aerodynamics.dynamic_stall import SEPARATION, attached_fraction
 from wingfit.sim.effects.ports.vehicle import VehicleScene, deferred
 from wingfit.sim.vehicle.states import separate
 
@@ -33,14 +33,7 @@ EFFECT = effect_of_air(
         Parameter(
             "chords", "1", 0.5, 10.0, 3.0, "distance in which the vortex decays, in chords travelled", scale="log"
         ),
-        Parameter(
-            "angle", "rad", 0.15, 1.2, 0.4, "angle of attack at which steady flow is separated from half of the chord"
-        ),
-        Parameter(
-            "width", "rad", 0.02, 0.3, 0.08, "range of angles of attack over which steady flow separates", scale="log"
-        ),
-        Parameter("delay", "1", 0.2, 10.0, 0.5, "time constant of separation, in chords travelled", scale="log"),
-        Parameter("advance", "1", 0.0, 10.0, 2.0, "delay of the onset of stall while alpha grows, in chords travelled"),
+        *SEPARATION,
     ),
     memory="the attached fraction of the chord and the lost circulation at each station of a vehicle's wing",
     law="Delta = share Gamma_alpha (1 - ((1 + X^(1/2)) / 2)^2),     X as in dynamic_stall\n"

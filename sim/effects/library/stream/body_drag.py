@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from wingfit.records import Vehicle
-from wingfit.sim.effects.contract import Array, Parameter, Values, effect_of_air
+from wingfit.sim.effects.contract import Array, Parameter, Values, effect_of_air, measure
 from wingfit.sim.effects.ports.vehicle import VehicleScene
 
 
 def wing_area(vehicle: Vehicle) -> float:
     """Return the area (m^2) of one wing of ``vehicle``."""
-    return float(np.trapezoid([s.chord for s in vehicle.stations], [s.r for s in vehicle.stations]))
+    return measure(vehicle, "chord") * vehicle.span
 
 
 def stream_force(scene: VehicleScene) -> Array:
