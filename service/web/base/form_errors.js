@@ -8,7 +8,7 @@ const fieldOf = (where) => where.split(".").filter((name) => !/^\d+$/.test(name)
 export function showErrors(form, box, error) {
   box.hidden = !error;
   for (const field of form.elements) field.removeAttribute("aria-invalid");
-  if (!error) return;
+  if (!error) return box.replaceChildren();
   const items = (error.errors ?? []).map((item) => {
     const field = fieldOf(item.where);
     form.elements.namedItem(field)?.setAttribute?.("aria-invalid", "true");

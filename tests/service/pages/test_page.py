@@ -151,12 +151,12 @@ def test_the_form_shows_what_the_server_says_and_then_starts(
     seen.page.fill("[name=seed]", "-3")
     seen.page.click("#submit-form [type=submit]")
     seen.wait("document.getElementById('submit-errors').textContent.includes('seed')")
-    assert seen.page.get_attribute("[name=seed]", "aria-invalid") == "true"
+    seen.wait("document.querySelector('[name=seed]').getAttribute('aria-invalid') === 'true'")
     seen.page.fill("[name=seed]", "4")
     seen.page.fill("[name=accuracy_mm]", "0.01")
     seen.page.click("#submit-form [type=submit]")
     seen.wait("document.getElementById('submit-errors').textContent.includes('at least 0.02 mm')")
-    assert seen.page.get_attribute("[name=accuracy_mm]", "aria-invalid") == "true"
+    seen.wait("document.querySelector('[name=accuracy_mm]').getAttribute('aria-invalid') === 'true'")
     seen.page.fill("[name=accuracy_mm]", "0.05")
     seen.page.click("#effects-summary")
     offered = seen.page.evaluate("[...document.querySelectorAll('#effect-choices input')].map((i) => i.value)")
