@@ -40,8 +40,10 @@ class Floors:
             the best hypothesis, 0 if the finer one fits no better; None where there is no finer one.
         finer: description of the finer discretisation; "" where there is none.
         simulation: misfit that any model is allowed, for the error of the simulation: a tenth of the noise.
-        total: root of the sum of squares of noise, discretisation and simulation: the expected misfit of a correct
-            model.
+        total: root of the sum of squares of noise, discretisation, simulation and marker positions: the expected misfit
+            of a correct model.
+        marker_positions: misfit caused by errors of the markers' described rest positions, as far as all markers share
+            them; their other errors are estimated, and not part of any misfit. 0 where they are negligible.
     """
 
     noise: float
@@ -50,6 +52,7 @@ class Floors:
     finer: str
     simulation: float
     total: float
+    marker_positions: float = 0.0
 
 
 @dataclass(frozen=True)

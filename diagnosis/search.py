@@ -10,11 +10,7 @@ import numpy as np
 
 from wingfit.diagnosis.evidence.competing_fits import StartPoint, fit_from_estimates, large_start, start_points
 from wingfit.diagnosis.evidence.fit import FIT_ERRORS, Fit
-from wingfit.diagnosis.evidence.nominal import (
-    choose_discretisation,
-    fit_nominal,
-    improves,
-)
+from wingfit.diagnosis.evidence.nominal import choose_discretisation, fit_nominal, improves
 from wingfit.diagnosis.evidence.refit import (
     FINAL_STEPS,
     Refit,
@@ -61,6 +57,9 @@ def run_search(state: SearchState, free: tuple[str, ...]) -> Steps:
         state.initial_fit = state.initial_fit or (state.context, fit)
         yield 0.25 * (1.0 - 0.85 ** (k + 1)), "fitting the nominal model"
     state.judge_noise(fit)
+    if state.allow_for_marker_errors(fit):
+        yield 0.24, "fitting the nominal model, allowing for errors of the markers' rest positions"
+        *_, fit = fit_nominal(state.context, free, {**spec.calibration.fixed, **fit.values})
     yield 0.25, "comparing with a finer discretisation"
     suspects = select_suspects(state.subject, spec)
     for fraction, stage in _search_coarse_first(state, fit, suspects):
@@ -77,7 +76,7 @@ def run_search(state: SearchState, free: tuple[str, ...]) -> Steps:
     yield 0.94, "continuing the best refits"
     if state.refits:
         _continue_best(state)
-    floor = 0.0 if spec.refine else state.fitted_nominal.discretisation_error or 0.0
+    floor = state.floor(0.0 if spec.refine else state.fitted_nominal.discretisation_error or 0.0)
     yield from ((0.95, stage) for stage in _final_fits(state, floor, len(suspects)))
 
 
@@ -97,7 +96,8 @@ def _search_coarse_first(state: SearchState, fit: Fit, suspects: Sequence[Suspec
 def _final_fits(state: SearchState, floor: float, suspects: int) -> Iterator[str]:
     """Fit the best hypothesis, and those that explain as much, until they converge; store the weights of all.
 
-    ``floor`` (m or N): discretisation error; ``suspects``: number of effects considered. Yields the name of each stage.
+    ``floor`` (m or N): misfit of a right model beyond noise; ``suspects``: number of effects considered. Yields the
+    name of each stage.
     """
 
     def weighed() -> HypothesisWeights:

@@ -10,12 +10,13 @@ from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.problem import Evaluation, Problem
 from wingfit.diagnosis.evidence.context import FitContext
 from wingfit.diagnosis.evidence.fit import COST_TOLERANCE, Fit
+from wingfit.diagnosis.evidence.marker_errors import MarkerErrors, find_marker_errors
 from wingfit.diagnosis.evidence.nominal import Nominal
 from wingfit.diagnosis.evidence.refit import Refit, is_in_position
 from wingfit.diagnosis.evidence.screen import Trial
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.spec import DiagnosisSpec
-from wingfit.diagnosis.subject import Subject
+from wingfit.diagnosis.subject import Subject, beat_subject
 from wingfit.diagnosis.verdict.noise_doubt import judged_noise
 from wingfit.diagnosis.verdict.weigh_hypotheses import HypothesisWeights, tolerated_excess
 from wingfit.records.array_types import ArrayLike
@@ -31,6 +32,7 @@ class SearchState:
         trials: score tests, a list for each suspect, best first.
         refits: fits with suspects added.
         weights: evidence and probability of each fit; None until the search ends.
+        marker_errors: of the described rest positions, integrated out of ``data``; None where they do not matter.
         initial_fit: the nominal model at the estimates of its genes, before any step of a fit, and the context used for
             it.
     """
@@ -41,6 +43,7 @@ class SearchState:
     trials: list[list[Trial]] = field(default_factory=list)
     refits: list[Refit] = field(default_factory=list)
     weights: HypothesisWeights | None = None
+    marker_errors: MarkerErrors | None = None
     initial_fit: tuple[FitContext, Fit] | None = None
 
     @property
@@ -80,6 +83,24 @@ class SearchState:
     def judge_noise(self, nominal: Fit) -> None:
         """Find out, at the fit ``nominal``, whether slow noise may explain what the nominal model misses."""
         self.context = replace(self.context, data=judged_noise(self.data, nominal))
+
+    def floor(self, discretisation: float) -> float:
+        """Return the misfit (m or N) of a right model beyond noise; ``discretisation``: the part of its discretisation.
+
+        The other part is of errors of the markers' rest positions, although these are integrated out.
+        """
+        return float(np.hypot(discretisation, self.marker_errors.shared if self.marker_errors else 0.0))
+
+    def allow_for_marker_errors(self, nominal: Fit) -> bool:
+        """Measure errors of rest positions at the fit ``nominal``; return whether they matter; if so, allow for them."""
+        if self.data.kind != "tracks":
+            return False
+        found = find_marker_errors(beat_subject(self.subject), self.data, nominal)
+        if found is None:
+            return False
+        self.marker_errors, data = found
+        self.context = replace(self.context, data=data)
+        return True
 
     def add(self, refit: Refit | None) -> None:
         """Store ``refit`` unless it is None or has the size of a choice between its positions.

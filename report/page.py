@@ -90,6 +90,8 @@ def _floors(finding: Finding) -> Markup:
     ]
     if floors.discretisation is not None:
         rows.insert(1, ("discretisation error, from a finer model", floors.discretisation, "pale"))
+    if floors.marker_positions > 0.0:
+        rows.insert(-2, ("rest positions of the markers, what all share", floors.marker_positions, "pale"))
     most = max(value for _, value, _ in rows) * scale.factor or 1.0
     along = Axis(0, 1.1 * most, 12, 348)
     bottom = 8 + 34.0 * len(rows)

@@ -13,6 +13,7 @@ from wingfit.calibration.estimates.linearised import residuals_of
 from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.problem import Problem, compared
 from wingfit.diagnosis.policy import POLICY, Policy
+from wingfit.inference.marginal import Marginal
 from wingfit.inference.noise.harmonic import HarmonicFit, harmonic_fit, whole_markers
 from wingfit.inference.noise.series import MEASURED_ERROR
 from wingfit.inference.noise.series_fit import SeriesFit, SeriesReduction
@@ -47,6 +48,7 @@ class WhitenedData:
         tolerance: root mean square (m or N) that any model may differ from the truth.
         policy: thresholds.
         series: reduces recordings without a beat, with their noise; None for tracks and forces.
+        errors: of the description, integrated out of the coefficients of every residual; None: none were found.
         is_steady: of series: whether the residual of the nominal model may be slow noise. If not, because its power
             differs as that of no stationary noise does, the noise is what is visible of it.
     """
@@ -57,6 +59,7 @@ class WhitenedData:
     tolerance: float
     policy: Policy = POLICY
     series: SeriesReduction | None = None
+    errors: Marginal | None = None
     is_steady: bool = True
 
     @classmethod
@@ -111,7 +114,11 @@ class WhitenedData:
     def noiseless(self) -> WhitenedData:
         """The same with zero noise variance, for coefficients that come from simulations alone."""
         reduced = tuple(replace(fit, variance=np.zeros_like(fit.variance)) for fit in self.reduced)
-        return replace(self, reduced=reduced)
+        return replace(self, reduced=reduced, errors=None)
+
+    def allowing(self, errors: Marginal) -> WhitenedData:
+        """Return the same data with ``errors`` of the description, relative to :attr:`scale`, integrated out."""
+        return replace(self, errors=errors)
 
     @cached_property
     def noise(self) -> float:
@@ -196,9 +203,16 @@ class WhitenedData:
         return np.asarray(np.sqrt(self.variance + np.concatenate(allowed)))
 
     def coefficients_of(self, residuals: Sequence[Float[Array, "*B _ _"]]) -> Float[Array, "*B D"]:
-        """Return the coefficients [..., D] of ``residuals``: for each recording [..., T, C], C channels at T times."""
+        """Return the coefficients [..., D] of ``residuals``: for each recording [..., T, C], C channels at T times.
+
+        Without what errors of the description contribute.
+        """
         found = [fit.of(one)[..., fit.used, :] for fit, one in zip(self.reduced, residuals, strict=True)]
-        return np.concatenate([one.reshape(*one.shape[:-2], -1) for one in found], axis=-1)
+        return self.without_errors(np.concatenate([one.reshape(*one.shape[:-2], -1) for one in found], axis=-1))
+
+    def without_errors(self, coefficients: Float[Array, "*B D"]) -> Float[Array, "*B D"]:
+        """Return ``coefficients`` [..., D] without what errors of the description contribute, or could explain."""
+        return coefficients if self.errors is None else self.errors.whiten(coefficients / self.scale) * self.scale
 
     def chi_squared(self, coefficients: Float[Array, " D"]) -> float:
         """Return the sum of squares of ``coefficients`` [D], each divided by :attr:`scale`."""

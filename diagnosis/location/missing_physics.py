@@ -106,11 +106,12 @@ def _plausible(loads: Sequence[MissingLoad], motions: Sequence[StationMotion]) -
 def _case(data: WhitenedData, nominal: Refit, r: int, probed: Probed) -> Case:
     beat_fit, part, fit = data.beat_fits[r], data.recording_slices[r], nominal.fit
     responses = beat_fit.of(np.moveaxis(np.nan_to_num(probed.responses), -1, 0))[:, beat_fit.used]
-    scale = data.scale[part]
+    scale, whole = data.scale[part], np.zeros((len(responses), len(data.scale)))
+    whole[:, part] = responses.reshape(len(responses), -1)
     return Case(
         data.recordings[r].name,
         -fit.coefficients[part] / scale,
-        responses.reshape(len(responses), -1).T / scale[:, None],
+        data.without_errors(whole)[:, part].T / scale[:, None],
         fit.jacobian[part] / scale[:, None],
         probed.crossing,
     )

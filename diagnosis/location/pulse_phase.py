@@ -80,4 +80,4 @@ def _pulses(context: FitContext, at: float, *, low_passed: bool = False) -> Arra
             row = np.zeros(len(data.scale))
             row[part][channel * len(own) : (channel + 1) * len(own)] = own
             rows.append(row)
-    return np.array(rows)
+    return data.without_errors(np.array(rows))

@@ -23,8 +23,14 @@ from wingfit.diagnosis.verdict.held_out import held_out_refutes
 from wingfit.diagnosis.verdict.locate_in_beat import locate_in_beat
 from wingfit.diagnosis.verdict.next_experiment import rank_conditions, separations
 from wingfit.diagnosis.verdict.next_series import Candidate, rank_recordings, series_separations
-from wingfit.diagnosis.verdict.noise_remarks import drift_sentence, noise_remarks
-from wingfit.diagnosis.verdict.proof import ResidualPair, predict_held_out, proof, recording_misfits
+from wingfit.diagnosis.verdict.noise_remarks import drift_sentence, marker_remarks, noise_remarks
+from wingfit.diagnosis.verdict.proof import (
+    ResidualPair,
+    fitted_residuals,
+    predict_held_out,
+    proof,
+    recording_misfits,
+)
 from wingfit.diagnosis.verdict.reservations import (
     accepted_error_sentence,
     accepted_sentence,
@@ -49,17 +55,17 @@ def build_finding(state: SearchState, name: str, held_out: Sequence[AnyRecording
     ``name``: of the dataset; ``held_out``: recordings with which the result is validated.
     """
     nominal, weights = state.fitted_nominal.refit, state.final_weights
-    decision = judged_by_accepted_error(decide(weights), state.data, weights, _discretisation_error(state))
+    decision = judged_by_accepted_error(decide(weights), state.data, weights, state.floor(_discretisation_error(state)))
     best = nominal if decision.verdict == "adequate" else decision.best
     yield 0.0, "computing the intervals of the genes", None
     best = replace(best, fit=with_measured_jacobian(state.context, best.fit))
     yield 0.05, "predicting the held-out recordings", None
-    validation, failed = predict_held_out(held_out, state.context, nominal.fit, best.fit)
-    own = ResidualPair(state.data, nominal.fit.residuals, best.fit.residuals)
+    validation, failed = predict_held_out(held_out, state.context, state.marker_errors, nominal.fit, best.fit)
+    own = fitted_residuals(state.context, state.marker_errors, nominal.fit, best.fit)
     refuted = (
         decision.verdict == "adequate"
         and validation is not None
-        and held_out_refutes(state.context, best.fit, validation, _discretisation_error(state))
+        and held_out_refutes(state.context, best.fit, validation, state.floor(_discretisation_error(state)))
     )
     located: Located | None = None
     for fraction, stage, found in _locate(state, decision, best, own, validation, refuted=refuted):
@@ -135,12 +141,12 @@ def _finding(
     refuted: bool,
 ) -> Finding:
     subject, data, weights = state.subject, state.data, state.final_weights
-    nominal, discretisation, unit = state.fitted_nominal.refit, _discretisation_error(state), state.data.unit
-    rows = recording_misfits(fitted, held_out=False, floor=discretisation)
+    nominal, floor, unit = state.fitted_nominal.refit, state.floor(_discretisation_error(state)), state.data.unit
+    rows = recording_misfits(fitted, held_out=False, floor=floor)
     first, proved = decision, None
     if validation is not None:
-        rows += recording_misfits(validation, held_out=True, floor=discretisation)
-        proved = proof(validation, discretisation, unit, effects_added=bool(best.names))
+        rows += recording_misfits(validation, held_out=True, floor=floor)
+        proved = proof(validation, floor, unit, effects_added=bool(best.names))
         decision = doubted_by_held_out(decision, proved, data, refuted=refuted)
     suspects, genes = {suspect.name: suspect for suspect in subject.suspects}, gene_values(data, best)
     weights = replace(weights, refits=tuple(best if one.names == best.names else one for one in weights.refits))
@@ -152,16 +158,16 @@ def _finding(
         verdict=decision.verdict,
         summary=summary(decision, suspects, _summary_texts(data, nominal, best, located, proved))
         + ("" if data.kind == "series" else drift_sentence(data))
-        + remaining_sentence(data, decision, best, discretisation)
+        + remaining_sentence(data, decision, best, floor)
         + accepted_error_sentence(decide(weights), first)
-        + accepted_sentence(data, decision, nominal, discretisation)
+        + accepted_sentence(data, decision, nominal, floor)
         + noise_sentence(data, decision, nominal)
         + held_out_sentence(first, proved, data, refuted=refuted),
         probabilities=decision.probabilities,
         named=decision.named,
         added_effects=best.names,
         strength=float(np.sqrt(1.0 + max(nominal.excess, 0.0) / data.noise**2)),
-        floors=_floors(state, discretisation),
+        floors=_floors(state),
         hypotheses=hypotheses(data, weights, state.trials),
         indistinguishable=decision.alternatives,
         where=located.where if decision.verdict != "adequate" else None,
@@ -180,6 +186,7 @@ def _finding(
             *state.fitted_nominal.remarks,
             *_refinement_remarks(state.fitted_nominal),
             *_noise_remarks(data, nominal, unit, decision),
+            *marker_remarks(data, state.marker_errors, best.fit),
             *_unidentified_sizes(genes, best),
             *_worsened(rows, best, unit),
         ),
@@ -201,12 +208,12 @@ def _discretisation_error(state: SearchState) -> float:
     return min(nominal.discretisation_error, float(np.sqrt(max(least, 0.0))))
 
 
-def _floors(state: SearchState, discretisation: float) -> Floors:
-    data, nominal = state.data, state.fitted_nominal
-    lag1 = float(np.median([one.lag1 for one in data.reduced]))
-    total = float(np.sqrt(data.noise**2 + discretisation**2 + data.tolerance**2 + data.accepted**2))
+def _floors(state: SearchState) -> Floors:
+    data, nominal, discretisation = state.data, state.fitted_nominal, _discretisation_error(state)
+    lag1, floor = float(np.median([one.lag1 for one in data.reduced])), state.floor(discretisation)
+    total = float(np.sqrt(data.noise**2 + floor**2 + data.tolerance**2 + data.accepted**2))
     error = None if nominal.discretisation_error is None else discretisation
-    return Floors(data.noise, lag1, error, nominal.finer, data.tolerance, total)
+    return Floors(data.noise, lag1, error, nominal.finer, data.tolerance, total, state.floor(0.0))
 
 
 def _summary_texts(

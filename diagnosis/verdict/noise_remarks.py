@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from wingfit.diagnosis.evidence.fit import Fit
+from wingfit.diagnosis.evidence.marker_errors import MarkerErrors
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.finding import amount
 from wingfit.diagnosis.verdict.weigh_hypotheses import drifts
@@ -58,6 +60,21 @@ def _uneven_noise_remarks(data: WhitenedData, unit: str) -> tuple[str, ...]:
         "recordings: what happens there but not in every beat is taken for noise, and missing physics may hide in it"
     )
     return (remark,) if loud else ()
+
+
+def marker_remarks(data: WhitenedData, errors: MarkerErrors | None, best: Fit) -> tuple[str, ...]:
+    """Return a remark on ``errors`` of rest positions, estimated at the fit ``best``; empty if they are negligible."""
+    if errors is None:
+        return ()
+    sizes = np.linalg.norm(errors.estimates(data, best), axis=1)
+    worst = int(np.argmax(sizes))
+    remark = (
+        f"the described rest positions of the markers are wrong by about {amount(errors.sd, data.unit)} along each "
+        f"axis ({errors.markers[worst]} by {amount(float(sizes[worst]), data.unit)}): so much do neighbouring markers "
+        "differ in every recording. These errors are estimated with every hypothesis, and are not part of any misfit; "
+        "measure the positions again to see smaller effects"
+    )
+    return (remark,)
 
 
 def drift_sentence(data: WhitenedData) -> str:

@@ -13,8 +13,10 @@ from wingfit.calibration.series.beginnings import from_beginnings
 from wingfit.diagnosis.evidence.context import FitContext
 from wingfit.diagnosis.evidence.fit import FIT_ERRORS, Fit, gauss_newton_fit
 from wingfit.diagnosis.evidence.intervals import CONFIDENCE
+from wingfit.diagnosis.evidence.marker_errors import MarkerErrors
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.finding import Interval, Proof, RecordingMisfit, amount
+from wingfit.diagnosis.subject import beat_subject
 from wingfit.inference.noise.series_fit import SeriesFit
 from wingfit.records import AnyRecording, Condition, Recording
 from wingfit.records.array_types import Array, Float
@@ -48,14 +50,21 @@ class ResidualPair:
             yield np.stack([np.where(fit.used, one / scale, np.nan) ** 2 for one in residuals])
 
 
+def fitted_residuals(context: FitContext, errors: MarkerErrors | None, before: Fit, after: Fit) -> ResidualPair:
+    """Return the residuals of the fitted recordings at two fits; arguments as of :func:`predict_held_out`."""
+    first, then = (_corrected(context.data, context, errors, fit, fit.residuals) for fit in (before, after))
+    return ResidualPair(context.data, first, then)
+
+
 def predict_held_out(
-    recordings: Sequence[AnyRecording], context: FitContext, before: Fit, after: Fit
+    recordings: Sequence[AnyRecording], context: FitContext, errors: MarkerErrors | None, before: Fit, after: Fit
 ) -> tuple[ResidualPair | None, tuple[str, ...]]:
     """Return residuals of recordings that neither model was fitted to, and remarks on those that cannot be simulated.
 
     ``before``: fit of the nominal model; ``after``: fit with effects added; ``context``: of both, whose force axes and
-    thresholds are used here too. Genes that belong to a held-out recording alone (an initial state) are fitted to it;
-    all others keep their values. None where no recording can be simulated with both models.
+    thresholds are used here too. ``errors`` of the markers' rest positions, as each fit estimates them, are subtracted.
+    Genes that belong to a held-out recording alone (an initial state) are fitted to it; all others keep their values.
+    None where no recording can be simulated with both models.
     """
     fitted = context.data
     kept, pairs, failed, incomplete = list[AnyRecording](), list[tuple[Array, Array]](), list[str](), False
@@ -63,6 +72,8 @@ def predict_held_out(
         one, found, reasons = fitted.like([recording]), [], []
         for fit in (before, after):
             residuals, reason = _predicted(one, context, fit)
+            if reason is None:
+                (residuals,) = _corrected(one, context, errors, fit, (residuals,))
             found.append(residuals)
             reasons.append(reason)
         incomplete = incomplete or reasons[1] is not None
@@ -87,6 +98,15 @@ def _predicted(one: WhitenedData, context: FitContext, fit: Fit) -> tuple[Array,
         return np.empty(0), str(error)
     _, (reason,), (residuals,) = one.evaluate(problem, context.evaluator, values)
     return residuals[0], reason
+
+
+def _corrected(
+    data: WhitenedData, context: FitContext, errors: MarkerErrors | None, fit: Fit, residuals: tuple[Array, ...]
+) -> tuple[Array, ...]:
+    """Return ``residuals`` without what ``errors``, estimated at ``fit``, contribute to the recordings of ``data``."""
+    if errors is None:
+        return residuals
+    return errors.corrected(beat_subject(context.subject), data, residuals, errors.estimates(context.data, fit))
 
 
 def with_own_genes(one: WhitenedData, context: FitContext, fit: Fit) -> tuple[Problem, Float[Array, "1 K"]]:
@@ -114,7 +134,7 @@ def recording_misfits(predicted: ResidualPair, *, held_out: bool, floor: float) 
     rows = []
     for r, recording in enumerate(predicted.data.recordings):
         fit = predicted.data.reduced[r]
-        alone = replace(predicted.data, recordings=(recording,), reduced=(fit,))
+        alone = replace(predicted.data, recordings=(recording,), reduced=(fit,), errors=None)
         before, after, _ = _misfits(ResidualPair(alone, (predicted.before[r],), (predicted.after[r],)))
         noise = float(np.sqrt(np.mean(fit.noise[fit.used] ** 2)))
         expected = before, after, _least(noise, floor, alone)

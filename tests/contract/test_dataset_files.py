@@ -154,7 +154,7 @@ def datasets(draw: st.DrawFn) -> Dataset:
     return Dataset(draw(titles), wing, parts, tuple(keys[1:]), draw(prose))
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
+@settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
 @given(datasets())
 def test_any_dataset_returns_exactly(dataset: Dataset) -> None:
     with tempfile.TemporaryDirectory() as folder:

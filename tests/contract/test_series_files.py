@@ -141,7 +141,7 @@ def datasets(draw: st.DrawFn) -> SeriesDataset:
     return replace(empty, recordings=parts, held_out=tuple(keys[1:]))
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
+@settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
 @given(datasets())
 def test_any_dataset_returns_exactly(dataset: SeriesDataset) -> None:
     with tempfile.TemporaryDirectory() as folder:

@@ -27,14 +27,14 @@ def nearest(wing: Wing, values: Values) -> Index:
     return np.argsort(away, axis=1, kind="stable")
 
 
-def tangents(wing: Wing, marker: int) -> Array:
+def tangents(rest: Array, marker: int, span: float) -> Array:
     """Return weights [2, M] with which the positions of M markers sum up to the wing's tangents at ``marker``.
 
-    The tangents are the derivatives of the position by x and by y at rest. The weights follow from a weighted
-    least-squares plane through the markers around ``marker``: exact for a uniform rotation and strain.
+    The tangents are the derivatives of the position by x and by y at rest, ``rest`` [M, 2] (m). The weights follow from
+    a weighted least-squares plane through the markers around ``marker``, as near as a part of the ``span`` (m): exact
+    for a uniform rotation and strain.
     """
-    rest = np.array([m.position[:2] for m in wing.markers])
     apart = rest - rest[marker]
-    weight = np.exp(-0.25 * (apart**2).sum(axis=1) / (_NEAR * wing.span) ** 2)
+    weight = np.exp(-0.25 * (apart**2).sum(axis=1) / (_NEAR * span) ** 2)
     plane = np.hstack([np.ones((len(rest), 1)), apart])
     return np.asarray((np.linalg.pinv(plane * weight[:, None]) * weight)[1:])

@@ -14,7 +14,7 @@ from tests.service.processes import ROOT, ServerProcess
 from tests.service.runs import force_data
 
 EXAMPLE = ROOT / "examples" / "robird"
-SPEC = {"division": "4", "population": 8, "max_generations": 6, "stall": 6, "seed": 3}
+SPEC = {"division": "4", "population": 6, "max_generations": 4, "stall": 4, "seed": 3}
 PATIENCE = 300.0
 
 Json = dict[str, Any]

@@ -11,9 +11,9 @@ from wingfit.sim.effects.ports.observation import Sampling
 
 def _observe(sampling: Sampling, values: Values) -> None:
     wing = sampling.wing
-    slipped = nearest(wing, values)[:, 0]
+    slipped, rest = nearest(wing, values)[:, 0], np.array([m.position[:2] for m in wing.markers])
     for beat, marker, x, y in zip(sampling.beat, slipped, values["x"], values["y"], strict=True):
-        along, across = tangents(wing, int(marker))
+        along, across = tangents(rest, int(marker), wing.span)
         # Along the wing as it is bent at that instant, which the markers around it show.
         beat[:, marker] += np.einsum("m,nmi->ni", x * along + y * across, beat)
 

@@ -42,6 +42,6 @@ def test_on_a_rigid_wing_the_slip_turns_with_it(marker: int) -> None:
 def test_tangents_of_a_bent_wing() -> None:
     """z = 0.4 y^2: dz/dy is 0.8 y but for the curvature within the neighbourhood; dz/dx is nothing."""
     rest = np.array([m.position for m in WING.markers])
-    aft, out = tangents(WING, 24) @ (0.4 * rest[:, 1] ** 2)
+    aft, out = tangents(rest[:, :2], 24, WING.span) @ (0.4 * rest[:, 1] ** 2)
     assert out == pytest.approx(0.8 * rest[24, 1], rel=0.05)
     assert abs(aft) < 0.05 * out

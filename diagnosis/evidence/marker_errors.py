@@ -1,0 +1,177 @@
+"""Errors of the described rest positions of markers, integrated out of the coefficients of every residual.
+
+No one measures by hand where a marker lies on a wing as well as cameras see it. Such errors are nuisances with a normal
+prior. The coefficients v of a residual then have the covariance D^2 + A A^T: D^2 is the variance of the noise, and a
+column of A the change by an error of one standard deviation, a vector that turns with the wing. D (1 + D^-1 A A^T
+D^-1)^-1/2 D^-1 v has the covariance D^2 of the noise alone; wherever a diagnosis speaks of the coefficients of a
+residual, it means these (Rasmussen and Williams 2006, Sec. 2.7: explicit basis functions with a normal prior).
+
+The standard deviation is measured: physics that a model lacks displaces neighbours alike, errors of single markers do
+not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from wingfit.diagnosis.evidence.fit import Fit
+from wingfit.diagnosis.evidence.screen import Nuisance
+from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
+from wingfit.diagnosis.location.maps import beat_series
+from wingfit.diagnosis.subject import BeatSubject
+from wingfit.inference.marginal import Marginal
+from wingfit.inference.noise.harmonic import HarmonicFit
+from wingfit.inference.noise.mean_beat import fourier_basis
+from wingfit.records import Recording
+from wingfit.records.array_types import Array, Float
+from wingfit.sim.effects.ports.markers import tangents
+
+PHASES = 72  # instants of a beat at which the wing's axes at a marker are computed
+LARGEST = 0.01  # m, standard deviation of a prior that hardly limits the errors
+SHOWN = 0.1  # of that prior's variance: an error of larger variance is not measured
+MARKERS_PER_TERM = 4  # least number of markers for each term of the polynomial that describes what neighbours share
+RIGID_TERMS = 3  # of the displacement of a rigid wing along an axis: constant, and linear in both directions
+LEAST_MARKERS = 8  # fewer do not show what neighbours share
+MAX_DEGREE = 3  # of that polynomial in both directions of the wing
+ROBUST_STEPS, HUBER = 20, 1.5  # of its fit, and beyond how many standard deviations an error counts less
+NORMAL_MAD = 1.4826  # standard deviation divided by median absolute deviation, of a normal distribution
+
+
+@dataclass(frozen=True)
+class MarkerErrors:
+    """Errors of the rest positions of ``markers``, with the standard deviation ``sd`` (m) along each axis."""
+
+    markers: tuple[str, ...]
+    sd: float
+
+    @property
+    def shared(self) -> float:
+        """Root mean square (m) along an axis of what a rigid motion of the wing shares with the errors."""
+        return self.sd * float(np.sqrt(RIGID_TERMS / len(self.markers)))
+
+    def estimates(self, data: WhitenedData, fit: Fit) -> Float[Array, "M 3"]:
+        """Return the described minus the true rest position (m, axes of the wing) of each marker, estimated at ``fit``.
+
+        ``data``: with these errors integrated out.
+        """
+        if data.errors is None:
+            return np.zeros((len(self.markers), 3))
+        return self.sd * data.errors.estimates(fit.coefficients / data.scale).reshape(-1, 3)
+
+    def corrected(
+        self, subject: BeatSubject, data: WhitenedData, residuals: Sequence[Array], errors: Float[Array, "M 3"]
+    ) -> tuple[Array, ...]:
+        """Return ``residuals`` [T, C] of the recordings of ``data`` without what ``errors`` (m) contribute to them."""
+        places, found = {name: k for k, name in enumerate(self.markers)}, []
+        for recording, beat_fit, residual in zip(data.beat_recordings, data.beat_fits, residuals, strict=True):
+            turning = axes_at_markers(subject, recording, beat_fit, residual)
+            own = np.array([errors[places[name]] if name in places else np.zeros(3) for name in recording.markers])
+            series = np.einsum("ma,makp->mkp", own, turning).reshape(-1, turning.shape[-1])
+            psi = 2 * np.pi * recording.condition.flap_frequency * recording.times
+            basis = fourier_basis(psi, int(beat_fit.order[~beat_fit.trend].max()))
+            found.append(residual - basis @ series[:, ~beat_fit.trend].T)
+        return tuple(found)
+
+
+def axes_at_markers(
+    subject: BeatSubject, recording: Recording, beat_fit: HarmonicFit, residual: Float[Array, "T C"]
+) -> Float[Array, "M 3 3 P"]:
+    """Return Fourier coefficients of the wing's three axes at each of M markers, each a vector, over the beat.
+
+    The last axes are the axis of the wing, the coordinate, and the P coefficients of ``beat_fit``. They are those of
+    the simulated motion, with the ``residual`` (m): tangents and normal at the marker, zero if that was not used.
+    """
+    places = subject.channel_locations(recording)[::3]
+    used = beat_fit.used.reshape(-1, 3).all(axis=1)
+    rest = np.array([(one.x, one.y) for one in places], float)[used]
+    motion = (beat_fit.coefficients + beat_fit.of(residual)).reshape(len(places), 3, -1)[used]
+    grid = beat_series(beat_fit, 0.0, PHASES)
+    beat = np.einsum("np,mkp->nmk", grid, motion)
+    length = float(np.ptp(rest[:, 1]))
+    found = np.zeros((len(places), 3, 3, grid.shape[1]))
+    periodic = np.linalg.pinv(grid)
+    for k, m in enumerate(np.flatnonzero(used)):
+        along, across = np.einsum("am,nmk->ank", tangents(rest, k, length), beat)
+        normal = np.cross(along, across)
+        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+        found[m] = np.einsum("pn,ank->akp", periodic, np.stack([along, across, normal]))
+    return found
+
+
+def changes_by_errors(
+    subject: BeatSubject, data: WhitenedData, residuals: Sequence[Float[Array, "T C"]], markers: Sequence[str]
+) -> Float[Array, "D K"]:
+    """Return the changes of the coefficients [D] by a metre of each rest position of M ``markers``, K = 3 M."""
+    places, rows = {name: k for k, name in enumerate(markers)}, []
+    for recording, beat_fit, residual in zip(data.beat_recordings, data.beat_fits, residuals, strict=True):
+        turning = axes_at_markers(subject, recording, beat_fit, residual)
+        found = np.zeros((len(turning), 3, turning.shape[-1], len(markers), 3))
+        for m, name in enumerate(recording.markers):
+            found[m, :, :, places[name]] = np.moveaxis(turning[m], 0, -1)
+        rows.append(found.reshape(-1, turning.shape[-1], 3 * len(markers))[beat_fit.used].reshape(-1, 3 * len(markers)))
+    return np.concatenate(rows)
+
+
+def find_marker_errors(
+    subject: BeatSubject, data: WhitenedData, nominal: Fit
+) -> tuple[MarkerErrors, WhitenedData] | None:
+    """Measure the errors of rest positions at the fit ``nominal``, and integrate them out of the coefficients.
+
+    None where they are negligible compared with the noise of a sample, or where few markers show nothing.
+    """
+    markers = tuple(dict.fromkeys(name for one in data.beat_recordings for name in one.markers))
+    changes = changes_by_errors(subject, data, nominal.residuals, markers)
+    places = {p.name: (p.x, p.y) for one in data.beat_recordings for p in subject.channel_locations(one)}
+    rest = np.array([places[name] for name in markers], float)
+    sd = _standard_deviation(data, nominal, changes, rest)
+    if sd < data.policy.negligible * data.noise:
+        return None
+    return MarkerErrors(markers, sd), data.allowing(Marginal.of(_own(changes, rest) * (sd / data.scale[:, None])))
+
+
+def _own(changes: Float[Array, "D K"], rest: Float[Array, "M 2"]) -> Float[Array, "D K"]:
+    """Return ``changes`` without what moves all markers as a rigid wing: a fault, not errors of single markers."""
+    rigid, _ = np.linalg.qr(_polynomial(rest, 1))
+    by_marker = changes.reshape(len(changes), -1, 3)
+    shared = np.einsum("mq,nq,dna->dma", rigid, rigid, by_marker, optimize=True)
+    return np.asarray((by_marker - shared).reshape(changes.shape))
+
+
+def _standard_deviation(data: WhitenedData, nominal: Fit, changes: Array, rest: Float[Array, "M 2"]) -> float:
+    """Return the standard deviation (m) of the errors of rest positions beyond what neighbouring markers share."""
+    nuisance = Nuisance(data, nominal)
+    fields = nuisance.project_out(changes.T)
+    covariance = np.linalg.inv(fields @ fields.T + np.eye(len(fields)) / LARGEST**2)
+    errors, variance = (covariance @ (fields @ nuisance.residual)).reshape(-1, 3), np.diag(covariance).reshape(-1, 3)
+    shown = (variance < SHOWN * LARGEST**2).all(axis=1)
+    errors, variance, rest = errors[shown], variance[shown], rest[shown]
+    degree = max((d for d in range(MAX_DEGREE + 1) if MARKERS_PER_TERM * len(_powers(d)) <= len(rest)), default=None)
+    if degree is None or len(rest) < LEAST_MARKERS:
+        return 0.0
+    shared = _polynomial(rest, degree)
+    own = np.concatenate([_beyond(shared, one) for one in errors.T])
+    spread = NORMAL_MAD * float(np.median(np.abs(own))) * np.sqrt(len(rest) / (len(rest) - shared.shape[1]))
+    return float(np.sqrt(max(spread**2 - float(np.mean(variance)), 0.0)))
+
+
+def _polynomial(rest: Float[Array, "M 2"], degree: int) -> Float[Array, "M Q"]:
+    """Return all products [M, Q] of powers of the coordinates ``rest`` [M, 2] up to ``degree``."""
+    place = (rest - rest.mean(axis=0)) / np.ptp(rest, axis=0).max()
+    return np.stack([place[:, 0] ** i * place[:, 1] ** j for i, j in _powers(degree)], axis=1)
+
+
+def _powers(degree: int) -> list[tuple[int, int]]:
+    return [(i, j) for i in range(degree + 1) for j in range(degree + 1 - i)]
+
+
+def _beyond(shared: Float[Array, "M Q"], values: Float[Array, " M"]) -> Float[Array, " M"]:
+    """Return ``values`` [M] minus their robust fit by the columns of ``shared`` [M, Q] (Huber 1964)."""
+    weight = np.ones(len(values))
+    for _ in range(ROBUST_STEPS):
+        left = values - shared @ np.linalg.lstsq(shared * weight[:, None], values * weight, rcond=None)[0]
+        scale = NORMAL_MAD * float(np.median(np.abs(left)))
+        weight = np.sqrt(np.minimum(1.0, HUBER * scale / np.maximum(np.abs(left), 1e-300)))
+    return np.asarray(left)
