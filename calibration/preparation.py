@@ -24,6 +24,7 @@ from wingfit.rigs.rig_model import RigModel
 from wingfit.sim.effects.registry import EFFECTS
 from wingfit.sim.filtering import default_cutoff, low_passed
 from wingfit.sim.model import Model
+from wingfit.sim.vehicle.terms import DRAG
 from wingfit.sim.wing.alignment import recorded_crossing
 from wingfit.sim.wing.flexible_wing import FlexibleWing
 
@@ -128,7 +129,7 @@ def _refuse_genes(spec: CalibrationSpec, model: Model) -> None:
 
 def _free(spec: CalibrationSpec, model: Model, never: Collection[str] = ()) -> tuple[str, ...]:
     """Return the genes to search, in the order of ``model`` and without those of ``never``; ValueError if none is."""
-    wanted = spec.genes or model.searched
+    wanted = spec.genes or (*model.searched, *(DRAG if len(spec.axes) > 1 else ()))
     known = [gene.name for gene in model.genes]
     free = tuple(name for name in known if name in wanted and name not in spec.fixed and name not in never)
     if not free:

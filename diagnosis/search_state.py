@@ -92,7 +92,7 @@ class SearchState:
         return float(np.hypot(discretisation, self.marker_errors.shared if self.marker_errors else 0.0))
 
     def allow_for_marker_errors(self, nominal: Fit) -> bool:
-        """Measure errors of rest positions at the fit ``nominal``; return whether they matter; if so, allow for them."""
+        """Measure errors of rest positions at the fit ``nominal``; and allow for them; return whether they matter."""
         if self.data.kind != "tracks":
             return False
         found = find_marker_errors(beat_subject(self.subject), self.data, nominal)

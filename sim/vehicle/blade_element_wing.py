@@ -97,7 +97,8 @@ class BladeElementWing:
     def searched(self) -> tuple[str, ...]:
         """Names of the model's genes that a search estimates by default: C_l, C_r, C_F, K_l, K_d and those of effects.
 
-        The coefficients of viscous drag and the motion are fixed, as in Armanini et al. (2016).
+        The coefficients of viscous drag and the motion are fixed, as in Armanini et al. (2016); a fit to two force axes
+        also searches those of drag.
         """
         added = {gene.name for effect in self.chosen for gene in effect.genes(self.vehicle)}
         return tuple(gene.name for gene in self.genes if gene.name in added.union(SEARCHED))

@@ -75,6 +75,7 @@ TERMS = {
     )
 }  # fmt: skip
 SEARCHED = ("C_l", "C_r", "C_F", "K_l", "K_d")
+DRAG = ("C_D0", "C_Dpi2")  # forces along two axes tell drag from lift, those along one do not
 
 
 @dataclass(frozen=True)
