@@ -16,6 +16,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 
 from wingfit.diagnosis.evidence.fit import Fit
 from wingfit.diagnosis.evidence.screen import Nuisance
@@ -26,13 +27,14 @@ from wingfit.inference.marginal import Marginal
 from wingfit.inference.noise.harmonic import HarmonicFit
 from wingfit.inference.noise.mean_beat import fourier_basis
 from wingfit.records import Recording
-from wingfit.records.array_types import Array, Float
+from wingfit.records.array_types import Array, Bool, Float, Mask
 from wingfit.sim.effects.ports.markers import tangents
 
 PHASES = 72  # instants of a beat at which the wing's axes at a marker are computed
 LARGEST = 0.01  # m, standard deviation of a prior that hardly limits the errors
 SHOWN = 0.1  # of that prior's variance: an error of larger variance is not measured
 MARKERS_PER_TERM = 4  # least number of markers for each term of the polynomial that describes what neighbours share
+BY_CHANCE = 0.01  # probability that any marker's error is so much larger than the others'
 RIGID_TERMS = 3  # of the displacement of a rigid wing along an axis: constant, and linear in both directions
 LEAST_MARKERS = 8  # fewer do not show what neighbours share
 MAX_DEGREE = 3  # of that polynomial in both directions of the wing
@@ -120,16 +122,18 @@ def find_marker_errors(
 ) -> tuple[MarkerErrors, WhitenedData] | None:
     """Measure the errors of rest positions at the fit ``nominal``, and integrate them out of the coefficients.
 
-    None where they are negligible compared with the noise of a sample, or where few markers show nothing.
+    A marker with a far larger error than others is excepted: it slipped, or was confused with another. None where the
+    errors are negligible compared with the noise of a sample, or where few markers show nothing.
     """
     markers = tuple(dict.fromkeys(name for one in data.beat_recordings for name in one.markers))
     changes = changes_by_errors(subject, data, nominal.residuals, markers)
     places = {p.name: (p.x, p.y) for one in data.beat_recordings for p in subject.channel_locations(one)}
     rest = np.array([places[name] for name in markers], float)
-    sd = _standard_deviation(data, nominal, changes, rest)
+    sd, usual = _standard_deviation(data, nominal, changes, rest)
     if sd < data.policy.negligible * data.noise:
         return None
-    return MarkerErrors(markers, sd), data.allowing(Marginal.of(_own(changes, rest) * (sd / data.scale[:, None])))
+    own = _own(changes * np.repeat(usual, 3), rest)
+    return MarkerErrors(markers, sd), data.allowing(Marginal.of(own * (sd / data.scale[:, None])))
 
 
 def _own(changes: Float[Array, "D K"], rest: Float[Array, "M 2"]) -> Float[Array, "D K"]:
@@ -140,21 +144,27 @@ def _own(changes: Float[Array, "D K"], rest: Float[Array, "M 2"]) -> Float[Array
     return np.asarray((by_marker - shared).reshape(changes.shape))
 
 
-def _standard_deviation(data: WhitenedData, nominal: Fit, changes: Array, rest: Float[Array, "M 2"]) -> float:
-    """Return the standard deviation (m) of the errors of rest positions beyond what neighbouring markers share."""
+def _standard_deviation(
+    data: WhitenedData, nominal: Fit, changes: Float[Array, "D K"], rest: Float[Array, "M 2"]
+) -> tuple[float, Bool[Mask, " M"]]:
+    """Return the standard deviation (m) of the errors beyond what neighbours share, and which markers have usual ones.
+
+    Zero where the markers are too few.
+    """
     nuisance = Nuisance(data, nominal)
     fields = nuisance.project_out(changes.T)
     covariance = np.linalg.inv(fields @ fields.T + np.eye(len(fields)) / LARGEST**2)
     errors, variance = (covariance @ (fields @ nuisance.residual)).reshape(-1, 3), np.diag(covariance).reshape(-1, 3)
     shown = (variance < SHOWN * LARGEST**2).all(axis=1)
-    errors, variance, rest = errors[shown], variance[shown], rest[shown]
+    errors, variance, rest, usual = errors[shown], variance[shown], rest[shown], np.ones(len(rest), bool)
     degree = max((d for d in range(MAX_DEGREE + 1) if MARKERS_PER_TERM * len(_powers(d)) <= len(rest)), default=None)
     if degree is None or len(rest) < LEAST_MARKERS:
-        return 0.0
+        return 0.0, usual
     shared = _polynomial(rest, degree)
-    own = np.concatenate([_beyond(shared, one) for one in errors.T])
+    own = np.stack([_beyond(shared, one) for one in errors.T], axis=1)
     spread = NORMAL_MAD * float(np.median(np.abs(own))) * np.sqrt(len(rest) / (len(rest) - shared.shape[1]))
-    return float(np.sqrt(max(spread**2 - float(np.mean(variance)), 0.0)))
+    usual[shown] = (own**2).sum(axis=1) < scipy.special.chdtri(3, BY_CHANCE / len(rest)) * spread**2
+    return float(np.sqrt(max(spread**2 - float(np.mean(variance)), 0.0))), usual
 
 
 def _polynomial(rest: Float[Array, "M 2"], degree: int) -> Float[Array, "M Q"]:
