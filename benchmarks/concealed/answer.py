@@ -11,8 +11,8 @@ from typing import Any, Literal
 
 from wingfit.records import Condition
 
-Group = Literal["null", "listed", "unlisted", "measurement", "pairs", "advice"]
-GROUPS: tuple[Group, ...] = ("null", "listed", "unlisted", "measurement", "pairs", "advice")
+Group = Literal["null", "listed", "unlisted", "smooth", "measurement", "pairs", "drift", "advice"]
+GROUPS: tuple[Group, ...] = ("null", "listed", "unlisted", "smooth", "measurement", "pairs", "drift", "advice")
 Side = Literal["physics", "measurement"]
 
 
@@ -65,6 +65,7 @@ class Answer:
         seed: random seed of the trial.
         attempt: number of the random draw that was recorded, from 0: the first that the plant could simulate.
         level: factor on the drawn noise. With seed, attempt and level the rig can be recorded again.
+        body: which wing or vehicle it is, a key of :data:`.rigs.GRIDS`.
     """
 
     trial: str
@@ -83,6 +84,7 @@ class Answer:
     seed: int
     attempt: int = 0
     level: float = 1.0
+    body: str = "robird"
 
     @property
     def names(self) -> frozenset[str]:

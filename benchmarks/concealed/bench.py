@@ -5,6 +5,7 @@ A bench simulates a plant with hidden effects and records it with simulated came
 
 from __future__ import annotations
 
+import copy
 from abc import ABC, abstractmethod
 from collections import OrderedDict
 from collections.abc import Hashable, Iterator, Mapping, Sequence
@@ -15,6 +16,7 @@ from typing import Generic, NamedTuple, TypeVar
 import numpy as np
 import numpy.typing as npt
 
+from benchmarks.concealed.drifting import STIFFNESS_DRIFT, drifting
 from benchmarks.concealed.plant.law import Concealed, Law, Parameters
 from benchmarks.concealed.plant.measurement.balance import FAULTS as BALANCE_FAULTS
 from benchmarks.concealed.plant.measurement.balance import Weighing, draw_weighing, silent, weigh
@@ -29,14 +31,14 @@ from benchmarks.concealed.plant.wing.simulate import simulate as simulate_wing
 from benchmarks.concealed.plant.wing_effects.catalogue import KINDS
 from benchmarks.concealed.plant.wing_effects.hidden import Effect, Hidden
 from benchmarks.concealed.plant.wing_effects.kind import Kind
+from benchmarks.concealed.rigs import VEHICLES, WINGS, as_described, size_of
 from benchmarks.concealed.strength import rms
-from benchmarks.concealed.trials import Build, name_of
+from benchmarks.concealed.trials import DRIFT, Build, name_of
 from wingfit.calibration.preparation import as_fitted
 from wingfit.calibration.spec import CalibrationSpec, model_for, wing_model
 from wingfit.records import Condition, Dataset, Recording, Vehicle, Wing
 from wingfit.sim.model import Model
-from wingfit.sim.virtual_rigs.balance import delfly
-from wingfit.sim.virtual_rigs.campaign import robird_wing
+from wingfit.sim.vehicle.terms import DRAG
 from wingfit.sim.wing.flexible_wing import FlexibleWing
 
 Array = npt.NDArray[np.float64]
@@ -50,6 +52,7 @@ SMALLEST, LARGEST = 0.02, 4.0  # limits of a strength, as multiples of the typic
 MOST = {"marker_swap": 1.9, "tip_loss": 2.0, "dynamic_stall": 1.4, "circulation_lag": 1.0}
 """Upper limits, as multiples of the typical strength, of laws that are only valid below LARGEST."""
 KEPT = 64  # simulated beats that are cached
+ROBIRD_MARKERS, DELFLY_MASS = 49, 17.4e-3  # for which settings of cameras and balance are drawn; kg
 
 
 class Made(NamedTuple):
@@ -73,7 +76,11 @@ class Bench(ABC, Generic[Motion, Quality]):
     @property
     @abstractmethod
     def rig(self) -> Wing | Vehicle:
-        """Description of the rig in the dataset, with estimates of the nominal model's parameters (genes)."""
+        """The rig as it is, with estimates of the nominal model's parameters (genes)."""
+
+    @abstractmethod
+    def described(self, rng: np.random.Generator) -> Wing | Vehicle:
+        """The description of the rig in the dataset, with the errors of a laboratory."""
 
     @property
     @abstractmethod
@@ -118,7 +125,7 @@ class Bench(ABC, Generic[Motion, Quality]):
     @cached_property
     def laws(self) -> dict[str, Law]:
         """All effects that can be hidden, physics and faults of the measurement, by name."""
-        return {**self.physics, **self.faults}
+        return {**self.physics, **self.faults, DRIFT: STIFFNESS_DRIFT}
 
     @cached_property
     def model(self) -> Model:
@@ -152,7 +159,12 @@ class Bench(ABC, Generic[Motion, Quality]):
     def genome(self, rng: np.random.Generator) -> dict[str, float]:
         """Random true values of the model's parameters by name; parameters that are not fitted keep their estimates."""
         drawn = {gene.name: float(gene.nominal * SPREAD ** rng.uniform(-1.0, 1.0)) for gene in self.model.genes}
-        return {g.name: drawn[g.name] if g.name in self.model.searched else g.nominal for g in self.model.genes}
+        return {g.name: drawn[g.name] if g.name in self.searched else g.nominal for g in self.model.genes}
+
+    @property
+    def searched(self) -> tuple[str, ...]:
+        """Names of the genes that a diagnosis fits to what is recorded."""
+        return self.model.searched
 
     def beat(self, condition: Condition, genome: Mapping[str, float], hidden: Concealed) -> Motion:
         """One beat by :meth:`simulated`, cached; measurement faults in ``hidden`` are ignored."""
@@ -174,7 +186,15 @@ class Bench(ABC, Generic[Motion, Quality]):
     ) -> Made:
         """Simulate and record one condition, with all physics and measurement faults in ``hidden``."""
         wrong = {name: values for name, values in hidden.items() if name in self.faults}
-        return self.shown(self.beat(condition, genome, hidden), condition, wrong, quality, rng)
+
+        def made(genes: Mapping[str, float], dice: np.random.Generator) -> Made:
+            return self.shown(self.beat(condition, genes, hidden), condition, wrong, quality, dice)
+
+        found = made(genome, copy.deepcopy(rng))
+        if DRIFT not in hidden:
+            return found
+        part = hidden[DRIFT]["strength"]
+        return found._replace(recording=drifting(lambda *of: made(*of).recording, genome, part, rng))
 
 
 class Filmset(NamedTuple):
@@ -189,8 +209,8 @@ class WingBench(Bench[Beat, Filmset]):
 
     @cached_property
     def rig(self) -> Wing:
-        """Description of a wing like the Robird's, with 49 markers."""
-        return robird_wing()
+        """The wing as it is; a laboratory describes it less exactly."""
+        return WINGS[self.build.body][0]
 
     def model_beside(self, genome: Mapping[str, float]) -> FlexibleWing:
         """The nominal model, whose search for a periodic motion starts from the motion with parameters ``genome``.
@@ -199,6 +219,10 @@ class WingBench(Bench[Beat, Filmset]):
         """
         found = wing_model(Dataset("nominal", self.rig, ()), CalibrationSpec(division=self.build.division))
         return replace(found, near=tuple(genome[gene.name] for gene in found.genes))
+
+    def described(self, rng: np.random.Generator) -> Wing:
+        """Return the wing as a laboratory describes it."""
+        return as_described(self.rig, rng)
 
     @property
     def faults(self) -> Mapping[str, Law]:
@@ -228,7 +252,11 @@ class WingBench(Bench[Beat, Filmset]):
 
     def quality(self, rng: np.random.Generator) -> Filmset:
         """Settings drawn from ``rng``: noise, gaps, poses of the cameras, and two to four beats."""
-        return Filmset(draw_filming(rng), draw_cameras(self.rig, rng))
+        filming = draw_filming(rng)
+        near = with_noise(filming, size_of(self.rig) * filming.noise.level)  # cameras are as near as the wing is small
+        return Filmset(
+            replace(near, lost=near.lost * len(self.rig.markers) // ROBIRD_MARKERS), draw_cameras(self.rig, rng)
+        )
 
     def quieter(self, quality: Filmset, level: float) -> Filmset:
         """Copy of the settings ``quality`` with the noise of the tracks multiplied by ``level``."""
@@ -237,7 +265,7 @@ class WingBench(Bench[Beat, Filmset]):
 
     def least(self, quality: Filmset) -> float:
         """Factor by which the noise must be multiplied to be LEAST_NOISE_M, that of the best trackers; at most 1."""
-        return min(1.0, LEAST_NOISE_M / quality.filming.noise.level)
+        return min(1.0, size_of(self.rig) * LEAST_NOISE_M / quality.filming.noise.level)
 
     def ideal(self, quality: Filmset) -> Filmset:
         """Copy of the settings ``quality`` without noise, and with all markers visible in all frames."""
@@ -280,8 +308,17 @@ class VehicleBench(Bench[Array, Weighing]):
 
     @cached_property
     def rig(self) -> Vehicle:
-        """Description of the vehicle of Armanini et al. (2016)."""
-        return delfly()
+        """The vehicle."""
+        return VEHICLES[self.build.body][0]
+
+    @property
+    def searched(self) -> tuple[str, ...]:
+        """Names of the genes that a diagnosis fits; as both axes are recorded, also those of drag."""
+        return (*self.model.searched, *DRAG)
+
+    def described(self, rng: np.random.Generator) -> Vehicle:  # noqa: ARG002
+        """Return the vehicle: its wings are weighed and its motion is measured."""
+        return self.rig
 
     @property
     def faults(self) -> Mapping[str, Law]:
@@ -294,8 +331,10 @@ class VehicleBench(Bench[Array, Weighing]):
         return VEHICLE_LAWS
 
     def quality(self, rng: np.random.Generator) -> Weighing:
-        """Settings of a balance drawn from ``rng``, which records BALANCE_BEATS beats."""
-        return replace(draw_weighing(rng), beats=BALANCE_BEATS)
+        """Settings of a balance drawn from ``rng``, for the vehicle's weight, which records BALANCE_BEATS beats."""
+        drawn, heavy = draw_weighing(rng), self.rig.mass / DELFLY_MASS
+        larger = {name: heavy * getattr(drawn, name) for name in ("sensor", "rattle", "wander")}
+        return replace(drawn, beats=BALANCE_BEATS, **larger)
 
     def quieter(self, quality: Weighing, level: float) -> Weighing:
         """Copy of the settings ``quality`` with noise, drift and variation between beats multiplied by ``level``."""

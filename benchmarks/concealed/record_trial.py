@@ -21,7 +21,7 @@ from benchmarks.concealed.bench import Bench, Made, bench_of
 from benchmarks.concealed.plant.law import Concealed
 from benchmarks.concealed.seal import read, seal
 from benchmarks.concealed.strength import Refit, rms, stacked, strength_for
-from benchmarks.concealed.trials import Trial, conditions, name_of
+from benchmarks.concealed.trials import DRIFT, Trial, conditions, name_of
 from wingfit.records import Condition, Dataset, Recording, load_dataset, save_dataset, wing_or_vehicle
 
 Array = npt.NDArray[np.float64]
@@ -155,7 +155,7 @@ def _made(trial: Trial, attempt: int) -> tuple[Dataset, Answer]:
     bare = Specimen(bench, trial.seed, attempt, bench.genome(rng), {})
     drawn = {name: bench.laws[name].draw(rng) for name in trial.hidden}
     strength = Strength.of(bare, fitted)
-    specimen = strength.set(bare, drawn, trial.target)
+    specimen = replace(bare, hidden=drawn) if DRIFT in drawn else strength.set(bare, drawn, trial.target)
     every = [specimen.made(number, condition) for number, (condition, _) in enumerate(planned)]
     held_out = tuple(one.recording.name for one, (_, held) in zip(every, planned, strict=True) if held)
     noise = {
@@ -171,7 +171,7 @@ def _made(trial: Trial, attempt: int) -> tuple[Dataset, Answer]:
         secrets=tuple(specimen.secret(name, fitted[0]) for name in specimen.hidden),
         genome=specimen.genome,
         target=trial.target,
-        strength=strength.final(specimen) / noise[False],
+        strength=0.0 if DRIFT in drawn else strength.final(specimen) / noise[False],
         strength_of_division=strength.division() / noise[False],
         noise=noise[False],
         noise_held_out=noise[True],
@@ -179,8 +179,10 @@ def _made(trial: Trial, attempt: int) -> tuple[Dataset, Answer]:
         seed=trial.seed,
         attempt=attempt,
         level=specimen.level,
+        body=trial.build.body,
     )
-    return Dataset(trial.name, bench.rig, tuple(one.recording for one in every), held_out), answer
+    described = bench.described(np.random.default_rng([trial.seed, attempt, 4]))
+    return Dataset(trial.name, described, tuple(one.recording for one in every), held_out), answer
 
 
 @dataclass(frozen=True, eq=False)
@@ -216,7 +218,7 @@ class Strength:
         coarse = replace(ideal, bench=bare.bench.coarse())
         recordings = ideal.fitted(fitted)
         plain = stacked(recordings) if coarse.bench is ideal.bench else stacked(coarse.fitted(fitted))
-        refit = Refit(bare.bench.model_beside(bare.genome), bare.genome, recordings)
+        refit = Refit(bare.bench.model_beside(bare.genome), bare.genome, recordings, bare.bench.searched)
         return cls(ideal, tuple(fitted), refit, coarse, plain)
 
     def change(self, hidden: Concealed) -> Array:

@@ -36,7 +36,8 @@ class Mark:
             refitted nominal model.
         span, chord, phase: distance of the reported from the true place, in spans, chords and degrees of the beat.
         covered, intervals: number of 90 % intervals that contain the true value, and number of intervals.
-        finer, division, plant: as in the answer.
+        finer, division, plant, body: as in the answer.
+        probability: of the verdict, according to the finding.
         seconds: duration of the diagnosis.
         remark: why there is no finding, or other notes for the list of failures.
     """
@@ -67,6 +68,8 @@ class Mark:
     finer: bool = False
     division: str = ""
     plant: str = ""
+    body: str = ""
+    probability: float = 0.0
     seconds: float = 0.0
     remark: str = ""
 
@@ -89,6 +92,7 @@ def blank(answer: Answer, verdict: str, remark: str = "") -> Mark:
         finer=answer.finer,
         division=answer.division,
         plant=answer.plant,
+        body=answer.body,
         remark=remark,
     )
 
@@ -109,7 +113,8 @@ def mark(finding: Finding, answer: Answer) -> Mark:
     named = finding.named if finding.verdict in NAMING else ()
     credited = set(named or top)
     plain = replace(blank(answer, finding.verdict), named=finding.named, top=top, alarm=finding.verdict != "adequate")
-    plain = replace(plain, seconds=finding.seconds, wrong=not set(named) <= answer.names)
+    plain = replace(plain, seconds=finding.seconds, probability=finding.probabilities.get(finding.verdict, 0.0))
+    plain = replace(plain, wrong=not set(named) <= answer.names)
     held_out, worse = _proof(finding, answer)
     covered, intervals = _covered(finding, answer)
     plain = replace(plain, held_out=held_out, worse=worse, covered=covered, intervals=intervals)

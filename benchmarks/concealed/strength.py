@@ -41,17 +41,20 @@ CLOSE = 0.2  # relative error of d at which the search for a strength ends
 class Refit:
     """Refits the nominal model to recordings, near the true values ``start`` of its genes.
 
-    Genes that the model does not search keep their true values.
+    ``searched``: names of the genes that are refitted, all that the model searches if empty; others keep their true
+    values.
     """
 
     model: Model
     start: Mapping[str, float]
     recordings: tuple[Recording, ...]
+    searched: tuple[str, ...] = ()
 
     @cached_property
     def genes(self) -> tuple[Gene, ...]:
         """The genes that are refitted, F of them."""
-        return tuple(gene for gene in self.model.genes if gene.name in self.model.searched)
+        searched = self.searched or self.model.searched
+        return tuple(gene for gene in self.model.genes if gene.name in searched)
 
     @cached_property
     def unit(self) -> Array:

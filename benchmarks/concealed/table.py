@@ -15,6 +15,7 @@ NORMAL_90 = 1.6448536269514722
 BINS = {2: (1.6, 2.45), 3: (2.45, 3.87), 5: (3.87, math.inf)}
 """Range of the measured strength d (misfit / noise) by intended d. Trials below the first are too weak to count."""
 WEAK = BINS[2][0]
+SURE = 0.95  # probability of a verdict that is given with certainty
 
 
 @dataclass(frozen=True)
@@ -119,6 +120,10 @@ class Table:
                 f"unlisted, {kind}: unnamed": rate(of_kind(unlisted, kind), lambda m: m.verdict == "unnamed")
                 for kind in kinds(unlisted)
             },
+            "smooth: wrong name": rate(seen(of(self.marks, "smooth")), lambda m: m.wrong),
+            "smooth: left unnamed": rate(seen(of(self.marks, "smooth")), lambda m: m.verdict == "unnamed"),
+            "drift: adequate": rate(of(self.marks, "drift"), lambda m: m.verdict == "adequate"),
+            "said with 95 %: right": rate(sure(self.marks), verdict_is_right),
             "measurement: right side": rate(seen(of(self.marks, "measurement")), lambda m: m.right_side),
             "pairs: both": rate(of(self.marks, "pairs"), lambda m: m.found == 2),
             "pairs: at least one": rate(of(self.marks, "pairs"), lambda m: (m.found or 0) >= 1),
@@ -185,6 +190,17 @@ class Table:
                 "detected_percent": rates["unlisted: detected"].percent,
                 "unnamed_percent": rates["unlisted: left unnamed"].percent,
             },
+            "smooth_unlisted": {
+                "n": rates["smooth: wrong name"].n,
+                "wrong_percent": rates["smooth: wrong name"].percent,
+                "unnamed_percent": rates["smooth: left unnamed"].percent,
+            },
+            "drift": {"n": rates["drift: adequate"].n, "adequate_percent": rates["drift: adequate"].percent},
+            "calibration": {
+                "said_95": rates["said with 95 %: right"].n,
+                "right_percent": rates["said with 95 %: right"].percent,
+            },
+            "by_plant": {name: figures_of(marks) for name, marks in by_plant(self.marks).items()},
             "measurement": {
                 "n": rates["measurement: right side"].n,
                 "right_percent": rates["measurement: right side"].percent,
@@ -245,9 +261,11 @@ def wrongs(one: Mark) -> str:
     mistakes = list[str]()
     if not one.truth:
         return "false alarm" if one.alarm else ""
-    if one.strength < WEAK and one.group != "pairs":
+    if one.strength < WEAK and one.group not in ("pairs", "drift"):
         pass
-    elif one.group == "unlisted":
+    elif one.group == "drift":
+        mistakes += ["adequate"] * (one.verdict == "adequate")
+    elif one.group in ("unlisted", "smooth"):
         mistakes += ["not detected" if one.verdict == "adequate" else "not left unnamed"] * (one.verdict != "unnamed")
     elif one.group == "measurement":
         mistakes += ["wrong side"] * (not one.right_side)
@@ -262,6 +280,51 @@ def wrongs(one: Mark) -> str:
 def of_rig(one: Mark) -> str:
     """Label of a trial's rig with the discretisations of model and plant: "wing 4 of 8x1" is model 4, plant 8x1."""
     return f"{one.rig} {one.division} of {one.plant}".removesuffix("  of ")
+
+
+def by_plant(marks: Iterable[Mark]) -> dict[str, list[Mark]]:
+    """Scores by what was simulated: which wing or vehicle, and the discretisations of model and plant."""
+    found = dict[str, list[Mark]]()
+    for one in sorted(marks, key=lambda m: (m.body, of_rig(m))):
+        found.setdefault(f"{one.body}: {of_rig(one)}", []).append(one)
+    return found
+
+
+def figures_of(marks: Sequence[Mark]) -> dict[str, float | int | None]:
+    """Figures of the trials of one plant, as in the JSON output; percentages are None where no trial counts."""
+    known, unlisted = seen(of(marks, "listed")), seen([*of(marks, "unlisted"), *of(marks, "smooth")])
+    return {
+        "n": len(marks),
+        "null": len(of(marks, "null")),
+        "false_alarms": rate(of(marks, "null"), lambda m: m.alarm).hits,
+        "top1_percent": rate(known, lambda m: m.first).percent,
+        "exact_percent": rate(known, lambda m: m.exact).percent,
+        "unlisted_unnamed_percent": rate(unlisted, lambda m: m.verdict == "unnamed").percent,
+        "wrong_name_percent": rate(marks, lambda m: m.wrong).percent,
+        "said_95": len([one for one in sure(marks) if verdict_is_right(one) is not None]),
+        "said_95_right_percent": rate(sure(marks), verdict_is_right).percent,
+    }
+
+
+def sure(marks: Iterable[Mark]) -> list[Mark]:
+    """Scores of the trials whose verdict was given with a probability of at least SURE."""
+    return [one for one in marks if one.probability >= SURE]
+
+
+def verdict_is_right(one: Mark) -> bool | None:
+    """Whether the verdict is true; None if what is hidden is too weak for a verdict to be expected.
+
+    A name is right if all that it names is hidden, and "unnamed" if the library lacks what is hidden.
+    """
+    if not one.truth:
+        return one.verdict == "adequate"
+    if one.group == "drift":
+        return one.verdict == "unnamed"
+    if one.strength < WEAK:
+        return None
+    if one.group in ("unlisted", "smooth"):
+        return one.verdict == "unnamed"
+    return one.verdict in ("named", "measurement fault", "ambiguous") and not one.wrong and bool(one.found)
 
 
 def right(one: Mark) -> bool | None:

@@ -11,27 +11,15 @@ from typing import Literal
 import numpy as np
 
 from benchmarks.concealed.answer import GROUPS, Group
+from benchmarks.concealed.rigs import GRIDS, ROBIRD, Grid
 from wingfit.records import Condition
 
 TARGETS = (2.0, 3.0, 5.0)
 AIR_PA, ROOM_K = 101_325.0, 293.15
 LAGS = tuple(math.radians(degrees) for degrees in (0.0, 3.0, 7.0))
-FREQUENCIES = (2.0, 2.5, 3.0, 3.5, 4.0)
+FREQUENCIES = ROBIRD.frequencies
 THIN_PA, THICK_PA = 1_000.0, 100_000.0
-SPEEDS = (3.5, 5.0, 6.0, 7.5, 8.5)
 INCIDENCE = math.radians(4.0)
-
-# Body pitch and flap frequency of the DelFly by airspeed (Armanini et al. 2016, Table 4): V m/s, pitch deg, f Hz.
-FLIGHT = (
-    (0.30, 83, 13.3),
-    (0.50, 74, 12.5),
-    (0.55, 70, 12.5),
-    (0.65, 71, 12.5),
-    (0.70, 62, 11.7),
-    (0.80, 65, 13.3),
-    (1.00, 45, 11.7),
-    (2.00, 31, 10.3),
-)
 
 
 @dataclass(frozen=True)
@@ -39,23 +27,31 @@ class Build:
     """A rig, with the discretisations of the diagnosed model and of the plant (the simulator that makes the data).
 
     ``division`` (model) and ``plant``: bodies of the wing, such as "8x4" (8 strips of 4 bodies); both "" for a vehicle.
-    ``without``: force terms omitted both from the vehicle's model and from its plant.
+    ``without``: force terms omitted both from the vehicle's model and from its plant. ``body``: which wing or vehicle.
     """
 
     rig: Literal["wing", "vehicle"]
     division: str = ""
     plant: str = ""
     without: tuple[str, ...] = ()
+    body: str = "robird"
+
+    @property
+    def grid(self) -> Grid:
+        """The conditions of its campaigns."""
+        return GRIDS[self.body]
 
 
 EQUAL, FINER = Build("wing", "4", "4"), Build("wing", "4", "8x1")
 BEYOND = Build("wing", "4", "10x1")  # a discretisation that no diagnosis refines to by itself
 ELEVEN, ELEVEN_FINER = Build("wing", "11", "11"), Build("wing", "11", "6x3")
 WHOLE, WHOLE_FINER = Build("wing", "24", "24"), Build("wing", "24", "8x4")
+BIRD, INSECT = Build("wing", "4", "9x1", body="bird"), Build("wing", "4", "8x1", body="insect")
 FLING = "clap_and_peel"
-VEHICLE, BARE = Build("vehicle"), Build("vehicle", without=(FLING,))
-VEHICLES = (VEHICLE, BARE)  # half of the models omit the fling, so that its absence does not reveal what is hidden
-SMALL = (FINER, EQUAL, BEYOND, FINER, EQUAL, BEYOND, EQUAL, FINER, BEYOND, EQUAL, FINER, EQUAL)
+VEHICLE, BARE = Build("vehicle", body="delfly"), Build("vehicle", without=(FLING,), body="delfly")
+PAIR = Build("vehicle", body="pair")
+VEHICLES = (VEHICLE, BARE, PAIR)  # some models omit the fling, so that its absence does not reveal what is hidden
+SMALL = (FINER, EQUAL, BIRD, BEYOND, INSECT, EQUAL, FINER, BIRD, BEYOND, EQUAL, INSECT, FINER)
 WINGS = (*SMALL, ELEVEN, *SMALL, *SMALL, ELEVEN_FINER, *SMALL)
 
 
@@ -97,6 +93,9 @@ LISTED_WING = (
 LISTED_VEHICLE = ("clap_and_peel", "induced_inflow", "circulation_lag", "stroke_amplitude")
 UNLISTED_WING = ("stop", "appendage", "tooth")
 UNLISTED_VEHICLE = ("stop_knock", "tail_in_wake")
+SMOOTH_WING = ("band", "brake", "closed_cells")
+SMOOTH_VEHICLE = ("inertial_camber",)
+DRIFT = "stiffness_drift"
 FAULTS_WING = (
     "camera_shift",
     "camera_rotation",
@@ -123,8 +122,12 @@ PAIRS_VEHICLE = (("clap_and_peel", "balance_offset"), ("stroke_amplitude", "bala
 OPEN_WING = ("phase_lag_error", "rolling_shutter", "hinge_tilt", "tracker_lag", "camera_rotation", "camera_desync")
 OPEN_VEHICLE = ("filter_delay", "clock_offset", "circulation_lag", "balance_tilt", "induced_inflow")
 
-COUNTS: dict[str, int] = {"null": 150, "listed": 15, "unlisted": 20, "measurement": 60, "pairs": 21, "advice": 20}
-QUICK: dict[str, int] = {"null": 6, "listed": 1, "unlisted": 1, "measurement": 4, "pairs": 2, "advice": 2}
+COUNTS: dict[str, int] = {
+    "null": 150, "listed": 15, "unlisted": 20, "smooth": 8, "measurement": 60, "pairs": 21, "drift": 20, "advice": 40,
+}  # fmt: skip
+QUICK: dict[str, int] = {
+    "null": 6, "listed": 1, "unlisted": 1, "smooth": 1, "measurement": 4, "pairs": 2, "drift": 1, "advice": 2,
+}  # fmt: skip
 SPARSE = 9  # every ninth null trial has as few recordings as an ambiguous one
 QUICK_KINDS = 3  # the quick sample contains every third of the listed and of the unlisted effects
 
@@ -145,8 +148,8 @@ def plan(seed: int, *, quick: bool = False, only: Sequence[str] = ()) -> tuple[T
 def _group(group: Group, n: int, thinned: int) -> Iterator[Trial]:
     """The trials of a group, still without name and seed.
 
-    ``n`` trials in all; for groups "listed" and "unlisted", ``n`` trials of every ``thinned``-th effect; for "listed"
-    also up to two (at most n // 7) of wings whose model has 24 bodies.
+    ``n`` trials in all; for groups "listed", "unlisted" and "smooth", ``n`` trials of every ``thinned``-th effect; for
+    "listed" also up to two (at most n // 7) of wings whose model has 24 bodies.
     """
     if group == "null":
         builds = [one for pair in zip((*SMALL, ELEVEN_FINER), cycle(VEHICLES), strict=False) for one in pair]
@@ -161,6 +164,11 @@ def _group(group: Group, n: int, thinned: int) -> Iterator[Trial]:
     elif group == "unlisted":
         yield from _each(group, UNLISTED_WING[::thinned], WINGS, n)
         yield from _each(group, UNLISTED_VEHICLE[::thinned], VEHICLES, n)
+    elif group == "smooth":
+        yield from _each(group, SMOOTH_WING[::thinned], WINGS, n)
+        yield from _each(group, SMOOTH_VEHICLE, VEHICLES, n)
+    elif group == "drift":
+        yield from (_draft(group, WINGS[k % len(WINGS)], (DRIFT,)) for k in range(n))
     elif group == "measurement":
         wing, vehicle = FAULTS_WING + LOOKALIKES_WING, 2 * (FAULTS_VEHICLE + LOOKALIKES_VEHICLE)
         yield from _mixed(group, [(name,) for name in wing], [(name,) for name in vehicle], n)
@@ -200,14 +208,14 @@ def conditions(trial: Trial, rng: np.random.Generator) -> list[tuple[Condition, 
     """(condition, held out) of each recording of ``trial``; the conditions are drawn from ``rng``."""
     if trial.build.rig == "vehicle":
         return _flights(trial, rng)
-    return _alike(rng) if trial.poor else _campaign(rng)
+    return _alike(trial.build.grid, rng) if trial.poor else _campaign(trial.build.grid, rng)
 
 
-def _campaign(rng: np.random.Generator) -> list[tuple[Condition, bool]]:
+def _campaign(grid: Grid, rng: np.random.Generator) -> list[tuple[Condition, bool]]:
     """Conditions of three recordings in the vacuum chamber and two in the wind tunnel, plus one held out of each."""
-    slow, fast = rng.permutation(FREQUENCIES[:2])[0], rng.permutation(FREQUENCIES[3:])[0]
-    lags, speeds = rng.permutation(LAGS), np.sort(rng.permutation(SPEEDS)[:3])
-    middle = FREQUENCIES[2]
+    slow, fast = rng.permutation(grid.frequencies[:2])[0], rng.permutation(grid.frequencies[3:])[0]
+    lags, speeds = rng.permutation(LAGS), np.sort(rng.permutation(grid.speeds)[:3])
+    middle = grid.frequencies[2]
     return [
         (chamber(THIN_PA, lags[0], slow), False),
         (chamber(THIN_PA, lags[1], fast), False),
@@ -219,21 +227,22 @@ def _campaign(rng: np.random.Generator) -> list[tuple[Condition, bool]]:
     ]
 
 
-def _alike(rng: np.random.Generator) -> list[tuple[Condition, bool]]:
+def _alike(grid: Grid, rng: np.random.Generator) -> list[tuple[Condition, bool]]:
     """Conditions that differ in phase lag only: two fitted recordings, and a held-out one."""
-    frequency, lags = float(rng.choice(FREQUENCIES[1:4])), rng.permutation(LAGS)
+    frequency, lags = float(rng.choice(grid.frequencies[1:4])), rng.permutation(LAGS)
     if rng.uniform() < 0.5:
         pressure = float(rng.choice([THIN_PA, THICK_PA]))
         return [(chamber(pressure, lag, frequency), k == 2) for k, lag in enumerate(lags)]
-    speed = float(rng.choice(SPEEDS))
+    speed = float(rng.choice(grid.speeds))
     return [(tunnel(lag, frequency, speed), k == 2) for k, lag in enumerate(lags)]
 
 
 def _flights(trial: Trial, rng: np.random.Generator) -> list[tuple[Condition, bool]]:
-    order = rng.permutation(len(FLIGHT))
+    flights = trial.build.grid.flights
+    order = rng.permutation(len(flights))
     chosen = np.sort(order[:2]) if trial.poor else np.sort(order[:5])
     held_out = order[2:3] if trial.poor else order[5:7]
-    return [(flight(k), False) for k in chosen] + [(flight(k), True) for k in held_out]
+    return [(flight(*flights[k]), False) for k in chosen] + [(flight(*flights[k]), True) for k in held_out]
 
 
 def any_condition(trial: Trial, known: Collection[str], rng: np.random.Generator) -> Condition:
@@ -242,12 +251,13 @@ def any_condition(trial: Trial, known: Collection[str], rng: np.random.Generator
 
 
 def _drawn(trial: Trial, rng: np.random.Generator) -> Condition:
+    grid = trial.build.grid
     if trial.build.rig == "vehicle":
-        return flight(int(rng.integers(len(FLIGHT))))
-    lag, frequency = float(rng.choice(LAGS)), float(rng.choice(FREQUENCIES))
+        return flight(*grid.flights[int(rng.integers(len(grid.flights)))])
+    lag, frequency = float(rng.choice(LAGS)), float(rng.choice(grid.frequencies))
     if rng.uniform() < 0.5:
         return chamber(float(rng.choice([THIN_PA, 1e4, THICK_PA])), lag, frequency)
-    return tunnel(lag, frequency, float(rng.choice(SPEEDS)))
+    return tunnel(lag, frequency, float(rng.choice(grid.speeds)))
 
 
 def chamber(pressure: float, lag: float, frequency: float) -> Condition:
@@ -260,10 +270,9 @@ def tunnel(lag: float, frequency: float, airspeed: float) -> Condition:
     return Condition(float(frequency), float(lag), AIR_PA, ROOM_K, float(airspeed), INCIDENCE)
 
 
-def flight(number: int) -> Condition:
-    """Flight condition of the DelFly in row ``number`` of FLIGHT."""
-    speed, pitch, frequency = FLIGHT[number]
-    return Condition(frequency, 0.0, AIR_PA, ROOM_K, speed, math.radians(pitch))
+def flight(speed: float, pitch_deg: float, frequency: float) -> Condition:
+    """Flight condition at ``speed`` (m/s), body pitch (deg) and flap ``frequency`` (Hz)."""
+    return Condition(frequency, 0.0, AIR_PA, ROOM_K, speed, math.radians(pitch_deg))
 
 
 def name_of(condition: Condition) -> str:
