@@ -57,7 +57,7 @@ def campaign(
 
     The plant omits the force terms ``without``. The same seed gives bit-identical data.
     """
-    bench = VehicleBench(Build("vehicle", without=without))
+    bench = VehicleBench(Build("vehicle", without=without, body="delfly"))
     balance = bench.quality(np.random.default_rng([seed, 2]))
     recordings = []
     for number, trial in enumerate(trials):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +14,7 @@ from benchmarks.concealed.plant.wing.rig import Rig
 
 Array = npt.NDArray[np.float64]
 
+FINER = 4
 _LENGTH = 0.1  # m: converts rotations to displacements when they are compared
 _WINDOW = 10  # beats that are combined in an extrapolation
 _ROUGH = 2e-4  # m: distance from periodicity below which the steps are refined
@@ -42,8 +43,18 @@ def settle(rig: Rig, rods: Callable[[int], Array], start: State, accuracy: Accur
 
     Returns rotations [n, N, 3, 3] and centres [n, N, 3] of the bodies over one beat, the distance from periodicity (m),
     and the number of beats that were integrated. ``rods``: :func:`.build.rod_table` as a function of the number of
-    steps. ArithmeticError if no periodic motion is found.
+    steps. ArithmeticError if no periodic motion is found, even with FINER times as many steps.
     """
+    try:
+        return _settled(rig, rods, start, accuracy)
+    except ArithmeticError:
+        finer = replace(accuracy, rough=FINER * accuracy.rough, steps=FINER * accuracy.steps)
+        return _settled(rig, rods, start, finer)
+
+
+def _settled(
+    rig: Rig, rods: Callable[[int], Array], start: State, accuracy: Accuracy
+) -> tuple[Array, Array, float, int]:
     state, spent = _let_in(rig, rods(accuracy.rough), start), 1
     for steps, near in ((accuracy.rough, _ROUGH), (accuracy.steps, accuracy.periodic)):
         search = _Search(rig, rods(steps), near)
