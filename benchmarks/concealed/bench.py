@@ -33,7 +33,7 @@ from benchmarks.concealed.plant.wing_effects.hidden import Effect, Hidden
 from benchmarks.concealed.plant.wing_effects.kind import Kind
 from benchmarks.concealed.rigs import VEHICLES, WINGS, as_described, size_of
 from benchmarks.concealed.strength import rms
-from benchmarks.concealed.trials import DRIFT, Build, name_of
+from benchmarks.concealed.trials import DRIFT, FLING, Build, name_of
 from wingfit.calibration.preparation import as_fitted
 from wingfit.calibration.spec import CalibrationSpec, model_for, wing_model
 from wingfit.records import Condition, Dataset, Recording, Vehicle, Wing
@@ -355,7 +355,8 @@ class VehicleBench(Bench[Array, Weighing]):
 
     def simulated(self, condition: Condition, genome: Mapping[str, float], hidden: Concealed) -> Array:
         """Forces [n, 2] along body x and z (N) over one beat."""
-        terms = tuple(term for term in PROPOSED if term not in self.build.without)
+        absent = self.build.without if self.rig.claps else (*self.build.without, FLING)
+        terms = tuple(term for term in PROPOSED if term not in absent)
         return simulate_vehicle(self.rig, genome, condition, hidden, terms=terms)
 
     def shown(
