@@ -116,7 +116,7 @@ def pair_vehicle() -> Vehicle:
     """Return a vehicle of 45 g with a single pair of wings, of 0.2 m each, that do not touch."""
     stations = (ChordStation(0.0, 0.070), ChordStation(0.09, 0.078), ChordStation(0.20, 0.036))
     flap = FourierFlap(0.10, (-0.95, 0.02), (0.0, 0.03))
-    pitch = FourierPitch(math.pi / 2, (0.05,), (-0.62, 0.04))
+    pitch = FourierPitch(math.pi / 2, (0.05, 0.0), (-0.62, 0.04))
     return Vehicle(
         name="pair", layout="pair", claps=False, stations=stations, wing_mass=0.9e-3, thickness=2e-5, pitch_axis=0.1,
         dihedral=0.05, mass=45e-3, motion=WingMotion(flap, pitch, root_pitch=math.pi / 2),
