@@ -130,9 +130,11 @@ def _indistinguishable(weights: HypothesisWeights) -> list[StartPoint]:
 def _look_alikes(state: SearchState, best: Refit) -> list[StartPoint]:
     """Return start points in which one effect of the hypothesis ``best`` is replaced by one known to look similar.
 
-    A score test does not see what the nominal genes, or a similar effect fitted first, have already absorbed.
+    A score test does not see what the nominal genes, or a similar effect fitted first, have already absorbed. Choices,
+    such as two signs, may explain the recordings equally, and exactly.
     """
-    if best.excess <= tolerated_excess(state.data, 0.0, 0.0):
+    exact = best.excess <= tolerated_excess(state.data, 0.0, 0.0)
+    if exact and not any(part.suspect.positions for part in best.trials):
         return []
     found = {trials[0].suspect.name: trials[0] for trials in state.trials if trials}
     starts = []

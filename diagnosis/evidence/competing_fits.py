@@ -13,7 +13,14 @@ from wingfit.calibration.series.beginnings import from_beginnings
 from wingfit.diagnosis.evidence.context import FitContext
 from wingfit.diagnosis.evidence.fit import FIT_ERRORS, SLOW_FACTOR, Fit, gauss_newton_fit, small_gain
 from wingfit.diagnosis.evidence.refit import Refit
-from wingfit.diagnosis.evidence.screen import Trial, off_units, size_columns, typical_units
+from wingfit.diagnosis.evidence.screen import (
+    Trial,
+    off_units,
+    positions_of,
+    size_columns,
+    typical_units,
+    units_at_position,
+)
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.verdict.weigh_hypotheses import tolerated_excess
 from wingfit.records.array_types import Array, Float
@@ -40,13 +47,16 @@ class StartPoint:
 def start_points(trial: Trial, others: Sequence[Trial] = (), refit: Refit | None = None) -> list[StartPoint]:
     """Return starts with the suspect of ``trial`` at typical size: at the trial's location, and at a typical one.
 
-    The suspects of ``others`` are in the model too, with the genes that were fitted in ``refit``.
+    Where its size is a choice, there is a start at each position instead. The suspects of ``others`` are in the model
+    too, with the genes that were fitted in ``refit``.
     """
     suspect = trial.suspect
     typical, size = typical_units(suspect), size_columns(suspect)
     own = trial.unit[0].copy()
     own[size] = typical[size]
     starts = [own, typical] if suspect.location_genes and not np.allclose(own, typical) else [own]
+    if suspect.positions:
+        starts = [units_at_position(suspect, *one) for one in positions_of(suspect)]
     fitted = dict(zip(refit.fit.problem.free, refit.fit.unit.tolist(), strict=True)) if refit else {}
     known = [fitted[gene.name] for one in others for gene in one.suspect.genes]
     return [StartPoint((*others, trial), np.array([*known, *start])) for start in starts]

@@ -20,12 +20,13 @@ from wingfit.diagnosis.evidence.fit import (
     gauss_newton_fit,
     with_measured_jacobian,
 )
-from wingfit.diagnosis.evidence.screen import Nuisance, Trial, off_units, size_columns
+from wingfit.diagnosis.evidence.screen import Nuisance, Trial, off_units, positions_of, size_columns, units_at_position
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.inference.gauss_newton import Quadratic
 from wingfit.inference.score_test import explained
 from wingfit.records.array_types import Array, Float, Mask
 from wingfit.records.series import belongs_to
+from wingfit.rigs.suspect import Suspect
 
 REFIT_STEPS = 6  # of a refit
 CONTINUED_STEPS = 10  # of a refit that is continued
@@ -160,8 +161,25 @@ def refit_with(context: FitContext, nominal: Fit, trials: Sequence[Trial], base:
                 first = _fit_added_genes(context, problem, *_fit_subset(context, problem, start, before, sizes))
                 fit = min((fit, first), key=lambda one: one.cost)
         fit = _no_worse(context, problem, before, added, fit)
+        if len(trials) == 1 and trials[0].suspect.positions:
+            fit = min((fit, *_at_positions(context, problem, before, trials[0].suspect)), key=lambda one: one.cost)
         return make_refit(data, fit, trials)
     return None
+
+
+def _at_positions(context: FitContext, problem: Problem, before: Fit, suspect: Suspect) -> Iterator[Fit]:
+    """Yield fits that begin at each position of a choice of ``suspect``, to which the other genes are fitted first.
+
+    A choice changes much at once, and from the genes of the fit ``before`` a fit may end between two positions.
+    """
+    for one in positions_of(suspect):
+        chosen = units_at_position(suspect, *one)
+        base = problem.base.replace({gene.name: gene.nominal for gene in suspect.genes} | dict([one]))
+        with suppress(*FIT_ERRORS):
+            *_, others = gauss_newton_fit(
+                context, replace(problem, free=before.problem.free, base=base), before.unit, REFIT_STEPS
+            )
+            yield broyden_fit(context, problem, np.concatenate([others.unit, chosen]), steps=REFIT_STEPS)
 
 
 def _no_worse(context: FitContext, problem: Problem, before: Fit, added: Sequence[Trial], fit: Fit) -> Fit:

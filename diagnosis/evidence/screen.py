@@ -93,6 +93,17 @@ def typical_units(suspect: Suspect) -> Float[Array, " E"]:
     return unit_at(list(suspect.genes), np.array([suspect.typical[gene.name] for gene in suspect.genes]))
 
 
+def positions_of(suspect: Suspect) -> list[tuple[str, float]]:
+    """Return each size gene of ``suspect`` that is a choice with each of its positions."""
+    return [(name, position) for name, positions in suspect.positions.items() for position in positions]
+
+
+def units_at_position(suspect: Suspect, name: str, position: float) -> Float[Array, " E"]:
+    """Return the genes [E] of ``suspect`` in unit coordinates, the size ``name`` at ``position`` and others off."""
+    values = [position if gene.name == name else gene.nominal for gene in suspect.genes]
+    return unit_at(list(suspect.genes), np.array(values))
+
+
 def size_columns(suspect: Suspect) -> list[int]:
     """Return the indices of the size genes among the genes of ``suspect``."""
     return [k for k, gene in enumerate(suspect.genes) if gene.name in suspect.size_genes]

@@ -22,6 +22,6 @@ EFFECT = effect_of_air(
     law="alpha' = (1 + part) alpha + angle",
     source="Armanini et al. (2016), Table 4 and Eqs. 18 and 19: the body pitch gives the direction of the stream",
     signature="mean forces change with the direction of the stream, most in a fast stream and least in hover",
-    confused_with=("balance_tilt", "airspeed_error", "tail_lift"),
+    confused_with=("axis_sign", "balance_tilt", "airspeed_error", "tail_lift"),
     vehicle=_vehicle,
 )

@@ -1,0 +1,103 @@
+"""Rigs of other size and layout, descriptions with the errors of a laboratory, and wings that drift."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import pytest
+
+from benchmarks.concealed.answer import Group
+from benchmarks.concealed.bench import VehicleBench, WingBench
+from benchmarks.concealed.drifting import drifting
+from benchmarks.concealed.rigs import BY_HAND, VEHICLES, WINGS, as_described, size_of
+from benchmarks.concealed.score import Mark
+from benchmarks.concealed.table import Table, figures_of, verdict_is_right
+from benchmarks.concealed.trials import Build, chamber, flight, tunnel
+from wingfit.records import Recording
+from wingfit.sim.model import Array
+from wingfit.sim.virtual_rigs.campaign import blank_recording
+
+
+@pytest.mark.parametrize("name", WINGS)
+def test_plant_and_model_of_every_wing_agree(name: str) -> None:
+    """Two simulators of the same bodies: the markers differ by far less than cameras see."""
+    wing, grid = WINGS[name]
+    bench = WingBench(Build("wing", "4", "4", body=name))
+    genome = {gene.name: gene.nominal for gene in bench.model.genes}
+    for condition in (chamber(1000.0, 0.05, grid.frequencies[2]), tunnel(0.05, grid.frequencies[1], grid.speeds[2])):
+        beat = bench.simulated(condition, genome, {})
+        times = np.arange(len(beat.tracks)) / len(beat.tracks) / condition.flap_frequency
+        values = np.roll(beat.tracks, -round(beat.crossing / (2 * np.pi) * len(times)), axis=0)
+        seen = Recording("a", "vacuum_chamber", condition, times, blank_recording(wing, condition).markers,
+                         values.reshape(len(times), -1))  # fmt: skip
+        found = bench.model.observe(np.array([list(genome.values())]), seen)
+        assert found.reasons == (None,)
+        assert np.sqrt(np.mean((found.channels[0] - seen.values) ** 2)) < 2e-4 * size_of(wing)
+
+
+@pytest.mark.parametrize("name", VEHICLES)
+def test_plant_and_model_of_every_vehicle_agree(name: str) -> None:
+    bench = VehicleBench(Build("vehicle", body=name))
+    genome = bench.genome(np.random.default_rng(1))
+    condition = flight(*VEHICLES[name][1].flights[2])
+    forces: Array = bench.simulated(condition, genome, {})
+    blank = Recording(
+        "a", "wind_tunnel", condition, np.arange(4) / 40.0, (), np.full((4, 2), np.nan), forces=("x", "z")
+    )
+    model = bench.model
+    own = np.asarray(model.beat([list(genome.values())], blank)[0])  # type: ignore[attr-defined]
+    apart = np.array(
+        [np.interp(np.arange(len(own)) / len(own), np.arange(len(forces)) / len(forces), c) for c in forces.T]
+    )
+    assert np.sqrt(np.mean((apart.T - own) ** 2)) < 0.02 * np.sqrt(np.mean(own**2))
+
+
+def test_a_description_has_the_errors_of_a_laboratory_in_proportion_to_the_wing() -> None:
+    for wing, _ in WINGS.values():
+        off = []
+        for seed in range(20):
+            described = as_described(wing, np.random.default_rng(seed))
+            places = [[m.position for m in one.markers] for one in (wing, described)]
+            off.append(float(np.std(np.array(places[0]) - np.array(places[1]))) / size_of(wing))
+            assert described.materials != wing.materials
+            assert described.stations == wing.stations
+        assert BY_HAND[0] * 0.8 < min(off) < max(off) < BY_HAND[1] * 1.2
+        assert np.mean(off) == pytest.approx(np.mean(BY_HAND), rel=0.2)
+
+
+def test_a_wing_drifts_between_its_stiffest_and_its_softest_motion() -> None:
+    blank = Recording("a", "vacuum_chamber", chamber(1e3, 0.0, 3.0), np.arange(41) / 30.0, ("m",), np.zeros((41, 3)))
+
+    def record(genome: Mapping[str, float], rng: np.random.Generator) -> Recording:
+        noise = 1e-3 * rng.standard_normal((41, 3))
+        return Recording("a", blank.rig, blank.condition, blank.times, ("m",), np.full((41, 3), genome["E_f"]) + noise)
+
+    found = drifting(record, {"E_f": 10.0, "L_a": 3.0}, 0.2, np.random.default_rng(5)).values
+    noise = 1e-3 * np.random.default_rng(5).standard_normal((41, 3))
+    np.testing.assert_allclose(found - noise, np.tile(np.linspace(11.0, 9.0, 41)[:, None], (1, 3)), atol=1e-12)
+
+
+def test_a_verdict_is_right_if_all_that_it_names_is_hidden() -> None:
+    def scored(group: Group, verdict: str, truth: tuple[str, ...], named: tuple[str, ...] = ()) -> Mark:
+        return Mark(
+            "t", group, "wing", truth, 3.0, 3.0, verdict, named, wrong=not set(named) <= set(truth), probability=0.97,
+            found=len(set(named) & set(truth)), alarm=verdict != "adequate", body="bird", division="4", plant="9x1",
+        )  # fmt: skip
+
+    marks = (
+        scored("null", "adequate", ()),
+        scored("listed", "named", ("a",), ("a",)),
+        scored("listed", "named", ("a",), ("b",)),
+        scored("pairs", "named", ("a", "b"), ("a",)),
+        scored("smooth", "unnamed", ("c",)),
+        scored("drift", "adequate", ("stiffness_drift",)),
+        scored("listed", "adequate", ("a",)),
+    )
+    assert [verdict_is_right(one) for one in marks] == [True, True, False, True, True, False, False]
+    table = Table(marks, (), 0, 1.0).as_json()
+    assert table["calibration"] == {"said_95": 7, "right_percent": 57.1}
+    assert table["drift"] == {"n": 1, "adequate_percent": 100.0}
+    assert table["smooth_unlisted"] == {"n": 1, "wrong_percent": 0.0, "unnamed_percent": 100.0}
+    assert table["by_plant"] == {"bird: wing 4 of 9x1": figures_of(marks)}
+    assert figures_of(marks)["wrong_name_percent"] == pytest.approx(14.3)
