@@ -92,7 +92,7 @@ class SearchState:
         return float(np.hypot(discretisation, self.marker_errors.shared if self.marker_errors else 0.0))
 
     def allow_for_marker_errors(self, nominal: Fit) -> bool:
-        """Measure errors of rest positions at the fit ``nominal``; and allow for them; return whether they matter."""
+        """Measure errors of rest positions at the fit ``nominal``, and allow for them; return whether they matter."""
         if self.data.kind != "tracks":
             return False
         found = find_marker_errors(beat_subject(self.subject), self.data, nominal)
@@ -100,6 +100,11 @@ class SearchState:
             return False
         self.marker_errors, data = found
         self.context = replace(self.context, data=data)
+        if self.initial_fit:
+            context, fit = self.initial_fit
+            slopes = data.without_errors(fit.jacobian.T).T
+            fit = replace(fit, coefficients=data.without_errors(fit.coefficients), jacobian=slopes)
+            self.initial_fit = replace(context, data=data), fit
         return True
 
     def add(self, refit: Refit | None) -> None:

@@ -34,6 +34,7 @@ PHASES = 72  # instants of a beat at which the wing's axes at a marker are compu
 LARGEST = 0.01  # m, standard deviation of a prior that hardly limits the errors
 SHOWN = 0.1  # of that prior's variance: an error of larger variance is not measured
 MARKERS_PER_TERM = 4  # least number of markers for each term of the polynomial that describes what neighbours share
+MAX_CELLS = 30_000_000  # of the matrix of changes, 240 MB: 150 markers in 10 recordings
 BY_CHANCE = 0.01  # probability that any marker's error is so much larger than the others'
 RIGID_TERMS = 3  # of the displacement of a rigid wing along an axis: constant, and linear in both directions
 LEAST_MARKERS = 8  # fewer do not show what neighbours share
@@ -92,8 +93,10 @@ def axes_at_markers(
     motion = (beat_fit.coefficients + beat_fit.of(residual)).reshape(len(places), 3, -1)[used]
     grid = beat_series(beat_fit, 0.0, PHASES)
     beat = np.einsum("np,mkp->nmk", grid, motion)
-    length = float(np.ptp(rest[:, 1]))
+    length = float(np.ptp(rest, axis=0).max()) if len(rest) else 0.0
     found = np.zeros((len(places), 3, 3, grid.shape[1]))
+    if not length > 0.0:
+        return found
     periodic = np.linalg.pinv(grid)
     for k, m in enumerate(np.flatnonzero(used)):
         along, across = np.einsum("am,nmk->ank", tangents(rest, k, length), beat)
@@ -123,12 +126,17 @@ def find_marker_errors(
     """Measure the errors of rest positions at the fit ``nominal``, and integrate them out of the coefficients.
 
     A marker with a far larger error than others is excepted: it slipped, or was confused with another. None where the
-    errors are negligible compared with the noise of a sample, or where few markers show nothing.
+    errors are negligible compared with the noise of a sample, where few markers show nothing, or where there are too
+    many for the memory.
     """
     markers = tuple(dict.fromkeys(name for one in data.beat_recordings for name in one.markers))
-    changes = changes_by_errors(subject, data, nominal.residuals, markers)
     places = {p.name: (p.x, p.y) for one in data.beat_recordings for p in subject.channel_locations(one)}
     rest = np.array([places[name] for name in markers], float)
+    if len(markers) < LEAST_MARKERS or not np.ptp(rest, axis=0).max() > 0.0:
+        return None
+    if 3 * len(markers) * len(data.scale) > MAX_CELLS:
+        return None
+    changes = changes_by_errors(subject, data, nominal.residuals, markers)
     sd, usual = _standard_deviation(data, nominal, changes, rest)
     if sd < data.policy.negligible * data.noise:
         return None

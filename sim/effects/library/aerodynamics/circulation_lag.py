@@ -79,11 +79,22 @@ EFFECT = effect_of_air(
             "share", "1", 0.0, 1.5, 1.0, "fraction of Wagner's deficit of circulation; 1 for a thin wing in plane flow"
         ),
     ),
-    shape=(Parameter("rate", "1", 0.3, 3.0, 1.0, "rate of both states, relative to plane flow", scale="log"),),
+    shape=(
+        Parameter(
+            "rate",
+            "1",
+            0.3,
+            5.0,
+            1.0,
+            "rate of both states, relative to plane flow; above 1 of a finite wing",
+            scale="log",
+        ),
+    ),
     memory="two lagging circulations at each station of a vehicle's wing or strip of a flexible wing",
     law="x_i' = rate b_i (2 V / c) (Gamma_0 - x_i),     i = 1, 2\nGamma = Gamma_0 - share sum_i a_i (Gamma_0 - x_i)",
-    source="Wagner (1925), in the approximation of R. T. Jones (1940), NACA Report 681, which for a steady oscillation "
-    "is the function of Theodorsen (1935), NACA Report 496; Leishman (2006), ch. 8: the same with internal states",
+    source="Wagner (1925), in the approximation of R. T. Jones (1940), NACA Report 681, which has finite wings too and "
+    "for a steady oscillation is the function of Theodorsen (1935), NACA Report 496; Leishman (2006), ch. 8: the same "
+    "with internal states",
     signature="lift is late and varies less, and its delay is the same number of half chords travelled at any flap "
     "frequency",
     confused_with=("dynamic_stall", "wake_capture", "filter_delay", "clock_offset"),

@@ -9,7 +9,7 @@ import pytest
 from tests.oracles.unsteady_airfoil import theodorsen
 from tests.sim.effects.moved import Motion, Moved
 from tests.sim.kernels.marching import CHORD
-from wingfit.sim.effects.library.aerodynamics.circulation_lag import wagner
+from wingfit.sim.effects.library.aerodynamics.circulation_lag import EFFECT, wagner
 from wingfit.sim.kernels.arrays import CIRCULATION, LIFT_SLOPE
 
 Array = npt.NDArray[np.float64]
@@ -34,6 +34,19 @@ def test_wagner_is_that_of_the_exact_theory() -> None:
     np.testing.assert_allclose(wagner(s), (s + 2) / (s + 4), atol=0.03)
     assert wagner(0.0) == pytest.approx(0.5)
     assert wagner(1e3) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(("deficit", "fading"), [(0.283, 0.540), (0.361, 0.381)], ids=["aspect ratio 3", "6"])
+def test_a_finite_wing_is_a_smaller_and_faster_lag(deficit: float, fading: float) -> None:
+    """R. T. Jones (1940), NACA Report 681: 1 - 0.283 exp(-0.540 s), 1 - 0.361 exp(-0.381 s), relative to the end."""
+    s = np.linspace(0.0, 20.0, 200)
+    share, rate = next(one for one in EFFECT.size if one.name == "share"), EFFECT.shape[0]
+    errors = [
+        np.abs(a * (1 - wagner(b * s)) - deficit * np.exp(-fading * s)).max()
+        for a in np.linspace(share.lower, share.upper, 76)
+        for b in np.geomspace(rate.lower, rate.upper, 60)
+    ]
+    assert min(errors) < 0.03
 
 
 def test_a_heaving_section_has_theodorsens_lift() -> None:
