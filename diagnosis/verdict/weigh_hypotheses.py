@@ -12,9 +12,9 @@ may have (:func:`tolerated_excess`), likewise divided; nu the effective number o
 compete with the effects: *no physics is missing*, and *physics outside the library*, which is assumed to explain all
 but a fraction of the residual (`Policy.unknown_residual`) at the cost of the genes of a new law. If noise does not
 explain the residual of the nominal model, only hypotheses that are worth their genes compete with the second. Those
-that are hardly worth them are possible if they explain most of the residual and their sizes cannot all be zero. With a
-beat, a hypothesis that leaves too much is less probable (`Policy.most_left`): almost any smooth omission is imitated in
-part by some effect.
+that are hardly worth them are possible if they explain most of the residual, their sizes cannot all be zero, and there
+are recordings to predict. With a beat, a hypothesis that leaves too much is less probable (`Policy.most_left`): almost
+any smooth omission is imitated in part by some effect.
 """
 
 from __future__ import annotations
@@ -72,10 +72,11 @@ def weigh(
     drift_alone = only_drifts(data, nominal, floor)
     if nominal_refuted(data, nominal.excess, floor, error) or (drifts(data) and not drift_alone):
         # A hypothesis that leaves the misfit as it was explains nothing; nor does the nominal model. With few
-        # recordings, one that explains most of the misfit may have little evidence, if its size is not zero.
+        # recordings, one that explains most of the misfit may have little evidence, if its size is not zero; with a
+        # single one, nothing shows that it predicts.
         possible = evidence - evidence[0] > policy.least_evidence
         for k in np.flatnonzero(~possible & (excess < policy.drift_left * excess[0])):
-            possible[k] = not absent(data, hypotheses[k])
+            possible[k] = hypotheses[k].predicted is not None and not absent(data, hypotheses[k])
     if drift_alone:
         possible &= [_explains_drift(data, nominal, one) for one in hypotheses]
     imitates = _imitation(data, hypotheses, floor, error)
