@@ -9,6 +9,7 @@ from wingfit.records.array_types import Array, Float
 from wingfit.records.dataset import STANDARD_GRAVITY, Recording
 from wingfit.records.errors import Faults
 from wingfit.records.files.flap_frequency import check_frequency
+from wingfit.records.files.track_axes import check_axes
 from wingfit.records.series_checks import SHOWN, Locate, check_times
 from wingfit.records.vehicle import Vehicle
 from wingfit.records.wing import Wing
@@ -45,6 +46,8 @@ def check_numbers(recording: Recording, rig: Wing | Vehicle, where: str, at: Loc
             _check_clock(recording, where, at, faults)
     if faults.count == known:
         check_frequency(recording, where, faults)
+        if isinstance(rig, Wing):
+            check_axes(recording, rig, where, faults)
 
 
 def check_frames(frames: int, where: str, faults: Faults, what: str = "frames") -> None:
