@@ -45,10 +45,14 @@ NORMAL_MAD = 1.4826  # standard deviation divided by median absolute deviation, 
 
 @dataclass(frozen=True)
 class MarkerErrors:
-    """Errors of the rest positions of ``markers``, with the standard deviation ``sd`` (m) along each axis."""
+    """Errors of the rest positions of ``markers``, with the standard deviation ``sd`` (m) along each axis.
+
+    ``usual`` [M]: False for markers with a far larger error, which is not estimated.
+    """
 
     markers: tuple[str, ...]
     sd: float
+    usual: Bool[Mask, " M"]
 
     @property
     def shared(self) -> float:
@@ -62,7 +66,8 @@ class MarkerErrors:
         """
         if data.errors is None:
             return np.zeros((len(self.markers), 3))
-        return self.sd * data.errors.estimates(fit.coefficients / data.scale).reshape(-1, 3)
+        found = self.sd * data.errors.estimates(fit.coefficients / data.scale).reshape(-1, 3)
+        return np.asarray(found * self.usual[:, None])
 
     def corrected(
         self, subject: BeatSubject, data: WhitenedData, residuals: Sequence[Array], errors: Float[Array, "M 3"]
@@ -141,7 +146,7 @@ def find_marker_errors(
     if sd < data.policy.negligible * data.noise:
         return None
     own = _own(changes * np.repeat(usual, 3), rest)
-    return MarkerErrors(markers, sd), data.allowing(Marginal.of(own * (sd / data.scale[:, None])))
+    return MarkerErrors(markers, sd, usual), data.allowing(Marginal.of(own * (sd / data.scale[:, None])))
 
 
 def _own(changes: Float[Array, "D K"], rest: Float[Array, "M 2"]) -> Float[Array, "D K"]:
