@@ -250,8 +250,13 @@ class _Worker:
             return
         self._process.kill()
         self._process.join()
+        # Another thread (multiprocessing.active_children) may just be collecting the exit code, and then join returns.
+        patience = time.monotonic() + COLLECTED_SECONDS
+        while self._process.exitcode is None and time.monotonic() < patience:
+            time.sleep(0.001)
         self.last_exit = f"exit code {self._process.exitcode}"
-        self._process.close()
+        if self._process.exitcode is not None:
+            self._process.close()
         self._connection.close()
         self._process = self._connection = None
 
