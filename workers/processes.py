@@ -31,6 +31,7 @@ from wingfit.workers.running_evaluator import Interrupted, RunningEvaluator
 from wingfit.workers.share import PROBLEMS_KEPT, Task, child_environment, lower_priority
 from wingfit.workers.watch import ATTEMPTS, START_SECONDS, STARTS, Expectation, Standing, Tally
 
+COLLECTED_SECONDS = 1.0  # after which an exit code that another thread collects is not waited for
 LOG = logging.getLogger("wingfit.workers")
 LOOK_SECONDS = 0.5
 Answer = tuple[Literal["need problem", "begun", "done", "raised"], Any]
