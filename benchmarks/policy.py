@@ -32,7 +32,7 @@ FAINT = 0.35  # of the concealed strength: so weak that verdicts are close to th
 FAINT_NAME = "-faint"
 BLIND = replace(POLICY, negligible=1e3)
 """No residual is large enough for this policy: what it changes shows that a policy reaches the diagnosis."""
-RIGHT = {"null": "adequate", "unlisted": "unnamed"}
+RIGHT = {"null": "adequate", "unlisted": "unnamed", "smooth": "unnamed", "drift": "unnamed"}
 
 
 class Said(NamedTuple):

@@ -59,7 +59,7 @@ def run_search(state: SearchState, free: tuple[str, ...]) -> Steps:
     state.judge_noise(fit)
     if state.allow_for_marker_errors(fit):
         yield 0.24, "fitting the nominal model, allowing for errors of the markers' rest positions"
-        *_, fit = fit_nominal(state.context, free, {**spec.calibration.fixed, **fit.values})
+        fit = state.fitted_again(fit)
     yield 0.25, "comparing with a finer discretisation"
     suspects = select_suspects(state.subject, spec)
     for fraction, stage in _search_coarse_first(state, fit, suspects):

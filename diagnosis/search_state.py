@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.problem import Evaluation, Problem
 from wingfit.diagnosis.evidence.context import FitContext
-from wingfit.diagnosis.evidence.fit import COST_TOLERANCE, Fit
+from wingfit.diagnosis.evidence.fit import COST_TOLERANCE, FIT_ERRORS, Fit, gauss_newton_fit
 from wingfit.diagnosis.evidence.marker_errors import MarkerErrors, find_marker_errors
 from wingfit.diagnosis.evidence.nominal import Nominal
 from wingfit.diagnosis.evidence.refit import Refit, is_in_position
@@ -20,6 +21,8 @@ from wingfit.diagnosis.subject import Subject, beat_subject
 from wingfit.diagnosis.verdict.noise_doubt import judged_noise
 from wingfit.diagnosis.verdict.weigh_hypotheses import HypothesisWeights, tolerated_excess
 from wingfit.records.array_types import ArrayLike
+
+AGAIN_STEPS = 20  # of a nominal fit that is continued
 
 
 @dataclass
@@ -102,10 +105,15 @@ class SearchState:
         self.context = replace(self.context, data=data)
         if self.initial_fit:
             context, fit = self.initial_fit
-            slopes = data.without_errors(fit.jacobian.T).T
-            fit = replace(fit, coefficients=data.without_errors(fit.coefficients), jacobian=slopes)
-            self.initial_fit = replace(context, data=data), fit
+            self.initial_fit = replace(context, data=data), _without_errors(data, fit)
         return True
+
+    def fitted_again(self, nominal: Fit) -> Fit:
+        """Return the fit ``nominal`` continued with the present data, or as it was where that cannot be simulated."""
+        with suppress(*FIT_ERRORS):
+            *_, found = gauss_newton_fit(self.context, nominal.problem, nominal.unit, AGAIN_STEPS)
+            return found
+        return _without_errors(self.data, nominal)
 
     def add(self, refit: Refit | None) -> None:
         """Store ``refit`` unless it is None or has the size of a choice between its positions.
@@ -136,6 +144,12 @@ class SearchState:
         """Whether the best refit explains as much as a law outside the library would (`Policy.unknown_residual`)."""
         least = min((one.excess for one in self.refits), default=np.inf)
         return least <= self.data.policy.unknown_residual**2 * self.fitted_nominal.refit.excess
+
+
+def _without_errors(data: WhitenedData, fit: Fit) -> Fit:
+    """Return ``fit``, whose coefficients contain errors of the description, as that of ``data`` without them."""
+    slopes = data.without_errors(fit.jacobian.T).T
+    return replace(fit, coefficients=data.without_errors(fit.coefficients), jacobian=slopes)
 
 
 @dataclass

@@ -42,6 +42,15 @@ class Marginal:
         less = 1.0 - 1.0 / np.sqrt(1.0 + self.gain**2)
         return np.asarray(residuals - ((residuals @ self.basis) * less) @ self.basis.T)
 
+    def restore(self, whitened: Float[Array, "*B N"]) -> Float[Array, "*B N"]:
+        """Return the residuals [..., N] of which :meth:`whiten` made ``whitened``."""
+        more = np.sqrt(1.0 + self.gain**2) - 1.0
+        return np.asarray(whitened + ((whitened @ self.basis) * more) @ self.basis.T)
+
+    def of_part(self, part: slice) -> Marginal:
+        """Return the same parameters, integrated out of a ``part`` of the residuals alone."""
+        return Marginal.of(self.basis[part] * self.gain)
+
     def estimates(self, whitened: Float[Array, " N"]) -> Float[Array, " K"]:
         """Return the posterior mean [K] of the parameters from ``whitened`` [N], which :meth:`whiten` returned."""
         return np.asarray((whitened @ self.basis * (self.gain / np.sqrt(1.0 + self.gain**2))) @ self.mix)

@@ -206,7 +206,9 @@ class Table:
                 "right_percent": rates["measurement: right side"].percent,
             },
             "wrong_name_percent": rates["all: wrong name"].percent,
-            "heldout_over_floor_median": median(m.held_out for m in self.hiding if m.group != "unlisted"),
+            "heldout_over_floor_median": median(
+                m.held_out for m in self.hiding if m.group not in ("unlisted", "smooth", "drift")
+            ),
             "heldout_worse_percent": rates["held out: worse"].percent,
             "coverage_percent": self.coverage.percent,
             "place": {
@@ -237,7 +239,9 @@ class Table:
             **{name: str(found) for name, found in self.rates.items() if found.n},
             "held-out misfit over floor": f"median {figures['heldout_over_floor_median']}",
             "place": f"medians {place['span_R']} R, {place['chord_c']} c, {place['phase_deg']} degrees",
-            f"too weak to count (d < {WEAK})": str(len(self.hiding) - len(seen(self.hiding))),
+            f"too weak to count (d < {WEAK})": str(
+                len([m for m in self.hiding if m.group != "drift" and m.strength < WEAK])
+            ),
             "advice: ambiguous at first": f"{len(self.advised)} of {self.advice_trials} trials",
             "failures": str(len(figures["failures"])),
             "seconds of a trial": f"median {median(m.seconds for m in self.marks)}",

@@ -47,7 +47,7 @@ class StartPoint:
 def start_points(trial: Trial, others: Sequence[Trial] = (), refit: Refit | None = None) -> list[StartPoint]:
     """Return starts with the suspect of ``trial`` at typical size: at the trial's location, and at a typical one.
 
-    Where its size is a choice, there is a start at each position instead. The suspects of ``others`` are in the model
+    Where its size is a choice, there is also a start at each position. The suspects of ``others`` are in the model
     too, with the genes that were fitted in ``refit``.
     """
     suspect = trial.suspect
@@ -56,7 +56,7 @@ def start_points(trial: Trial, others: Sequence[Trial] = (), refit: Refit | None
     own[size] = typical[size]
     starts = [own, typical] if suspect.location_genes and not np.allclose(own, typical) else [own]
     if suspect.positions:
-        starts = [units_at_position(suspect, *one) for one in positions_of(suspect)]
+        starts = [own, *(units_at_position(trial, *one) for one in positions_of(suspect))]
     fitted = dict(zip(refit.fit.problem.free, refit.fit.unit.tolist(), strict=True)) if refit else {}
     known = [fitted[gene.name] for one in others for gene in one.suspect.genes]
     return [StartPoint((*others, trial), np.array([*known, *start])) for start in starts]

@@ -34,10 +34,10 @@ PHASES = 72  # instants of a beat at which the wing's axes at a marker are compu
 LARGEST = 0.01  # m, standard deviation of a prior that hardly limits the errors
 SHOWN = 0.1  # of that prior's variance: an error of larger variance is not measured
 MARKERS_PER_TERM = 4  # least number of markers for each term of the polynomial that describes what neighbours share
-MAX_CELLS = 30_000_000  # of the matrix of changes, 240 MB: 150 markers in 10 recordings
+MAX_CELLS = 60_000_000  # of the matrix of changes, 480 MB: 49 markers in 140 recordings, 180 in 10
 BY_CHANCE = 0.01  # probability that any marker's error is so much larger than the others'
 RIGID_TERMS = 3  # of the displacement of a rigid wing along an axis: constant, and linear in both directions
-LEAST_MARKERS = 8  # fewer do not show what neighbours share
+LEAST_MARKERS = 12  # with fewer, the polynomial does not have what a rigid wing shares
 MAX_DEGREE = 3  # of that polynomial in both directions of the wing
 ROBUST_STEPS, HUBER = 20, 1.5  # of its fit, and beyond how many standard deviations an error counts less
 NORMAL_MAD = 1.4826  # standard deviation divided by median absolute deviation, of a normal distribution
@@ -57,7 +57,7 @@ class MarkerErrors:
     @property
     def shared(self) -> float:
         """Root mean square (m) along an axis of what a rigid motion of the wing shares with the errors."""
-        return self.sd * float(np.sqrt(RIGID_TERMS / len(self.markers)))
+        return self.sd * float(np.sqrt(RIGID_TERMS / self.usual.sum()))
 
     def estimates(self, data: WhitenedData, fit: Fit) -> Float[Array, "M 3"]:
         """Return the described minus the true rest position (m, axes of the wing) of each marker, estimated at ``fit``.
@@ -139,22 +139,32 @@ def find_marker_errors(
     rest = np.array([places[name] for name in markers], float)
     if len(markers) < LEAST_MARKERS or not np.ptp(rest, axis=0).max() > 0.0:
         return None
-    if 3 * len(markers) * len(data.scale) > MAX_CELLS:
+    if too_many(data):
         return None
     changes = changes_by_errors(subject, data, nominal.residuals, markers)
     sd, usual = _standard_deviation(data, nominal, changes, rest)
     if sd < data.policy.negligible * data.noise:
         return None
-    own = _own(changes * np.repeat(usual, 3), rest)
+    own = _own(changes, rest, usual)
     return MarkerErrors(markers, sd, usual), data.allowing(Marginal.of(own * (sd / data.scale[:, None])))
 
 
-def _own(changes: Float[Array, "D K"], rest: Float[Array, "M 2"]) -> Float[Array, "D K"]:
-    """Return ``changes`` without what moves all markers as a rigid wing: a fault, not errors of single markers."""
-    rigid, _ = np.linalg.qr(_polynomial(rest, 1))
-    by_marker = changes.reshape(len(changes), -1, 3)
-    shared = np.einsum("mq,nq,dna->dma", rigid, rigid, by_marker, optimize=True)
-    return np.asarray((by_marker - shared).reshape(changes.shape))
+def too_many(data: WhitenedData) -> bool:
+    """Return whether the markers are too many for the memory, so that their errors are not measured."""
+    markers = {name for one in data.beat_recordings for name in one.markers}
+    return 3 * len(markers) * len(data.scale) > MAX_CELLS
+
+
+def _own(changes: Float[Array, "D K"], rest: Float[Array, "M 2"], usual: Bool[Mask, " M"]) -> Float[Array, "D K"]:
+    """Return ``changes`` without what moves the ``usual`` markers as a rigid wing: a fault, not errors of single ones.
+
+    Zero for the other markers.
+    """
+    rigid, _ = np.linalg.qr(_polynomial(rest[usual], 1))
+    by_marker = changes.reshape(len(changes), -1, 3)[:, usual]
+    found = np.zeros((len(changes), len(rest), 3))
+    found[:, usual] = by_marker - np.einsum("mq,nq,dna->dma", rigid, rigid, by_marker, optimize=True)
+    return np.asarray(found.reshape(changes.shape))
 
 
 def _standard_deviation(

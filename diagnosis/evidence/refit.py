@@ -26,7 +26,6 @@ from wingfit.inference.gauss_newton import Quadratic
 from wingfit.inference.score_test import explained
 from wingfit.records.array_types import Array, Float, Mask
 from wingfit.records.series import belongs_to
-from wingfit.rigs.suspect import Suspect
 
 REFIT_STEPS = 6  # of a refit
 CONTINUED_STEPS = 10  # of a refit that is continued
@@ -162,19 +161,24 @@ def refit_with(context: FitContext, nominal: Fit, trials: Sequence[Trial], base:
                 fit = min((fit, first), key=lambda one: one.cost)
         fit = _no_worse(context, problem, before, added, fit)
         if len(trials) == 1 and trials[0].suspect.positions:
-            fit = min((fit, *_at_positions(context, problem, before, trials[0].suspect)), key=lambda one: one.cost)
+            every = [
+                make_refit(data, one, trials) for one in (fit, *_at_positions(context, problem, before, trials[0]))
+            ]
+            return min(every, key=lambda one: (not is_in_position(one), one.fit.cost))
         return make_refit(data, fit, trials)
     return None
 
 
-def _at_positions(context: FitContext, problem: Problem, before: Fit, suspect: Suspect) -> Iterator[Fit]:
-    """Yield fits that begin at each position of a choice of ``suspect``, to which the other genes are fitted first.
+def _at_positions(context: FitContext, problem: Problem, before: Fit, trial: Trial) -> Iterator[Fit]:
+    """Yield fits that begin at each position of a choice of ``trial``, to which the nominal genes are fitted first.
 
     A choice changes much at once, and from the genes of the fit ``before`` a fit may end between two positions.
     """
-    for one in positions_of(suspect):
-        chosen = units_at_position(suspect, *one)
-        base = problem.base.replace({gene.name: gene.nominal for gene in suspect.genes} | dict([one]))
+    genes = list(trial.suspect.genes)
+    for one in positions_of(trial.suspect):
+        chosen = units_at_position(trial, *one)
+        values = values_at(genes, chosen[None])[0].tolist()
+        base = problem.base.replace(dict(zip((gene.name for gene in genes), values, strict=True)))
         with suppress(*FIT_ERRORS):
             *_, others = gauss_newton_fit(
                 context, replace(problem, free=before.problem.free, base=base), before.unit, REFIT_STEPS

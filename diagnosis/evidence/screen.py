@@ -98,10 +98,17 @@ def positions_of(suspect: Suspect) -> list[tuple[str, float]]:
     return [(name, position) for name, positions in suspect.positions.items() for position in positions]
 
 
-def units_at_position(suspect: Suspect, name: str, position: float) -> Float[Array, " E"]:
-    """Return the genes [E] of ``suspect`` in unit coordinates, the size ``name`` at ``position`` and others off."""
+def units_at_position(trial: Trial, name: str, position: float) -> Float[Array, " E"]:
+    """Return the genes [E] of the suspect of ``trial`` in unit coordinates, with its size ``name`` at ``position``.
+
+    Other sizes are off, and the shape is that of the trial.
+    """
+    suspect = trial.suspect
     values = [position if gene.name == name else gene.nominal for gene in suspect.genes]
-    return unit_at(list(suspect.genes), np.array(values))
+    found = unit_at(list(suspect.genes), np.array(values))
+    shape = [k for k in range(len(found)) if k not in size_columns(suspect)]
+    found[shape] = trial.unit[0][shape]
+    return np.asarray(found)
 
 
 def size_columns(suspect: Suspect) -> list[int]:

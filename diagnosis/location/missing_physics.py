@@ -106,13 +106,20 @@ def _plausible(loads: Sequence[MissingLoad], motions: Sequence[StationMotion]) -
 def _case(data: WhitenedData, nominal: Refit, r: int, probed: Probed) -> Case:
     beat_fit, part, fit = data.beat_fits[r], data.recording_slices[r], nominal.fit
     responses = beat_fit.of(np.moveaxis(np.nan_to_num(probed.responses), -1, 0))[:, beat_fit.used]
-    scale, whole = data.scale[part], np.zeros((len(responses), len(data.scale)))
-    whole[:, part] = responses.reshape(len(responses), -1)
+    residual, slopes = fit.coefficients / data.scale, fit.jacobian.T / data.scale
+    rows = (residual[part], responses.reshape(len(responses), -1) / data.scale[part], slopes[:, part])
+    if data.errors is not None:  # another recording has another load, so each is considered alone
+        alone = data.errors.of_part(part)
+        rows = (
+            alone.whiten(data.errors.restore(residual)[part]),
+            alone.whiten(rows[1]),
+            alone.whiten(data.errors.restore(slopes)[:, part]),
+        )
     return Case(
         data.recordings[r].name,
-        -fit.coefficients[part] / scale,
-        data.without_errors(whole)[:, part].T / scale[:, None],
-        fit.jacobian[part] / scale[:, None],
+        -rows[0],
+        rows[1].T,
+        rows[2].T,
         probed.crossing,
     )
 

@@ -67,7 +67,7 @@ def locate_in_beat(
 def _only_drifts(state: SearchState, decision: Decision) -> bool:
     """Return whether only a drift speaks against the nominal model: then its misfit shows no place on the wing."""
     nominal = state.fitted_nominal
-    floor = 0.0 if nominal.tried_finer else nominal.discretisation_error or 0.0
+    floor = state.floor(0.0 if nominal.tried_finer else nominal.discretisation_error or 0.0)
     return decision.verdict in ("unnamed", "ambiguous") and only_drifts(state.data, nominal.refit, floor)
 
 
@@ -104,7 +104,9 @@ def _where(state: SearchState, decision: Decision, best: Refit, missing: Missing
     """Return where the misfit lies or, for a named effect, where the effect acts (a fit spreads a misfit in time)."""
     data, coefficients = state.data, state.fitted_nominal.refit.fit.coefficients
     if decision.verdict in ("named", "measurement fault"):
-        acts = contribution(state.context, best)
+        plain = replace(data, errors=None)  # what an effect does, also where errors of positions could explain it
+        fit = replace(best.fit, coefficients=plain.coefficients_of(best.fit.residuals))
+        acts = contribution(replace(state.context, data=plain), replace(best, fit=fit))
         data, coefficients = (data, coefficients) if acts is None else (data.noiseless, acts)
     found = residual_location(
         data, maps.recording_residuals(beat_subject(state.subject), data, coefficients), coefficients

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from wingfit.diagnosis.evidence.fit import Fit
-from wingfit.diagnosis.evidence.marker_errors import MarkerErrors
+from wingfit.diagnosis.evidence.marker_errors import MarkerErrors, too_many
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.finding import amount
 from wingfit.diagnosis.verdict.weigh_hypotheses import drifts
@@ -65,7 +65,10 @@ def _uneven_noise_remarks(data: WhitenedData, unit: str) -> tuple[str, ...]:
 def marker_remarks(data: WhitenedData, errors: MarkerErrors | None, best: Fit) -> tuple[str, ...]:
     """Return a remark on ``errors`` of rest positions, estimated at the fit ``best``; empty if they are negligible."""
     if errors is None:
-        return ()
+        remark = (
+            "errors of the markers' rest positions are not estimated with so many markers and recordings: fit fewer"
+        )
+        return (remark,) if data.kind == "tracks" and too_many(data) else ()
     sizes = np.linalg.norm(errors.estimates(data, best), axis=1)
     worst = int(np.argmax(sizes))
     remark = (

@@ -73,7 +73,7 @@ def weigh(
     if nominal_refuted(data, nominal.excess, floor, error) or (drifts(data) and not drift_alone):
         # A hypothesis that leaves the misfit as it was explains nothing; nor does the nominal model. With few
         # recordings, one that explains most of the misfit may have little evidence, if its size is not zero; with a
-        # single one, nothing shows that it predicts.
+        # single experiment, nothing shows that it predicts.
         possible = evidence - evidence[0] > policy.least_evidence
         for k in np.flatnonzero(~possible & (excess < policy.drift_left * excess[0])):
             possible[k] = hypotheses[k].predicted is not None and not absent(data, hypotheses[k])

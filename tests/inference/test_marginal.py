@@ -25,6 +25,14 @@ def test_the_estimates_are_those_of_ridge_regression() -> None:
     np.testing.assert_allclose(marginal.estimates(marginal.whiten(residual)), expected, rtol=1e-9)
 
 
+def test_what_was_whitened_is_restored_and_a_part_has_its_own_covariance() -> None:
+    marginal, residuals, part = Marginal.of(CHANGES), RNG.standard_normal((5, 40)), slice(10, 25)
+    np.testing.assert_allclose(marginal.restore(marginal.whiten(residuals)), residuals, atol=1e-9)
+    whitener = marginal.of_part(part).whiten(np.eye(15)).T
+    covariance = np.eye(15) + CHANGES[part] @ CHANGES[part].T
+    np.testing.assert_allclose(whitener @ covariance @ whitener.T, np.eye(15), atol=1e-9)
+
+
 def test_a_parameter_that_changes_nothing_is_estimated_as_zero() -> None:
     marginal = Marginal.of(np.column_stack([CHANGES[:, 0], np.zeros(40)]))
     first, second = marginal.estimates(marginal.whiten(CHANGES[:, 0]))

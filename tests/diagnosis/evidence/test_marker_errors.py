@@ -13,7 +13,7 @@ from wingfit.calibration.spec import CalibrationSpec
 from wingfit.diagnosis import DiagnosisSpec, Finding, diagnose
 from wingfit.diagnosis.evidence.context import FitContext
 from wingfit.diagnosis.evidence.fit import gauss_newton_fit
-from wingfit.diagnosis.evidence.marker_errors import axes_at_markers, find_marker_errors
+from wingfit.diagnosis.evidence.marker_errors import _own, axes_at_markers, find_marker_errors
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.rigs import subject_of
 from wingfit.records import Dataset, Recording, Wing
@@ -91,6 +91,15 @@ def measured(dataset: Dataset) -> float | None:
 def test_their_size_is_measured_and_exact_positions_have_none() -> None:
     assert measured(described(0.0)) is None
     assert measured(described(HAND)) == pytest.approx(HAND, rel=0.2)
+
+
+def test_what_a_rigid_wing_does_is_not_taken_for_errors_beside_markers_that_slipped() -> None:
+    rest, rng = np.array([m.position[:2] for m in robird_wing().markers]), np.random.default_rng(3)
+    changes, usual = rng.standard_normal((400, 147)), np.arange(49) % 16 != 2
+    own = _own(changes, rest, usual).reshape(400, 49, 3)
+    assert not own[:, ~usual].any()
+    for rigid in (np.ones(49), rest[:, 0], rest[:, 1]):
+        np.testing.assert_allclose(np.einsum("dma,m->da", own, rigid * usual), 0.0, atol=1e-9)
 
 
 def test_a_hinge_offset_is_named_although_the_positions_were_measured_by_hand() -> None:
