@@ -154,12 +154,20 @@ class WhitenedData:
     def drift(self) -> Float[Array, " R"]:
         """Slow change of each recording [R] that noise does not explain, divided by its noise of a sample.
 
-        Both are root mean squares over the recording's used channels; zero where noise explains the change.
+        Both are root mean squares over the recording's used channels; zero where noise explains the change. Where the
+        noise is for the most part one pattern that the markers share, that part counts as a change too.
         """
         if self.kind == "series":
             return np.zeros(len(self.recordings))
-        found = np.array([fit.drift.size if fit.drift else 0.0 for fit in self.beat_fits])
         noise = [float(np.sqrt(np.mean(fit.noise[fit.used] ** 2))) for fit in self.beat_fits]
+        slow = [fit.drift.size if fit.drift else 0.0 for fit in self.beat_fits]
+        found = np.maximum(
+            slow,
+            [
+                np.sqrt(fit.shared) * one * (fit.shared > self.policy.shared)
+                for fit, one in zip(self.beat_fits, noise, strict=True)
+            ],
+        )
         return np.asarray(found / np.maximum(noise, self.tolerance))
 
     def change_of_beat(self, coefficients: Float[Array, " D"]) -> float:

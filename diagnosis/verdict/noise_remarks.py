@@ -29,7 +29,7 @@ def noise_remarks(data: WhitenedData, unit: str) -> tuple[str, ...]:
             f"{', '.join(within_beats)}: fewer than two beats in the order of the frames; noise is estimated only "
             "from the residual of the beat's harmonics, and slow noise may look like misfit: record longer"
         )
-    return (*remarks, *_drift_remarks(data, unit), *_uneven_noise_remarks(data, unit))
+    return (*remarks, *_drift_remarks(data, unit), *_shared_remarks(data), *_uneven_noise_remarks(data, unit))
 
 
 def _drift_remarks(data: WhitenedData, unit: str) -> tuple[str, ...]:
@@ -41,6 +41,24 @@ def _drift_remarks(data: WhitenedData, unit: str) -> tuple[str, ...]:
         "settled, or shorter"
     )
     return (remark,) if found else ()
+
+
+def _shared_remarks(data: WhitenedData) -> tuple[str, ...]:
+    """Return a remark on recordings whose noise is for the most part one pattern of the markers; empty without any."""
+    found = [f"{name} ({100 * share:.0f} %)" for name, share in _shared(data)]
+    remark = (
+        f"what differs between the beats of {', '.join(found)} is for the most part one pattern that all markers "
+        "share: not the noise of single markers, but a motion that changes (a stiffness or motor that drifts, or beats "
+        "of different size), in which missing physics may hide; record more beats"
+    )
+    return (remark,) if found else ()
+
+
+def _shared(data: WhitenedData) -> list[tuple[str, float]]:
+    """Name and shared part of the noise of recordings in which most of it is one pattern, and no drift was found."""
+    fits = zip(data.recordings, data.beat_fits, strict=True)
+    known = {name for name, _ in _drifts(data)}
+    return [(one.name, fit.shared) for one, fit in fits if fit.shared > data.policy.shared and one.name not in known]
 
 
 def _uneven_noise_remarks(data: WhitenedData, unit: str) -> tuple[str, ...]:
@@ -82,10 +100,11 @@ def marker_remarks(data: WhitenedData, errors: MarkerErrors | None, best: Fit) -
 
 def drift_sentence(data: WhitenedData) -> str:
     """Return a sentence for the summary if the beat changes slowly during recordings; empty if it does not."""
-    drifting, every = len(_drifts(data)), len(data.recordings)
+    drifting, shared, every = len(_drifts(data)), len(_shared(data)), len(data.recordings)
     cause = "which may be the cause" if drifts(data) else "by too little to matter"
     found = f" The beat changes slowly during {drifting} of {every} recordings: something drifts, {cause}."
-    return found if drifting else ""
+    more = f" The beats of {shared} of {every} recordings differ by a motion that all markers share."
+    return (found if drifting else "") + (more if shared else "")
 
 
 def _drifts(data: WhitenedData) -> list[tuple[str, Drift]]:

@@ -20,6 +20,7 @@ from scipy.special import elliprg
 
 from wingfit.inference.noise.drift import Drift, drift_of, slow_basis
 from wingfit.inference.noise.mean_beat import fourier_basis, masks_of, scatter_about
+from wingfit.inference.noise.shared_pattern import shared_part
 from wingfit.inference.noise.spectrum import density_at_harmonics, lag1_autocorrelation
 from wingfit.records import Recording
 from wingfit.records.array_types import Array, Bool, Float, Index, Int, Mask
@@ -55,6 +56,7 @@ class HarmonicFit:
         two beats, if it was estimated from the part of the spectrum above the fitted harmonics.
         coefficients: [C, P] of the recording itself.
         drift: slow change of the beat during the recording; None for too few beats.
+        shared: part of the power of the noise that is one pattern of the markers of tracks (:func:`shared_part`).
     """
 
     order: Int[Index, " P"]
@@ -68,6 +70,7 @@ class HarmonicFit:
     between_beats: bool
     coefficients: Float[Array, "C P"]
     drift: Drift | None = None
+    shared: float = 0.0
 
     def of(self, residuals: Float[Array, "*B T C"]) -> Float[Array, "*B C P"]:
         """Fourier coefficients [..., C, P] of ``residuals`` [..., T, C] (NaN: not recorded); zero if not used."""
@@ -99,6 +102,7 @@ def harmonic_fit(recording: Recording, compared: Mask | None = None) -> Harmonic
         scatter.beats >= 2,
         np.einsum("cpt,tc->cp", inverse, np.where(valid, recording.values, 0.0)),
         scatter.drift,
+        shared_part(scatter.values, valid) if recording.kind == "tracks" else 0.0,
     )
 
 

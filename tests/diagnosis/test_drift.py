@@ -137,7 +137,7 @@ def test_a_change_of_the_mean_counts_where_the_mean_drifts() -> None:
 def test_the_sentence_fits_the_verdict(size: float, says: str) -> None:
     """Size of the drift of one recording, in its noise."""
     drift = Drift(Change(9.0, 1e-9, 1e-3 * size), NONE) if size else None
-    fits = [SimpleNamespace(drift=one) for one in (drift, None)]
+    fits = [SimpleNamespace(drift=one, shared=0.0) for one in (drift, None)]
     recordings = [SimpleNamespace(name=name) for name in ("a", "b")]
     every = np.array([size, 0.0])
     data = SimpleNamespace(recordings=recordings, beat_fits=fits, tolerance=1e-4, drift=every, policy=POLICY)
