@@ -19,7 +19,7 @@ def shared_part(scatter: Float[Array, "T C"], valid: Bool[Mask, "T C"]) -> float
     """Return the part of the power of ``scatter`` [T, C] (recorded minus mean beat, m) in its strongest pattern.
 
     C: x, y, z of each marker in turn; T frames. What all markers share in a frame is subtracted first. 0 for too few
-    markers or frames. Noise of single markers, however slow, gave at most 0.28 in simulated recordings of 62 frames.
+    markers or frames. Noise of single markers, however slow, gave at most 0.27 in simulated recordings.
     """
     frames, channels = scatter.shape
     if channels % 3 or channels < 3 * LEAST_MARKERS or frames < LEAST_FRAMES:
