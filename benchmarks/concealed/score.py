@@ -9,11 +9,9 @@ from dataclasses import dataclass, replace
 from benchmarks.concealed.answer import Answer, Group, Side
 from wingfit.diagnosis.finding import Finding, GeneValue, Hypothesis, Interval
 from wingfit.sim.effects.registry import EFFECTS
-from wingfit.sim.wing.genes import wing_genes
 
 WORSE = 1.01  # ratio of held-out misfits above which the second counts as worse
 NAMING = ("named", "measurement fault")
-SHARES = frozenset(gene.name for gene in wing_genes({}) if gene.share_of)  # only their ratios are identifiable
 
 
 @dataclass(frozen=True)
@@ -193,7 +191,7 @@ def _nominal(answer: Answer) -> dict[str, float]:
     """
     if answer.secrets or answer.rig == "wing":
         return {}
-    return {name: value for name, value in answer.genome.items() if name not in SHARES}
+    return dict(answer.genome)
 
 
 def _true(answer: Answer, along: str) -> float | None:

@@ -102,16 +102,17 @@ def test_an_ambiguous_verdict_names_nothing() -> None:
     ("verdict", "alarm"), [("adequate", False), ("unnamed", True), ("ambiguous", True), ("named", True)]
 )
 def test_missing_physics_in_a_null_trial_is_a_false_alarm(verdict: Verdict, alarm: bool) -> None:
-    marks = mark(finding(verdict, genes=(gene("E_f", 5.1e6, 2e5), gene("L_1", 0.1, 0.01))), answer(group="null"))
+    found = finding(verdict, genes=(gene("C_l", 1.1, 0.2), gene("C_r", 2.0, 0.1)))
+    marks = mark(found, answer(group="null", rig="vehicle", genome={"C_l": 1.0, "C_r": 1.5}))
     assert marks.alarm is alarm
     assert marks.first is None
-    assert (marks.covered, marks.intervals) == (1, 1)  # shares have no value of their own
+    assert (marks.covered, marks.intervals) == (1, 2)
 
 
-def test_a_finer_plant_has_no_true_genes() -> None:
-    found = finding("adequate", genes=(gene("E_f", 9e6, 2e5),))
+def test_a_wing_whose_densities_are_described_wrong_has_no_true_genes() -> None:
+    found = finding("adequate", genes=(gene("E_f", 5e6, 2e5),))
     assert mark(found, answer(group="null", plant="8x1")).intervals == 0
-    assert mark(found, answer(group="null")).covered == 0
+    assert mark(found, answer(group="null")).intervals == 0
 
 
 def test_a_fault_taken_for_physics_is_on_the_wrong_side() -> None:
@@ -227,7 +228,7 @@ def test_a_failed_diagnosis_gets_the_worst_score() -> None:
     assert figures["null"]["false_alarms"] == 1
     assert figures["wrong_name_percent"] == figures["heldout_worse_percent"] == 100.0
     assert table.coverage.percent == 0.0
-    assert table.coverage.n == 2  # the mass, and E_f: shares have no value of their own
+    assert table.coverage.n == 1  # the mass
     assert figures["heldout_over_floor_median"] is None  # it is not finite
     assert figures["place"] == {"span_R": None, "chord_c": None, "phase_deg": None}
     json.dumps(figures, allow_nan=False)
