@@ -12,7 +12,7 @@ from wingfit.calibration.problem import Evaluation, Problem
 from wingfit.diagnosis.evidence.context import FitContext
 from wingfit.diagnosis.evidence.fit import COST_TOLERANCE, FIT_ERRORS, Fit, gauss_newton_fit
 from wingfit.diagnosis.evidence.marker_errors import MarkerErrors, find_marker_errors
-from wingfit.diagnosis.evidence.nominal import Nominal
+from wingfit.diagnosis.evidence.nominal import NOMINAL_STEPS, Nominal
 from wingfit.diagnosis.evidence.refit import Refit, is_in_position
 from wingfit.diagnosis.evidence.screen import Trial
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
@@ -21,8 +21,6 @@ from wingfit.diagnosis.subject import Subject, beat_subject
 from wingfit.diagnosis.verdict.noise_doubt import judged_noise
 from wingfit.diagnosis.verdict.weigh_hypotheses import HypothesisWeights, tolerated_excess
 from wingfit.records.array_types import ArrayLike
-
-AGAIN_STEPS = 20  # of a nominal fit that is continued
 
 
 @dataclass
@@ -111,7 +109,7 @@ class SearchState:
     def fitted_again(self, nominal: Fit) -> Fit:
         """Return the fit ``nominal`` continued with the present data, or as it was where that cannot be simulated."""
         with suppress(*FIT_ERRORS):
-            *_, found = gauss_newton_fit(self.context, nominal.problem, nominal.unit, AGAIN_STEPS)
+            *_, found = gauss_newton_fit(self.context, nominal.problem, nominal.unit, NOMINAL_STEPS)
             return found
         return _without_errors(self.data, nominal)
 

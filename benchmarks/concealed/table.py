@@ -318,7 +318,7 @@ def sure(marks: Iterable[Mark]) -> list[Mark]:
 def verdict_is_right(one: Mark) -> bool | None:
     """Whether the verdict is true; None if what is hidden is too weak for a verdict to be expected.
 
-    A name is right if all that it names is hidden, and "unnamed" if the library lacks what is hidden.
+    A name is right if all that it names is hidden, and "unnamed" if what is hidden is not in the library.
     """
     if not one.truth:
         return one.verdict == "adequate"

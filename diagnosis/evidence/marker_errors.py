@@ -6,8 +6,7 @@ column of A the change by an error of one standard deviation, a vector that turn
 D^-1)^-1/2 D^-1 v has the covariance D^2 of the noise alone; wherever a diagnosis speaks of the coefficients of a
 residual, it means these (Rasmussen and Williams 2006, Sec. 2.7: explicit basis functions with a normal prior).
 
-The standard deviation is measured: physics that a model lacks displaces neighbours alike, errors of single markers do
-not.
+The standard deviation is measured: missing physics displaces neighbours alike, errors of single markers do not.
 """
 
 from __future__ import annotations
@@ -21,11 +20,9 @@ import scipy
 from wingfit.diagnosis.evidence.fit import Fit
 from wingfit.diagnosis.evidence.screen import Nuisance
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
-from wingfit.diagnosis.location.maps import beat_series
 from wingfit.diagnosis.subject import BeatSubject
 from wingfit.inference.marginal import Marginal
 from wingfit.inference.noise.harmonic import HarmonicFit
-from wingfit.inference.noise.mean_beat import fourier_basis
 from wingfit.records import Recording
 from wingfit.records.array_types import Array, Bool, Float, Mask
 from wingfit.sim.effects.ports.markers import tangents
@@ -66,8 +63,7 @@ class MarkerErrors:
         """
         if data.errors is None:
             return np.zeros((len(self.markers), 3))
-        found = self.sd * data.errors.estimates(fit.coefficients / data.scale).reshape(-1, 3)
-        return np.asarray(found * self.usual[:, None])
+        return self.sd * data.errors.estimates(fit.coefficients / data.scale).reshape(-1, 3)
 
     def corrected(
         self, subject: BeatSubject, data: WhitenedData, residuals: Sequence[Array], errors: Float[Array, "M 3"]
@@ -79,8 +75,7 @@ class MarkerErrors:
             own = np.array([errors[places[name]] if name in places else np.zeros(3) for name in recording.markers])
             series = np.einsum("ma,makp->mkp", own, turning).reshape(-1, turning.shape[-1])
             psi = 2 * np.pi * recording.condition.flap_frequency * recording.times
-            basis = fourier_basis(psi, int(beat_fit.order[~beat_fit.trend].max()))
-            found.append(residual - basis @ series[:, ~beat_fit.trend].T)
+            found.append(residual - beat_fit.waves(psi) @ series.T)
         return tuple(found)
 
 
@@ -96,7 +91,7 @@ def axes_at_markers(
     used = beat_fit.used.reshape(-1, 3).all(axis=1)
     rest = np.array([(one.x, one.y) for one in places], float)[used]
     motion = (beat_fit.coefficients + beat_fit.of(residual)).reshape(len(places), 3, -1)[used]
-    grid = beat_series(beat_fit, 0.0, PHASES)
+    grid = beat_fit.waves(2 * np.pi * np.arange(PHASES) / PHASES)
     beat = np.einsum("np,mkp->nmk", grid, motion)
     length = float(np.ptp(rest, axis=0).max()) if len(rest) else 0.0
     found = np.zeros((len(places), 3, 3, grid.shape[1]))

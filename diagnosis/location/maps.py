@@ -55,11 +55,7 @@ def beat_series(beat_fit: HarmonicFit, origin: float, count: int = PHASES) -> Fl
 
     ``origin``: phase (rad) at which the beat starts. Slow trends are zero.
     """
-    psi = origin + 2 * np.pi * np.arange(count) / count
-    angle, column = psi[:, None] * beat_fit.order, np.arange(len(beat_fit.order))
-    last = int(beat_fit.order[~beat_fit.trend].max())  # columns: mean, cosines, sines, trends
-    waves = np.where((last < column) & (column <= 2 * last), np.sin(angle), np.cos(angle))
-    return np.where(beat_fit.trend, 0.0, waves)
+    return beat_fit.waves(origin + 2 * np.pi * np.arange(count) / count)
 
 
 def markers(before: Sequence[RecordingResidual], after: Sequence[RecordingResidual]) -> tuple[MarkerMisfit, ...]:

@@ -79,6 +79,12 @@ class HarmonicFit:
         found = np.einsum("cbt,cpt->bcp", channels, self.inverse, optimize=True)
         return np.asarray(found.reshape(*residuals.shape[:-2], *self.variance.shape))
 
+    def waves(self, psi: Float[Array, " N"]) -> Float[Array, "N P"]:
+        """Return the basis function [N, P] of each of P coefficients at phases ``psi`` [N] (rad); 0 for slow trends."""
+        found = np.zeros((len(psi), len(self.order)))
+        found[:, ~self.trend] = fourier_basis(psi, int(self.order[~self.trend].max()))
+        return found
+
 
 def harmonic_fit(recording: Recording, compared: Mask | None = None) -> HarmonicFit:
     """Reduce ``recording`` to the Fourier coefficients of its beat and estimate their noise.
