@@ -5,7 +5,8 @@ next to the harmonics, so close that it looks like noise of long memory. But noi
 same density at all frequencies near a harmonic, unless a resonance is narrower than the distance of a few spectral
 lines. So the power of the slow change of a harmonic is compared with the power of the nearest spectral lines: their
 ratio, pooled over harmonics and channels, follows an F distribution for noise alone. Its degrees of freedom count
-harmonics and channels only as far as their noise near the harmonics is independent and of similar size.
+harmonics, their two phases, and channels only as far as their noise near the harmonics is independent and of similar
+size: beats that scatter in size change all of them alike.
 
 The mean of the beat is compared apart from the harmonics, because slow noise rises towards it
 (:mod:`wingfit.inference.noise.drift_of_mean`).
@@ -16,6 +17,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.polynomial import legendre
 from scipy import stats
 
 from wingfit.inference.noise.drift_of_mean import MeanPowers, change_of_mean, mean_distances
@@ -27,6 +29,7 @@ HARMONICS = 3  # compared: those in which a wing moves most
 FEWEST_BEATS = 3  # with which lines remain that the change does not use up
 FEWEST_OF_MEAN = 4  # with which two lines above zero show how noise rises towards it
 CURVED = 4  # beats from which a curved change is found and removed, too
+WINDING = 12  # beats from which changes of higher degree are kept out of the noise
 NEAREST = 3  # spectral lines on either side of a harmonic: farther ones say less about the noise at the harmonic
 RISE = 1.5  # largest ratio of the density of noise at a harmonic to that around it that counts as usual
 
@@ -94,10 +97,12 @@ def drift_of(
             changes.append([orthonormal(one, periodic, mean, *less) for one, less in zip(new, lower, strict=True)])
         beat = orthonormal(np.hstack([one for row in changes for one in row]))
         every = np.hstack([mean, beat])
-        lines = [orthonormal(_waves(apparent[mask], k, distances), periodic, every) for k in orders]
+        lines = [orthonormal(_envelopes(psi[mask], apparent[mask], k, distances), periodic, every) for k in orders]
+        higher = [_slow(psi[mask], time[mask], k, degree) for k in orders for degree in _higher(beats)]
+        beyond = orthonormal(np.hstack(higher), periodic, every) if higher else every[:, :0]
         values = scatter[np.ix_(mask, channels)]
         steady = values - every @ (every.T @ values)
-        parts.append(_Powers.of(values, steady, changes, lines))
+        parts.append(_Powers.of(values, steady, changes, lines, beyond))
         if beats < FEWEST_OF_MEAN:
             continue
         raw = [_slow(psi[mask], time[mask], k, degree) for k in orders for degree in _degrees(beats)]
@@ -105,7 +110,7 @@ def drift_of(
         slow: list[Array] = []
         for one in of_zero:
             slow.append(orthonormal(one, periodic, own, *slow))
-        waves = orthonormal(_waves(apparent[mask], 0, mean_distances(beats)), periodic, every)
+        waves = orthonormal(_waves(apparent[mask], mean_distances(beats)), periodic, every)
         of_mean.append(MeanPowers.of(values, steady, slow, waves))
     if not parts or min(float(one.freedom.min()) for one in parts) < 1.0:
         return None
@@ -119,22 +124,29 @@ class _Powers:
     """Slow changes of D degrees (linear, curved) and noise near K harmonics, in C channels that have the same gaps.
 
     ``slow`` [D, K, C]: sum of squares of the coefficients of slow changes; ``near`` [K, L, C]: coefficients of noise at
-    L nearby lines; ``freedom`` [D + 1, K]: number of independent coefficients of the slow changes of each degree, and
-    of the noise; ``level`` [C]: mean square of the samples without slow changes.
+    L nearby lines (:func:`_envelopes`); ``alone``: the same without changes of higher degree; ``freedom`` [D + 1, K]:
+    number of independent coefficients of the slow changes of each degree, and of the noise; ``level`` [C]: mean square
+    of the samples without slow changes.
     """
 
     slow: Array
     near: Array
+    alone: Array
     freedom: Array
     level: Array
 
     @classmethod
-    def of(cls, values: Array, steady: Array, changes: list[list[Array]], lines: list[Array]) -> _Powers:
-        """Project ``values`` [T, C], and ``steady`` [T, C] without slow changes, on bases [T, .] of each harmonic."""
+    def of(cls, values: Array, steady: Array, changes: list[list[Array]], lines: list[Array], beyond: Array) -> _Powers:
+        """Project ``values`` [T, C], and ``steady`` [T, C] without slow changes, on bases [T, .] of each harmonic.
+
+        ``beyond`` [T, .]: basis of the changes of higher degree.
+        """
         freedom = np.array([[rank(one) for one in row] for row in (*changes, lines)])
         slow = np.array([[((one.T @ values) ** 2).sum(axis=0) for one in row] for row in changes])
         near = np.array([one.T @ steady for one in lines])
-        return cls(slow, near, freedom, np.maximum((steady**2).mean(axis=0), 1e-300))
+        noise = steady - beyond @ (beyond.T @ steady)
+        alone = np.array([one.T @ noise for one in lines])
+        return cls(slow, near, alone, freedom, np.maximum((steady**2).mean(axis=0), 1e-300))
 
 
 def _compared(parts: list[_Powers], samples: int) -> Change:
@@ -143,18 +155,21 @@ def _compared(parts: list[_Powers], samples: int) -> Change:
     Linear changes alone are compared, and linear and curved ones together; the less probable result counts.
     """
     every = (
-        (one.slow, one.near, np.repeat(one.freedom[..., None], len(one.level), axis=-1), one.level) for one in parts
+        (one.slow, one.near, one.alone, np.repeat(one.freedom[..., None], len(one.level), axis=-1), one.level)
+        for one in parts
     )
-    slow, near, freedom, level = (np.concatenate(found, axis=-1) for found in zip(*every, strict=True))
+    slow, near, alone, freedom, level = (np.concatenate(found, axis=-1) for found in zip(*every, strict=True))
     slow, of_slow = slow.cumsum(axis=0), freedom[:-1].cumsum(axis=0)
     noise = (near**2).sum(axis=1) / freedom[-1]
     # Each channel is divided by its size, so that a loud one does not decide alone.
     around, lines = float((noise / level).mean()), freedom[-1].mean(axis=-1)
-    sources = independent_sources(near / np.sqrt(level), lines)
+    # Size and start of a beat that scatter move all harmonics of all channels at once, so these are counted together.
+    envelopes = alone.reshape(len(alone), -1, 2, len(level)) / np.sqrt(level)
+    sources = independent_sources(envelopes.transpose(1, 0, 2, 3).reshape(envelopes.shape[1], -1), lines.mean() / 2)
     found = []
     for power, count in zip(slow, of_slow, strict=True):
         ratio = float((power / count / level).mean() / max(around, 1e-300))
-        chance = float(stats.f.sf(ratio / RISE, sources * count.mean(), sources * lines.mean()))
+        chance = float(stats.f.sf(ratio / RISE, sources * count.mean() / 2, sources * lines.mean() / 2))
         found.append((len(slow) * chance, -ratio))
     probability, ratio = min(found)
     beyond = float((slow[-1] - of_slow[-1] * noise).sum())
@@ -179,6 +194,11 @@ def _degrees(beats: int) -> tuple[int, ...]:
     return (1, 2) if beats >= CURVED else (1,)
 
 
+def _higher(beats: int) -> tuple[int, ...]:
+    """Degrees of slow changes that are not looked for, but are no noise either: a change need not be a parabola."""
+    return (3, 4) if beats >= WINDING else ()
+
+
 def _time(apparent: Array) -> Array:
     """Time [T] from -1 at the first sample to 1 at the last."""
     return np.asarray(2.0 * (apparent - apparent[0]) / (apparent[-1] - apparent[0]) - 1.0)
@@ -186,12 +206,21 @@ def _time(apparent: Array) -> Array:
 
 def _slow(psi: Array, time: Array, k: int, degree: int) -> Array:
     """Slow change [T, .] of harmonic ``k`` (0: of the mean): a Legendre polynomial of the ``time`` [T], -1 to 1."""
-    slow = (time if degree == 1 else 1.5 * time**2 - 0.5)[:, None]
+    slow = legendre.legval(time, np.eye(degree + 1)[degree])[:, None]
     return np.hstack([slow * np.cos(k * psi)[:, None], slow * np.sin(k * psi)[:, None]]) if k else slow
 
 
-def _waves(apparent: Array, k: int, distances: Array) -> Array:
-    """Cosines and sines [T, .] at ``distances`` (in flap frequencies) on either side of harmonic ``k``; above 0."""
-    sides = np.concatenate([k - distances, k + distances]) if k else distances
-    angles = 2 * np.pi * apparent[:, None] * sides
+def _waves(apparent: Array, distances: Array) -> Array:
+    """Cosines and sines [T, .] of the frequencies ``distances`` (in flap frequencies)."""
+    angles = 2 * np.pi * apparent[:, None] * distances
     return np.hstack([np.cos(angles), np.sin(angles)])
+
+
+def _envelopes(psi: Array, apparent: Array, k: int, distances: Array) -> Array:
+    """Return the spectral lines at ``distances`` (in flap frequencies) on either side of harmonic ``k``, [T, .].
+
+    As changes in time of its two phases: columns in pairs, one change times the cosine, and times the sine.
+    """
+    slow = _waves(apparent, distances)[:, :, None]
+    carrier = np.stack([np.cos(k * psi), np.sin(k * psi)], axis=1)[:, None, :]
+    return np.asarray((slow * carrier).reshape(len(psi), -1))

@@ -75,7 +75,7 @@ def change_of_mean(parts: list[MeanPowers], samples: int) -> Change:
     power = (near[:lines] ** 2 + near[lines:] ** 2).mean(axis=1) / 2.0
     walk = np.average([one.walk for one in parts], axis=0, weights=[len(one.level) for one in parts])
     expected = _expected(power, walk[degrees:], walk[:degrees])
-    sources = independent_sources(near[None], np.array([2.0 * lines]))
+    sources = independent_sources(near, 2.0 * lines)
     found = []
     for count in range(1, degrees + 1):
         ratio = float(slow[:count].mean() / max(expected[:count].mean(), 1e-300))

@@ -32,17 +32,17 @@ class Change:
         return self.probability < self.certain
 
 
-def independent_sources(near: Float[Array, "K L C"], lines: Float[Array, " K"]) -> float:
-    """Number of independent sources of noise near K harmonics in C channels, of equal power: at most K C.
+def independent_sources(near: Float[Array, "L C"], lines: float) -> float:
+    """Number of independent sources of noise in C channels, of equal power: at most C.
 
-    It is smaller where channels scatter together, or where some harmonics or channels have most of the noise.
-    ``near`` [K, L, C]: coefficients of the noise; ``lines`` [K]: how many of the L are independent. By chance, channels
-    correlate that are independent; the mean of that is subtracted.
+    It is smaller where channels scatter together, or where some have most of the noise. ``near`` [L, C]: coefficients
+    of the noise; ``lines``: how many of the L are independent. By chance, channels correlate that are independent; the
+    mean of that is subtracted.
     """
-    total = (near**2).sum(axis=(1, 2))
-    square = ((near.transpose(0, 2, 1) @ near) ** 2).sum(axis=(1, 2))
-    square = np.maximum((square - total**2 / lines) / np.maximum(1.0 - 1.0 / lines, 0.5), total**2 / near.shape[2])
-    return float((total / lines).sum() ** 2 / max((square / lines**2).sum(), 1e-300)) or 1.0
+    total = float((near**2).sum())
+    small = near @ near.T if len(near) < near.shape[1] else near.T @ near
+    square = (float((small**2).sum()) - total**2 / lines) / max(1.0 - 1.0 / lines, 0.5)
+    return total**2 / max(square, total**2 / near.shape[1], 1e-300) or 1.0
 
 
 def orthonormal(columns: Float[Array, "T P"], *others: Float[Array, "T _"]) -> Float[Array, "T P"]:
