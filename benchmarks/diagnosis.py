@@ -20,7 +20,8 @@ import numpy as np
 
 from benchmarks.common import machine
 from benchmarks.common.kernel_time import kernel_time
-from benchmarks.concealed.bench import WingBench, record_all
+from benchmarks.concealed.benches.bench import record_all
+from benchmarks.concealed.benches.wing import WingBench
 from benchmarks.concealed.plant.law import Concealed
 from benchmarks.concealed.trials import FREQUENCIES, LAGS, THICK_PA, THIN_PA, Build, chamber, name_of, tunnel
 from wingfit.calibration.spec import CalibrationSpec

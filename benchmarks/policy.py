@@ -19,8 +19,9 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from benchmarks.concealed.run_diagnosis import Outcome, Task, run
+from benchmarks.concealed.running import Folders, each, pool, task
 from benchmarks.concealed.seal import read
-from benchmarks.concealed.suite import Folders, each, make, pool, task
+from benchmarks.concealed.suite import make
 from benchmarks.concealed.trials import Trial, plan
 from wingfit.diagnosis.policy import POLICY, Policy, described
 

@@ -75,6 +75,9 @@ def diagnose(
     refine: Annotated[
         bool, typer.Option(help="Allow a finer discretisation where the number of bodies limits the accuracy.")
     ] = True,
+    exhaustive: Annotated[
+        bool, typer.Option("--exhaustive", help="Fit every pair of the effects given with --suspect; at most 20.")
+    ] = False,
     seed: Annotated[int | None, typer.Option(help="The same seed gives the same finding.")] = None,
     name: Annotated[str | None, typer.Option(help="A name for the diagnosis.")] = None,
     report: ReportFile = None,

@@ -16,13 +16,15 @@ class DiagnosisSpec(JobSpec):
 
     ``fixed``: values of genes that are not estimated; ``suspects``: names of the effects to be tested as explanations
     (empty: all that apply); ``refine``: allow a finer discretisation of the wing; ``refits``: largest number of effects
-    refitted in full; ``start``: the initial genome, empty for the nominal values in the dataset.
+    refitted in full; ``exhaustive``: every pair of the suspects is fitted; ``start``: the initial genome, empty for the
+    nominal values in the dataset.
     """
 
     fixed: dict[str, float]
     suspects: list[str]
     refine: bool
     refits: int
+    exhaustive: bool
     start: dict[str, float]
 
 

@@ -22,10 +22,10 @@ class DiagnosisCalls(Watching):
     def submit_diagnosis(self, dataset_id: str | None = None, *, run_id: str | None = None, **spec: Any) -> Diagnosis:
         """Submit a diagnosis of a dataset or of a run, and return it; a run gives its best genome and its settings.
 
-        ``spec``: seed, recordings, genes, fixed, effects, suspects, refine, refits, name; for a wing also division,
-        bounds_factor, accuracy_mm; for a vehicle also preset, without, axes, low_pass_hz, peel_width_beats. Omitted
-        settings are those of the run, or have the server's defaults. For series also rig: the name of one that is
-        installed on the server, or what :func:`wingfit.declaration` returns of yours, which :func:`wingfit.drive`
+        ``spec``: seed, recordings, genes, fixed, effects, suspects, refine, refits, exhaustive, name; for a wing also
+        division, bounds_factor, accuracy_mm; for a vehicle also preset, without, axes, low_pass_hz, peel_width_beats.
+        Omitted settings are those of the run, or have the server's defaults. For series also rig: the name of one that
+        is installed on the server, or what :func:`wingfit.declaration` returns of yours, which :func:`wingfit.drive`
         then simulates.
         """
         body = given(dataset_id=dataset_id, run_id=run_id, **spec)

@@ -16,10 +16,10 @@ from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.finding import Finding
 from wingfit.diagnosis.rig_subject import RigSubject
 from wingfit.diagnosis.rigs import subject_of
-from wingfit.diagnosis.search import run_search, select_suspects
+from wingfit.diagnosis.search import run_search
 from wingfit.diagnosis.search_state import CountingEvaluator, SearchState
 from wingfit.diagnosis.spec import DiagnosisSpec, Progress
-from wingfit.diagnosis.subject import Subject
+from wingfit.diagnosis.subject import Subject, select_suspects
 from wingfit.diagnosis.verdict.build_finding import build_finding
 from wingfit.inference.noise.series_fit import SeriesReduction
 from wingfit.records import AnyRecording, Dataset, Series, SeriesDataset
@@ -27,6 +27,7 @@ from wingfit.records.blas_threads import one_blas_thread
 from wingfit.rigs.rig import Rig
 from wingfit.rigs.rig_model import RigModel
 
+MOST_IN_PAIRS = 20  # suspects of which every pair can be fitted
 SEARCH_FRACTION = 0.7  # of the work; the rest locates the missing physics and validates the hypothesis
 
 
@@ -42,7 +43,11 @@ def check(dataset: Dataset, spec: DiagnosisSpec) -> None:
 
 
 def _check_search(subject: Subject, spec: DiagnosisSpec) -> None:
-    select_suspects(subject, spec)
+    suspects = len(select_suspects(subject, spec.suspects))
+    if spec.exhaustive and suspects > MOST_IN_PAIRS:
+        raise ValueError(
+            f"exhaustive fits every pair of suspects, and there are {suspects}: name at most {MOST_IN_PAIRS}"
+        )
     base_genome(subject.model, {**spec.start, **spec.calibration.fixed})
     if spec.refits < 1:
         raise ValueError(f"refits is {spec.refits}; at least 1 effect must be refitted: give 1 or more")

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from wingfit.diagnosis.combinations import combined_refits, every_pair, further_effects, smaller_refits
 from wingfit.diagnosis.evidence.competing_fits import StartPoint, fit_from_estimates, large_start, start_points
 from wingfit.diagnosis.evidence.fit import FIT_ERRORS, Fit
 from wingfit.diagnosis.evidence.nominal import choose_discretisation, fit_nominal, improves
@@ -15,22 +16,16 @@ from wingfit.diagnosis.evidence.refit import (
     FINAL_STEPS,
     Refit,
     continue_fit,
-    fit_to_convergence,
     make_refit,
-    partner_trials,
     refit_at,
     refit_with,
-    refit_without,
     strongest_trials,
-    substitute_trials,
-    suspect_pairs,
 )
 from wingfit.diagnosis.evidence.screen import Trial, score_tests
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.refinement import MAX_CONTINUED, refine_with_effects
 from wingfit.diagnosis.search_state import SearchState
-from wingfit.diagnosis.spec import DiagnosisSpec
-from wingfit.diagnosis.subject import Subject
+from wingfit.diagnosis.subject import select_suspects
 from wingfit.diagnosis.verdict.verdict import decide
 from wingfit.diagnosis.verdict.weigh_hypotheses import HypothesisWeights, nominal_suffices, tolerated_excess, weigh
 from wingfit.rigs.suspect import Suspect
@@ -40,10 +35,7 @@ Steps = Iterator[tuple[float, str]]  # fraction of the work done, and the next s
 FAULTS = ("measurement", "input")  # families of suspects that do not act within the simulation
 MAX_INNER = 12  # suspects that are fitted from a large size
 MAX_RESTARTED = 3  # suspects that are also fitted from the estimates
-MAX_PARTNERS = 3  # second effects that are tried with the best hypothesis
 MAX_RIVALS = 3  # hypotheses for which a second effect is tried
-EXTENDED = {"tracks": (1, 1), "series": (1, 1), "forces": (6, 2)}  # hypotheses that get a further effect, and rounds
-MAX_SUBSTITUTES = 2  # effects that are tried in place of each effect of a combined hypothesis
 
 
 def run_search(state: SearchState, free: tuple[str, ...]) -> Steps:
@@ -61,7 +53,7 @@ def run_search(state: SearchState, free: tuple[str, ...]) -> Steps:
         yield 0.24, "fitting the nominal model, allowing for errors of the markers' rest positions"
         fit = state.fitted_again(fit)
     yield 0.25, "comparing with a finer discretisation"
-    suspects = select_suspects(state.subject, spec)
+    suspects = state.suspects
     for fraction, stage in _search_coarse_first(state, fit, suspects):
         yield 0.3 + 0.55 * fraction, stage
     yield 0.85, "fitting the nominal model again"
@@ -72,7 +64,9 @@ def run_search(state: SearchState, free: tuple[str, ...]) -> Steps:
             yield 0.85 + 0.07 * fraction, stage
     yield 0.92, "comparing with a finer discretisation"
     yield from ((0.93, stage) for stage in _refine_and_extend(state))
-    yield from ((0.93, stage) for stage in _smaller_refits(state))
+    yield from ((0.93, stage) for stage in smaller_refits(state))
+    if spec.exhaustive and state.refits:
+        yield from ((0.93, stage) for stage in every_pair(state))
     yield 0.94, "continuing the best refits"
     if state.refits:
         _continue_best(state)
@@ -205,7 +199,7 @@ def _refits(state: SearchState, at_least: Refit | None) -> Steps:
     if not state.beats_unknown_law:
         yield from _refits_from_estimates(state)
     if not state.beats_unknown_law:
-        yield from ((0.82, stage) for stage in _combined_refits(state))
+        yield from ((0.82, stage) for stage in combined_refits(state))
         yield 0.97, "continuing the best refits"
         _continue_best(state)
 
@@ -230,7 +224,7 @@ def _refits_from_estimates(state: SearchState) -> Steps:
         raise ValueError("the nominal model has not been fitted")
     context, initial = state.initial_fit
     found = []
-    for suspect, trials in score_tests(context, initial, select_suspects(context.subject, state.spec)):
+    for suspect, trials in score_tests(context, initial, select_suspects(context.subject, state.spec.suspects)):
         found.append(trials)
         yield 0.74, f"score test of {suspect.name} at the estimates"
     starts = [entry for trial in _restart_trials(state.data, found) for entry in start_points(trial)]
@@ -275,101 +269,9 @@ def _refine_and_extend(state: SearchState) -> Iterator[str]:
         refine_with_effects(state)
     if state.is_explained or not (state.beats_unknown_law or state.data.kind == "forces"):
         return
-    yield from _further_effects(state)
+    yield from further_effects(state)
     if state.subject is coarse and not state.is_explained:
-        yield from _combined_refits(state)
-
-
-def _further_effects(state: SearchState) -> Iterator[str]:
-    """Refit the leading hypotheses together with each further effect that score tests at their own fits propose.
-
-    At the nominal fit, an effect may change nothing that it changes beside another one.
-    """
-    bases, rounds = EXTENDED[state.data.kind]
-    extended: set[frozenset[str]] = set()
-    for _ in range(rounds):
-        for base in _leading(state, bases):
-            if frozenset(base.names) not in extended:
-                extended.add(frozenset(base.names))
-                yield from _with_further_effect(state, base)
-        if state.is_explained:
-            return
-
-
-def _leading(state: SearchState, count: int) -> list[Refit]:
-    """Return the refit with the least excess, then those with most evidence, ``count`` in all."""
-    first = state.by_excess[0]
-    if count == 1:
-        return [first]
-    suspects = len(select_suspects(state.subject, state.spec))
-    weights = weigh(state.data, state.fitted_nominal.refit, state.refits, 0.0, suspects)
-    order = np.argsort(-weights.evidence[1:], kind="stable")
-    return [first, *(one for k in order if (one := state.refits[k]) is not first)][:count]
-
-
-def _with_further_effect(state: SearchState, base: Refit) -> Iterator[str]:
-    """Refit ``base`` together with each of the effects that score tests at its fit propose; yields stages."""
-    if state.data.kind == "forces":
-        base = fit_to_convergence(state.context, base)
-        state.add(base)
-    others, found = [one for one in select_suspects(state.subject, state.spec) if one.name not in base.names], []
-    for suspect, trials in score_tests(state.context, base.fit, others, base.names):
-        found.append(trials)
-        yield f"score test of {suspect.name} together with {' and '.join(base.names)}"
-    for trial in partner_trials(state.data, base, found)[:MAX_PARTNERS]:
-        yield f"refit with {' and '.join((*base.names, trial.suspect.name))}"
-        state.add(refit_with(state.context, base.fit, [*base.trials, trial], base.fit))
-
-
-def _combined_refits(state: SearchState) -> Iterator[str]:
-    """Refit the best hypotheses with a second effect, pairs of weak effects, and combinations with one replaced."""
-    data, tried = state.data, {frozenset(one.names) for one in state.refits}
-    for k, one in enumerate(state.by_excess[:MAX_RIVALS]):
-        for trial in partner_trials(data, one, state.trials)[: MAX_PARTNERS if k == 0 else 1]:
-            yield from _refit_untried(state, tried, [*one.trials, trial], one.fit)
-    least = min(data.chi_squared(one.fit.coefficients) for one in state.refits)
-    for two in suspect_pairs(data, state.fitted_nominal.refit.fit, state.trials, least, 2):
-        yield from _refit_untried(state, tried, two)
-    yield from _substituted_refits(state)
-
-
-def _refit_untried(
-    state: SearchState, tried: set[frozenset[str]], trials: Sequence[Trial], base: Fit | None = None
-) -> Iterator[str]:
-    """Refit with the suspects of ``trials``, unless the set of their names is in ``tried``; add it there."""
-    names = frozenset(trial.suspect.name for trial in trials)
-    if names not in tried:
-        tried.add(names)
-        yield f"refit with {' and '.join(sorted(names))}"
-        state.add(refit_with(state.context, state.fitted_nominal.refit.fit, trials, base))
-
-
-def _substituted_refits(state: SearchState) -> Iterator[str]:
-    """Refit the best combination with each of its effects replaced by effects that can reproduce the same change."""
-    best = state.by_excess[0]
-    if len(best.trials) < 2:
-        return
-    tried = {frozenset(one.names) for one in state.refits}
-    for part in best.trials:
-        others = [trial for trial in best.trials if trial is not part]
-        for trial in substitute_trials(state.context, best, part, state.trials, MAX_SUBSTITUTES):
-            yield from _refit_untried(state, tried, [*others, trial])
-
-
-def _smaller_refits(state: SearchState) -> Iterator[str]:
-    """Refit the best of three effects or more without each of them: one that was added early may be needed no longer.
-
-    Of series only: the trials of wings, which never needed it, were done without it.
-    """
-    best = state.by_excess[0] if state.refits else None
-    if state.data.kind != "series" or best is None or len(best.trials) < 3:
-        return
-    tried = {frozenset(one.names) for one in state.refits}
-    for part in best.trials:
-        names = [name for name in best.names if name != part.suspect.name]
-        if frozenset(names) not in tried:
-            yield f"refit with {' and '.join(sorted(names))}"
-            state.add(refit_without(state.context, best, part))
+        yield from combined_refits(state)
 
 
 def _continue_best(state: SearchState) -> bool:
@@ -389,12 +291,3 @@ def _is_outperformed(state: SearchState, trial: Trial, best: Trial) -> bool:
     """Return whether ``trial`` is skipped: much weaker than ``best``, while a refit already explains the residual."""
     weak = trial.gain <= state.data.policy.weak_after_success * best.gain
     return weak and bool(state.refits) and state.is_explained
-
-
-def select_suspects(subject: Subject, spec: DiagnosisSpec) -> list[Suspect]:
-    """Return the suspects that ``spec`` requests; ValueError for one that the rig does not have."""
-    known = {suspect.name: suspect for suspect in subject.suspects}
-    for name in spec.suspects:
-        if name not in known:
-            raise ValueError(f"unknown suspect {name!r}: remove it; this rig has {', '.join(known)}")
-    return [suspect for name, suspect in known.items() if not spec.suspects or name in spec.suspects]

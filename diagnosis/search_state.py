@@ -17,10 +17,11 @@ from wingfit.diagnosis.evidence.refit import Refit, is_in_position
 from wingfit.diagnosis.evidence.screen import Trial
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.spec import DiagnosisSpec
-from wingfit.diagnosis.subject import Subject, beat_subject
+from wingfit.diagnosis.subject import Subject, beat_subject, select_suspects
 from wingfit.diagnosis.verdict.noise_doubt import judged_noise
 from wingfit.diagnosis.verdict.weigh_hypotheses import HypothesisWeights, tolerated_excess
 from wingfit.records.array_types import ArrayLike
+from wingfit.rigs.suspect import Suspect
 
 
 @dataclass
@@ -51,6 +52,11 @@ class SearchState:
     def subject(self) -> Subject:
         """The rig, with the discretisation of the present nominal fit."""
         return self.context.subject
+
+    @property
+    def suspects(self) -> list[Suspect]:
+        """The suspects that are considered."""
+        return select_suspects(self.subject, self.spec.suspects)
 
     @property
     def data(self) -> WhitenedData:

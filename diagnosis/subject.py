@@ -96,3 +96,12 @@ def beat_subject(subject: Subject) -> BeatSubject:
     if not hasattr(subject, "beat_start_phase"):
         raise TypeError(f"{subject.description} has no beat")
     return cast("BeatSubject", subject)
+
+
+def select_suspects(subject: Subject, names: Sequence[str]) -> list[Suspect]:
+    """Return the suspects of ``subject`` with these ``names``, all if empty; ValueError for an unknown one."""
+    known = {suspect.name: suspect for suspect in subject.suspects}
+    for name in names:
+        if name not in known:
+            raise ValueError(f"unknown suspect {name!r}: remove it; this rig has {', '.join(known)}")
+    return [suspect for name, suspect in known.items() if not names or name in names]

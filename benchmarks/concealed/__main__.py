@@ -13,7 +13,8 @@ import tempfile
 from pathlib import Path
 
 from benchmarks.concealed.answer import GROUPS
-from benchmarks.concealed.suite import Folders, conduct, make
+from benchmarks.concealed.running import Folders
+from benchmarks.concealed.suite import conduct, make
 from benchmarks.concealed.table import side_by_side
 from benchmarks.concealed.trials import plan
 

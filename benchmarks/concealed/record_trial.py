@@ -17,7 +17,8 @@ import numpy as np
 import numpy.typing as npt
 
 from benchmarks.concealed.answer import Answer, Secret
-from benchmarks.concealed.bench import Bench, Made, bench_of
+from benchmarks.concealed.benches.bench import Bench, Made
+from benchmarks.concealed.benches.choose import bench_of
 from benchmarks.concealed.plant.law import Concealed
 from benchmarks.concealed.seal import read, seal
 from benchmarks.concealed.strength import Refit, rms, stacked, strength_for

@@ -19,7 +19,8 @@ class Task:
     """A diagnosis to run.
 
     ``trial``: label of the dataset; ``dataset``: its path; ``division``: discretisation of a wing's model, "" for a
-    vehicle; ``without``: force terms that a vehicle's model omits; ``policy``: thresholds of the diagnosis.
+    vehicle; ``without``: force terms that a vehicle's model omits; ``policy``: thresholds of the diagnosis;
+    ``suspects``: considered, all if empty; ``exhaustive``: whether every pair of them is fitted.
     """
 
     trial: str
@@ -27,6 +28,8 @@ class Task:
     division: str
     without: tuple[str, ...]
     policy: Policy = POLICY
+    suspects: tuple[str, ...] = ()
+    exhaustive: bool = False
 
 
 @dataclass(frozen=True)
@@ -46,10 +49,9 @@ def run(task: Task) -> Outcome:
     if task.division:
         calibration = replace(calibration, division=task.division)
     evaluator = make_evaluator("in_process")
+    spec = DiagnosisSpec(calibration, suspects=task.suspects, policy=task.policy, exhaustive=task.exhaustive)
     try:
-        for progress in diagnose(
-            wing_or_vehicle(load_dataset(task.dataset)), DiagnosisSpec(calibration, policy=task.policy), evaluator
-        ):
+        for progress in diagnose(wing_or_vehicle(load_dataset(task.dataset)), spec, evaluator):
             finding = progress.finding
         reason = "" if finding else "it ended without a finding"
     except Exception as error:  # a crash counts as a failed trial; the other trials continue

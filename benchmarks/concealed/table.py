@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.concealed.exhaustive import Compared
 from benchmarks.concealed.score import Mark
 
 NORMAL_90 = 1.6448536269514722
@@ -95,13 +96,15 @@ class Table:
     """All scores of one method.
 
     ``marks``: one score per trial; ``advised``: trials whose first diagnosis was ambiguous; ``advice_trials``: number
-    of trials that were designed to be ambiguous; ``seconds``: duration of the test with this method.
+    of trials that were designed to be ambiguous; ``seconds``: duration of the test with this method; ``compared``: the
+    searches that were compared with an exhaustive one.
     """
 
     marks: tuple[Mark, ...]
     advised: tuple[Advised, ...]
     advice_trials: int
     seconds: float
+    compared: tuple[Compared, ...] = ()
 
     @property
     def rates(self) -> dict[str, Rate]:
@@ -132,6 +135,7 @@ class Table:
             "intervals: hold the truth": self.coverage,
             "advice: resolved": Rate(sum(one.resolved for one in self.advised), len(self.advised)),
             "advice: by a random recording": Rate(sum(one.by_chance for one in self.advised), len(self.advised)),
+            "search: best hypothesis found": Rate(sum(one.found for one in self.compared), len(self.compared)),
             "plant finer than the model": rate(self.marks, lambda m: m.finer),
             **{
                 f"{where}: {what}": rate([one for one in of(self.marks, group) if of_rig(one) == where], good)
@@ -225,6 +229,11 @@ class Table:
                 "n": len(self.advised),
                 "resolved_percent": rates["advice: resolved"].percent,
                 "random_percent": rates["advice: by a random recording"].percent,
+            },
+            "search": {
+                "n": rates["search: best hypothesis found"].n,
+                "best_found_percent": rates["search: best hypothesis found"].percent,
+                "missed": [asdict(one) for one in self.compared if not one.found],
             },
             "rates": {name: [one.hits, one.n, one.interval] for name, one in rates.items() if one.n},
             "failures": self.failures,

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.concealed.bench import VehicleBench
+from benchmarks.concealed.benches.vehicle import VehicleBench
 from benchmarks.concealed.trials import Build
 from benchmarks.delfly import LIFT_CORRELATION, fit
 from benchmarks.proof.story import Claim, Story, diagnosed, families, leader, nominal_misfit, over_floor, saved

@@ -15,7 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.concealed.bench import WingBench, record_all
+from benchmarks.concealed.benches.bench import record_all
+from benchmarks.concealed.benches.wing import WingBench
 from benchmarks.concealed.plant.law import Concealed
 from benchmarks.concealed.trials import LAGS, THICK_PA, THIN_PA, Build, chamber, name_of, tunnel
 from benchmarks.proof.story import (

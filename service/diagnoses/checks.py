@@ -33,7 +33,8 @@ def checked_rig(
     spec_views.refuse_foreign(body, dataset)
     calibration = spec_views.calibration_spec(body, of_run or CalibrationSpec())
     start = dict(genome or {})
-    spec = DiagnosisSpec(calibration, start, tuple(body.suspects), refits=body.refits)
+    suspects = tuple(body.suspects)
+    spec = DiagnosisSpec(calibration, start, suspects, refits=body.refits, exhaustive=body.exhaustive)
     try:
         diagnoser.check_rig(spec, dataset, rig)
     except ValueError as error:
@@ -74,6 +75,7 @@ def checked(
         suspects=tuple(body.suspects),
         refine=body.refine,
         refits=body.refits,
+        exhaustive=body.exhaustive,
         axes=tuple(body.axes or ()),
     )
     try:

@@ -41,4 +41,7 @@ class DiagnosisIn(JobSettings, BaseModel):
     ] = []
     refine: Annotated[StrictBool, Field(description="whether a finer division may be taken where it limits")] = True
     refits: Annotated[Whole, Field(ge=1, le=MOST_REFITS, description="effects refitted in full at most")] = 8
+    exhaustive: Annotated[
+        StrictBool, Field(description="whether every pair of the suspects is fitted; for at most 20 suspects")
+    ] = False
     axes: Annotated[Axes | None, Field(description="vehicles only; null: all that every recording has")] = None

@@ -34,5 +34,6 @@ def diagnosis_settings(spec: DiagnosisSpec) -> answers.DiagnosisSpec:
         suspects=list(spec.suspects),
         refine=spec.refine,
         refits=spec.refits,
+        exhaustive=spec.exhaustive,
         axes=list(spec.axes),
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -12,14 +13,19 @@ import pytest
 
 from tests.diagnosis.pendulum_rig import GENES, SUSPECTS, PendulumRig, recorded
 from wingfit.diagnosis import DiagnosisSpec
+from wingfit.diagnosis.combinations import smaller_refits
+from wingfit.diagnosis.diagnose import check
 from wingfit.diagnosis.evidence.competing_fits import StartPoint
 from wingfit.diagnosis.evidence.context import FitContext
 from wingfit.diagnosis.evidence.screen import Trial
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.policy import POLICY
-from wingfit.diagnosis.search import _indistinguishable, _look_alikes, _smaller_refits, run_search
+from wingfit.diagnosis.search import _indistinguishable, _look_alikes, run_search
 from wingfit.diagnosis.search_state import SearchState
+from wingfit.records import load_dataset, wing_or_vehicle
 from wingfit.workers.in_process import InProcessEvaluator
+
+ROOT = Path(__file__).parents[2]
 
 
 def trial(name: str, *, confused_with: tuple[str, ...] = ()) -> Trial:
@@ -73,13 +79,13 @@ def test_a_series_is_refitted_without_each_of_three_effects(monkeypatch: pytest.
     def without(_: object, best: Any, part: Trial) -> Any:
         return refit(*(one for one in best.trials if one is not part))
 
-    monkeypatch.setattr("wingfit.diagnosis.search.refit_without", without)
-    assert list(_smaller_refits(searched)) == ["refit with cubic and gain", "refit with gain and point_mass"]
+    monkeypatch.setattr("wingfit.diagnosis.combinations.refit_without", without)
+    assert list(smaller_refits(searched)) == ["refit with cubic and gain", "refit with gain and point_mass"]
     assert [set(one.names) for one in added] == [{"cubic", "gain"}, {"point_mass", "gain"}]
     searched.by_excess = [two, three]
-    assert list(_smaller_refits(searched)) == []
+    assert list(smaller_refits(searched)) == []
     searched.data.kind, searched.by_excess = "tracks", [three, two]
-    assert list(_smaller_refits(searched)) == []
+    assert list(smaller_refits(searched)) == []
 
 
 def test_indistinguishable_single_effects_compete() -> None:
@@ -129,3 +135,27 @@ def test_fits_from_the_estimates_ignore_the_given_start() -> None:
     next(steps)
     assert known.initial_fit is not None
     assert known.initial_fit[1].values == pytest.approx({gene.name: gene.nominal for gene in GENES})
+
+
+@pytest.mark.parametrize("exhaustive", [False, True])
+def test_an_exhaustive_search_fits_every_pair(exhaustive: bool) -> None:
+    few = ("cubic", "friction", "gain")
+    context = FitContext(PendulumRig(), WhitenedData.of(recorded({"cubic.k3": 0.3})), InProcessEvaluator())
+    searched = SearchState(context, DiagnosisSpec(suspects=few, exhaustive=exhaustive))
+    stages = [stage for _, stage in run_search(searched, context.subject.model.searched)]
+    pairs = {frozenset(one.names) for one in searched.refits if len(one.trials) == 2}
+    assert (len(pairs) == 3) == exhaustive
+    assert ("refit with friction and gain" in stages) == exhaustive
+    assert searched.final_weights.refits[1:][int(np.argmax(searched.final_weights.evidence[1:]))].names == ("cubic",)
+    if exhaustive:
+        alone = {one.names[0]: one.fit.cost for one in searched.refits if len(one.trials) == 1}
+        assert set(alone) == set(few)
+        for one in searched.refits:
+            assert all(one.fit.cost <= alone[name] + 1.0 for name in one.names), (
+                "a pair never fits worse than its parts"
+            )
+
+
+def test_an_exhaustive_search_of_the_whole_library_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"exhaustive fits every pair of suspects, and there are \d+: name at most 20"):
+        check(wing_or_vehicle(load_dataset(ROOT / "examples/delfly")), DiagnosisSpec(exhaustive=True))

@@ -13,10 +13,10 @@ from benchmarks.concealed.answer import GROUPS, Answer, Secret
 from benchmarks.concealed.plant.measurement import balance, film
 from benchmarks.concealed.plant.wing_effects.catalogue import UNKNOWN
 from benchmarks.concealed.record_trial import Addition, Order, add, make
+from benchmarks.concealed.running import Folders, diagnosed, task
 from benchmarks.concealed.score import Mark, beats_apart, blank, failed, mark
 from benchmarks.concealed.seal import MANIFEST, BrokenSealError, close, digest, open_seal, read, seal
 from benchmarks.concealed.strength import rms
-from benchmarks.concealed.suite import Folders, diagnosed
 from benchmarks.concealed.suite import make as make_all
 from benchmarks.concealed.table import Advised, Rate, Table, at
 from benchmarks.concealed.trials import COUNTS, EQUAL, VEHICLE, Trial, any_condition, conditions, name_of, plan
@@ -169,11 +169,11 @@ def test_existing_datasets_and_findings_are_reused(tmp_path: Path) -> None:
     path = folders.findings / f"{trial.name}.json"
     path.write_text(json.dumps(finding_json(finding("unnamed"))))
     with ThreadPoolExecutor(1) as executor:
-        (outcome,) = diagnosed(executor, [(trial, trial.name)], folders, "")
+        (outcome,) = diagnosed(executor, [task(trial, trial.name, folders)], folders, "")
         assert outcome.finding == finding("unnamed")
         path.write_text(json.dumps({"failed": "it crashed"}))
         folders.dataset(trial.name).write_bytes(b"nothing")  # so that the diagnosis fails, and says so in its place
-        (outcome,) = diagnosed(executor, [(trial, trial.name)], folders, "")
+        (outcome,) = diagnosed(executor, [task(trial, trial.name, folders)], folders, "")
     assert outcome.finding is None
     assert "it crashed" not in path.read_text()
 

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from benchmarks.concealed.answer import Group
-from benchmarks.concealed.bench import VehicleBench, WingBench
-from benchmarks.concealed.drifting import drifting
+from benchmarks.concealed.benches.drifting import drifting
+from benchmarks.concealed.benches.vehicle import VehicleBench
+from benchmarks.concealed.benches.wing import WingBench
 from benchmarks.concealed.rigs import BY_HAND, VEHICLES, WINGS, as_described, size_of
 from benchmarks.concealed.score import Mark
 from benchmarks.concealed.table import Table, figures_of, verdict_is_right

@@ -1,0 +1,1 @@
+"""Benches: a plant with its cameras or balance, behind one interface."""
