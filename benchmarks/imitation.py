@@ -24,7 +24,7 @@ import wingfit
 from benchmarks.common.machine import commit, cpu
 from benchmarks.common.progress import show, show_count
 from wingfit import DiagnosisSpec
-from wingfit.diagnosis.finding import Finding
+from wingfit.diagnosis.finding import NAMING, Finding
 from wingfit.records import Dataset, Recording
 from wingfit.records.array_types import Array
 from wingfit.sim.effects.contract import Effect
@@ -115,7 +115,7 @@ def outcome(seed: int, plan: Plan) -> dict[str, Any]:
 def _judged(found: Finding, plan: Plan) -> dict[str, Any]:
     true = {name for name, _ in plan.hidden} - set(plan.removed)
     alike = {other for name in plan.removed for other in EFFECTS[name].confused_with}
-    named = set(found.named) if found.verdict in ("named", "measurement fault") else set()
+    named = set(found.named) if found.verdict in NAMING else set()
     singles = [one for one in found.hypotheses if len(one.effects) == 1 and one.refitted]
     best = max(singles, key=lambda one: one.explained, default=None)
     return {

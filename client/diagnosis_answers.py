@@ -8,7 +8,7 @@ from typing_extensions import TypedDict
 
 from wingfit.client.answers import Job, JobSpec
 
-Verdict = Literal["adequate", "named", "ambiguous", "unnamed", "measurement fault"]
+Verdict = Literal["adequate", "named", "partly named", "ambiguous", "unnamed", "measurement fault"]
 
 
 class DiagnosisSpec(JobSpec):

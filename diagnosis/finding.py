@@ -14,8 +14,9 @@ from typing import Literal
 from wingfit.records.array_types import Array, Float
 from wingfit.records.dataset import AnyKind
 
-Verdict = Literal["adequate", "named", "ambiguous", "unnamed", "measurement fault"]
-VERDICTS: tuple[Verdict, ...] = ("adequate", "named", "ambiguous", "unnamed", "measurement fault")
+Verdict = Literal["adequate", "named", "partly named", "ambiguous", "unnamed", "measurement fault"]
+VERDICTS: tuple[Verdict, ...] = ("adequate", "named", "partly named", "ambiguous", "unnamed", "measurement fault")
+NAMING: tuple[Verdict, ...] = ("named", "partly named", "measurement fault")  # those with certain effects
 Numbers = tuple[float, ...]
 Table = tuple[tuple[float, ...], ...]
 

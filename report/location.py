@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from wingfit.diagnosis.finding import Exponent, Finding, Interval, Where
+from wingfit.diagnosis.finding import NAMING, Exponent, Finding, Interval, Where
 from wingfit.report.layout import figure, panels
 from wingfit.report.markup import Markup, joined, tag
 from wingfit.report.number_format import Scale, bounds, capital, listed, number, percent, with_unit
@@ -20,7 +20,7 @@ def place(finding: Finding) -> Markup | None:
     where = finding.where
     if where is None:
         return None
-    subject = "the named effect" if finding.verdict in ("named", "measurement fault") else "the misfit"
+    subject = "the named effect" if finding.verdict in NAMING else "the misfit"
     drawings = [d for d in (_strips(where), _harmonics(where, subject)) if d is not None]
     found = figure(where.words or "Location of the misfit", panels(*drawings)) if drawings else tag("p", where.words)
     return joined(found, _powers(where.exponents, subject))

@@ -51,6 +51,7 @@ def headline(finding: Finding) -> str:
     return {
         "adequate": "The model is adequate: these recordings show no missing physics",
         "named": f"Missing physics: {together or 'a known effect'}",
+        "partly named": f"A part of what is missing: {together or 'a known effect'}; more remains",
         "ambiguous": "Several hypotheses fit equally well",
         "unnamed": "Missing physics that no effect of the library explains",
         "measurement fault": f"Measurement fault: {together}" if named else "Measurement fault",

@@ -17,10 +17,9 @@ from benchmarks.any_rig.trials import Answer, Trial, recorded
 from benchmarks.common.progress import show_count
 from benchmarks.concealed.seal import digest
 from wingfit import Finding, SeriesDataset, diagnose
-from wingfit.diagnosis.finding import Interval
+from wingfit.diagnosis.finding import NAMING, Interval
 
 Outcome = tuple["Mark", Answer]
-NAMING = ("named", "measurement fault")
 VISIBLE = 1.6  # strength from which a hidden thing counts, as in benchmarks.concealed
 
 

@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 from wingfit.records import Condition
 
-Group = Literal["null", "listed", "unlisted", "smooth", "measurement", "pairs", "drift", "advice"]
-GROUPS: tuple[Group, ...] = ("null", "listed", "unlisted", "smooth", "measurement", "pairs", "drift", "advice")
+Group = Literal["null", "listed", "unlisted", "smooth", "measurement", "pairs", "partly", "drift", "advice"]
+GROUPS: tuple[Group, ...] = get_args(Group)
 Side = Literal["physics", "measurement"]
 
 

@@ -22,7 +22,7 @@ from benchmarks.concealed.benches.choose import bench_of
 from benchmarks.concealed.plant.law import Concealed
 from benchmarks.concealed.seal import read, seal
 from benchmarks.concealed.strength import Refit, rms, stacked, strength_for
-from benchmarks.concealed.trials import DRIFT, Trial, conditions, name_of
+from benchmarks.concealed.trials import DRIFT, REST, Trial, conditions, name_of
 from wingfit.records import Condition, Dataset, Recording, load_dataset, save_dataset, wing_or_vehicle
 
 Array = npt.NDArray[np.float64]
@@ -156,7 +156,7 @@ def _made(trial: Trial, attempt: int) -> tuple[Dataset, Answer]:
     bare = Specimen(bench, trial.seed, attempt, bench.genome(rng), {})
     drawn = {name: bench.laws[name].draw(rng) for name in trial.hidden}
     strength = Strength.of(bare, fitted)
-    specimen = replace(bare, hidden=drawn) if DRIFT in drawn else strength.set(bare, drawn, trial.target)
+    specimen = replace(bare, hidden=drawn) if DRIFT in drawn else strength.set(bare, drawn, _targets(trial, bare.bench))
     every = [specimen.made(number, condition) for number, (condition, _) in enumerate(planned)]
     held_out = tuple(one.recording.name for one, (_, held) in zip(every, planned, strict=True) if held)
     noise = {
@@ -184,6 +184,12 @@ def _made(trial: Trial, attempt: int) -> tuple[Dataset, Answer]:
     )
     described = bench.described(np.random.default_rng([trial.seed, attempt, 4]))
     return Dataset(trial.name, described, tuple(one.recording for one in every), held_out), answer
+
+
+def _targets(trial: Trial, bench: Bench[Any, Any]) -> dict[str, float]:
+    """Intended strength of each effect that ``trial`` hides; what the library does not have is a smaller part."""
+    rest = REST if trial.group == "partly" else 1.0
+    return {name: trial.target * (1.0 if bench.laws[name].listed else rest) for name in trial.hidden}
 
 
 @dataclass(frozen=True, eq=False)
@@ -229,13 +235,14 @@ class Strength:
             self.changes[key] = stacked(replace(self.coarse, hidden=hidden).fitted(self.conditions)) - self.plain
         return self.changes[key]
 
-    def set(self, bare: Specimen, drawn: Concealed, target: float) -> Specimen:
-        """The specimen ``bare`` with each effect of ``drawn`` at the strength where misfit / noise is ``target``.
+    def set(self, bare: Specimen, drawn: Concealed, targets: Mapping[str, float]) -> Specimen:
+        """The specimen ``bare`` with each effect of ``drawn`` at the strength where misfit / noise is its target.
 
         If the misfit stays below LITTLE times that, the noise is lowered instead, as far as real equipment allows.
         """
         hidden, level, noise = {}, bare.level, bare.noise(self.conditions)
         for name, parameters in drawn.items():
+            target = targets[name]
             hidden[name], found = self._sized(name, parameters, target, noise)
             if found < LITTLE * target:
                 level = min(level, max(found / target, bare.least_level))

@@ -7,11 +7,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from benchmarks.concealed.answer import Answer, Group, Side
-from wingfit.diagnosis.finding import Finding, GeneValue, Hypothesis, Interval
+from wingfit.diagnosis.finding import NAMING, Finding, GeneValue, Hypothesis, Interval
 from wingfit.sim.effects.registry import EFFECTS
 
 WORSE = 1.01  # ratio of held-out misfits above which the second counts as worse
-NAMING = ("named", "measurement fault")
 
 
 @dataclass(frozen=True)

@@ -24,12 +24,12 @@ from benchmarks.concealed.running import Folders, diagnosed, each, pool, task
 from benchmarks.concealed.score import Mark, failed, mark
 from benchmarks.concealed.table import Advised, Table
 from benchmarks.concealed.trials import ROOM_K, Trial, any_condition
+from wingfit.diagnosis.finding import NAMING
 from wingfit.records import Condition, load_dataset
 
 if TYPE_CHECKING:
     from benchmarks.concealed.peers import PeerOutcome
 
-SETTLED = ("named", "measurement fault")
 CASES = 40  # most ambiguous trials that are followed up
 
 
@@ -190,7 +190,7 @@ def _advised(trial: Trial, first: Outcome, second: dict[str, Outcome], truth: fr
 
     def settled(label: str) -> bool:
         finding = second[label].finding if label in second else None
-        return finding is not None and finding.verdict in SETTLED and set(finding.named) == truth
+        return finding is not None and finding.verdict in NAMING and set(finding.named) == truth
 
     return Advised(
         trial.name,

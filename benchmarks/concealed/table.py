@@ -11,6 +11,8 @@ import numpy as np
 
 from benchmarks.concealed.exhaustive import Compared
 from benchmarks.concealed.score import Mark
+from wingfit.diagnosis.finding import NAMING
+from wingfit.sim.effects.registry import EFFECTS
 
 NORMAL_90 = 1.6448536269514722
 BINS = {2: (1.6, 2.45), 3: (2.45, 3.87), 5: (3.87, math.inf)}
@@ -129,6 +131,8 @@ class Table:
             "said with 95 %: right": rate(sure(self.marks), verdict_is_right),
             "measurement: right side": rate(seen(of(self.marks, "measurement")), lambda m: m.right_side),
             "pairs: both": rate(of(self.marks, "pairs"), lambda m: m.found == 2),
+            "partly: the part alone": rate(of(self.marks, "partly"), part_is_right),
+            "partly: left unnamed": rate(of(self.marks, "partly"), lambda m: m.verdict == "unnamed"),
             "pairs: at least one": rate(of(self.marks, "pairs"), lambda m: (m.found or 0) >= 1),
             "all: wrong name": rate(self.marks, lambda m: m.wrong),
             "held out: worse": rate(self.hiding, lambda m: m.worse),
@@ -199,6 +203,11 @@ class Table:
                 "wrong_percent": rates["smooth: wrong name"].percent,
                 "unnamed_percent": rates["smooth: left unnamed"].percent,
             },
+            "partly": {
+                "n": rates["partly: the part alone"].n,
+                "right_percent": rates["partly: the part alone"].percent,
+                "unnamed_percent": rates["partly: left unnamed"].percent,
+            },
             "drift": {"n": rates["drift: adequate"].n, "adequate_percent": rates["drift: adequate"].percent},
             "calibration": {
                 "said_95": rates["said with 95 %: right"].n,
@@ -211,7 +220,7 @@ class Table:
             },
             "wrong_name_percent": rates["all: wrong name"].percent,
             "heldout_over_floor_median": median(
-                m.held_out for m in self.hiding if m.group not in ("unlisted", "smooth", "drift")
+                m.held_out for m in self.hiding if m.group not in ("unlisted", "smooth", "drift", "partly")
             ),
             "heldout_worse_percent": rates["held out: worse"].percent,
             "coverage_percent": self.coverage.percent,
@@ -282,6 +291,8 @@ def wrongs(one: Mark) -> str:
         mistakes += ["not detected" if one.verdict == "adequate" else "not left unnamed"] * (one.verdict != "unnamed")
     elif one.group == "measurement":
         mistakes += ["wrong side"] * (not one.right_side)
+    elif one.group == "partly":
+        mistakes += ["not the part alone"] * (not part_is_right(one))
     elif one.group == "pairs":
         mistakes += ["not both"] * ((one.found or 0) < len(one.truth))
     else:
@@ -335,9 +346,14 @@ def verdict_is_right(one: Mark) -> bool | None:
         return one.verdict == "unnamed"
     if one.strength < WEAK:
         return None
-    if one.group in ("unlisted", "smooth"):
+    if one.group in ("unlisted", "smooth") or (one.group == "partly" and one.verdict == "unnamed"):
         return one.verdict == "unnamed"
-    return one.verdict in ("named", "measurement fault", "ambiguous") and not one.wrong and bool(one.found)
+    return one.verdict in (*NAMING, "ambiguous") and not one.wrong and bool(one.found)
+
+
+def part_is_right(one: Mark) -> bool:
+    """Whether the verdict is that a part is certain, and names just what is hidden of the library."""
+    return one.verdict == "partly named" and set(one.named) == {name for name in one.truth if name in EFFECTS}
 
 
 def right(one: Mark) -> bool | None:

@@ -38,6 +38,7 @@ from wingfit.diagnosis.verdict.reservations import (
     held_out_sentence,
     judged_by_accepted_error,
     noise_sentence,
+    partly,
     remaining_sentence,
 )
 from wingfit.diagnosis.verdict.series_remarks import series_remarks
@@ -55,7 +56,9 @@ def build_finding(state: SearchState, name: str, held_out: Sequence[AnyRecording
     ``name``: of the dataset; ``held_out``: recordings with which the result is validated.
     """
     nominal, weights = state.fitted_nominal.refit, state.final_weights
-    decision = judged_by_accepted_error(decide(weights), state.data, weights, state.floor(_discretisation_error(state)))
+    floor = state.floor(_discretisation_error(state))
+    decision = judged_by_accepted_error(decide(weights), state.data, weights, floor)
+    decision = partly(decision, state.data, nominal, floor)
     best = nominal if decision.verdict == "adequate" else decision.best
     yield 0.0, "computing the intervals of the genes", None
     best = replace(best, fit=with_measured_jacobian(state.context, best.fit))

@@ -9,7 +9,7 @@ from typing import Literal
 
 from wingfit.diagnosis.evidence.intervals import gene_values
 from wingfit.diagnosis.evidence.refit import Refit, contribution, refit_at
-from wingfit.diagnosis.finding import Interval, Where
+from wingfit.diagnosis.finding import NAMING, Interval, Where
 from wingfit.diagnosis.location import maps
 from wingfit.diagnosis.location.differences import cause_location, residual_location
 from wingfit.diagnosis.location.located import Located
@@ -25,7 +25,7 @@ from wingfit.diagnosis.location.pulse_phase import locate_pulse
 from wingfit.diagnosis.search_state import SearchState
 from wingfit.diagnosis.subject import beat_subject
 from wingfit.diagnosis.verdict.proof import ResidualPair
-from wingfit.diagnosis.verdict.verdict import Decision
+from wingfit.diagnosis.verdict.verdict import Decision, is_measurement_fault
 from wingfit.diagnosis.verdict.weigh_hypotheses import only_drifts
 
 Step = tuple[float, str, Located | None]
@@ -103,7 +103,7 @@ def _locate(state: SearchState, *, unnamed: bool) -> Iterator[tuple[float, str, 
 def _where(state: SearchState, decision: Decision, best: Refit, missing: MissingPhysics) -> Where:
     """Return where the misfit lies or, for a named effect, where the effect acts (a fit spreads a misfit in time)."""
     data, coefficients = state.data, state.fitted_nominal.refit.fit.coefficients
-    if decision.verdict in ("named", "measurement fault"):
+    if decision.verdict in NAMING:
         plain = replace(data, errors=None)  # what an effect does, also where errors of positions could explain it
         fit = replace(best.fit, coefficients=plain.coefficients_of(best.fit.residuals))
         acts = contribution(replace(state.context, data=plain), replace(best, fit=fit))
@@ -115,7 +115,7 @@ def _where(state: SearchState, decision: Decision, best: Refit, missing: Missing
     own = {gene.name: gene.value for gene in gene_values(state.data, shown_refit)}
     span = _effect_location(shown_refit, own, "span") or missing.place.span
     chord = _effect_location(shown_refit, own, "chord") or missing.place.chord
-    phase = missing.place.phase if decision.verdict != "measurement fault" else None
+    phase = None if decision.verdict in NAMING and is_measurement_fault(best) else missing.place.phase
     return replace(
         found,
         words=found.words + cause_location(span, chord, phase, drive_error=missing.drive_error),

@@ -8,15 +8,28 @@ import numpy as np
 
 from wingfit.diagnosis.evidence.refit import Refit
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
-from wingfit.diagnosis.finding import Proof, Verdict, amount
+from wingfit.diagnosis.finding import NAMING, Proof, Verdict, amount
 from wingfit.diagnosis.verdict.noise_doubt import noise_may_hide
 from wingfit.diagnosis.verdict.verdict import Decision
-from wingfit.diagnosis.verdict.weigh_hypotheses import HypothesisWeights, nominal_refuted
+from wingfit.diagnosis.verdict.weigh_hypotheses import HypothesisWeights, nominal_refuted, tolerated_excess
 from wingfit.records import Series
 
-NAMING: tuple[Verdict, ...] = ("named", "ambiguous", "measurement fault")
+CLAIMING: tuple[Verdict, ...] = (*NAMING, "ambiguous")
 NO_GAIN = 0.1  # of the held-out misfit: effects that remove less of it are not named
 NOT_PREDICTED = 2.0  # times the floor: the lower end of a held-out misfit from which a model does not predict
+
+
+def partly(decision: Decision, data: WhitenedData, nominal: Refit, floor: float) -> Decision:
+    """Return a ``decision`` that names effects as "partly named" if they leave more than noise and the form of a law.
+
+    ``floor`` (m or N): discretisation error.
+    """
+    left, enough = decision.best.excess, tolerated_excess(data, nominal.excess, floor)
+    if decision.verdict not in NAMING or left <= enough or not nominal_refuted(data, left, floor):
+        return decision
+    found = dict(decision.probabilities)
+    found[decision.verdict], found["partly named"] = 0.0, found[decision.verdict]
+    return replace(decision, verdict="partly named", probabilities=found)
 
 
 def remaining_sentence(data: WhitenedData, decision: Decision, best: Refit, floor: float) -> str:
@@ -83,9 +96,9 @@ def judged_by_accepted_error(
 def _without_names(decision: Decision, share: float = 1.0) -> Decision:
     """Return ``decision`` with a ``share`` of the probability of all names given to an unnamed cause."""
     found = dict(decision.probabilities)
-    given = {name: share * found[name] for name in NAMING}
-    found.update({name: found[name] - given[name] for name in NAMING}, unnamed=found["unnamed"] + sum(given.values()))
-    if sum(found[name] for name in NAMING) > found["unnamed"]:
+    given = {name: share * found[name] for name in CLAIMING}
+    found.update({name: found[name] - given[name] for name in CLAIMING}, unnamed=found["unnamed"] + sum(given.values()))
+    if sum(found[name] for name in CLAIMING) > found["unnamed"]:
         return replace(decision, probabilities=found)
     return replace(decision, verdict="unnamed", probabilities=found, named=(), alternatives=())
 
@@ -146,7 +159,7 @@ def _unpredicted(decision: Decision, proved: Proof | None, data: WhitenedData) -
 
 
 def _useless(decision: Decision, proved: Proof | None, data: WhitenedData) -> bool:
-    if data.kind != "series" or decision.verdict not in NAMING or proved is None:
+    if data.kind != "series" or decision.verdict not in CLAIMING or proved is None:
         return False
     missed = proved.before.value > 1.0 + NO_GAIN  # else there is nothing to gain
     return missed and not proved.improved and proved.after.value > (1.0 - NO_GAIN) * proved.before.value

@@ -11,7 +11,7 @@ from wingfit.diagnosis.evidence.intervals import gene_values
 from wingfit.diagnosis.evidence.refit import Refit
 from wingfit.diagnosis.evidence.screen import Trial
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
-from wingfit.diagnosis.finding import VERDICTS, Hypothesis, Verdict
+from wingfit.diagnosis.finding import NAMING, VERDICTS, Hypothesis, Verdict
 from wingfit.diagnosis.verdict.weigh_hypotheses import HypothesisWeights
 from wingfit.rigs.suspect import Suspect
 
@@ -47,7 +47,7 @@ def decide(weights: HypothesisWeights) -> Decision:
         top = int(np.argmax(effects))
         possible = [refits[k] for k in np.argsort(-effects) if effects[k] >= policy.possible * max(total, 1e-300)]
         certain = refits[top] if effects[top] >= policy.single * total else _common_subset(possible)
-        one: Verdict = "measurement fault" if certain and _is_measurement_fault(certain) else "named"
+        one: Verdict = "measurement fault" if certain and is_measurement_fault(certain) else "named"
         if certain:
             contained = [set(certain.names) <= set(refit.names) for refit in refits]
             probability[one] = float(effects[contained].sum())
@@ -67,7 +67,7 @@ def decide(weights: HypothesisWeights) -> Decision:
     if verdict == "ambiguous":
         named = tuple(dict.fromkeys(name for refit in possible for name in refit.names))
     else:
-        named = best.names if verdict in ("named", "measurement fault") else ()
+        named = best.names if verdict in NAMING else ()
     return Decision(verdict, probability, named, alternatives, best)
 
 
@@ -145,7 +145,8 @@ def _screened_hypothesis(trial: Trial, start: float, data: WhitenedData) -> Hypo
     )
 
 
-def _is_measurement_fault(refit: Refit) -> bool:
+def is_measurement_fault(refit: Refit) -> bool:
+    """Return whether all effects of the hypothesis ``refit`` are faults of the measurement."""
     return bool(refit.trials) and all(trial.suspect.family == "measurement" for trial in refit.trials)
 
 
@@ -171,8 +172,9 @@ def summary(decision: Decision, suspects: Mapping[str, Suspect], texts: Mapping[
             f"Physics is missing, and these recordings cannot distinguish: {either}. {start} "
             f"With the most probable the misfit is {texts['after']}. {texts['held_out']}"
         )
-    kind = "The recordings have a fault" if decision.verdict == "measurement fault" else "The model is missing"
-    link = ": " if decision.verdict == "measurement fault" else " "
+    fault = is_measurement_fault(decision.best)
+    kind, link = ("the recordings have a fault", ": ") if fault else ("the model is missing", " ")
+    kind = f"In part, {kind}" if decision.verdict == "partly named" else kind.capitalize()
     named = set(decision.named)
     larger = [one for one in decision.alternatives if named <= set(one)]
     others = [one for one in decision.alternatives if not named <= set(one)]

@@ -34,7 +34,7 @@ BOTH = ("hinge_offset", "drive_harmonics")
 VACUUM = AdvisedCondition(5.0, 14.0, 10.0, 0.0, 0.0)
 OPEN = ("hinge_offset", "stroke_amplitude")
 WEAK = ("added_mass", "tip_loss", "dynamic_stall", "wake_capture", "induced_inflow", "plate_drag")
-NAMES = ("adequate", "named", "ambiguous", "unnamed", "measurement fault")
+NAMES = ("adequate", "named", "partly named", "ambiguous", "unnamed", "measurement fault")
 
 
 def around(value: float, half: float) -> Interval:

@@ -107,6 +107,7 @@ def test_no_text_becomes_markup(finding: Finding) -> None:
             "Missing physics: Displaced hinge or Harmonics of the drive; these recordings cannot distinguish them",
         ),
         ("unnamed", "Missing physics that no effect of the library explains"),
+        ("partly named", "A part of what is missing: Displaced hinge + Harmonics of the drive; more remains"),
         ("measurement fault", "Measurement fault: Rotated camera frame"),
     ],
 )

@@ -9,7 +9,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from wingfit.diagnosis.finding import VERDICTS, Interval, Proof, Verdict
+from wingfit.diagnosis.finding import NAMING, VERDICTS, Interval, Proof, Verdict
 from wingfit.diagnosis.policy import POLICY
 from wingfit.diagnosis.verdict.reservations import (
     accepted_error_sentence,
@@ -17,6 +17,7 @@ from wingfit.diagnosis.verdict.reservations import (
     doubted_by_held_out,
     held_out_sentence,
     judged_by_accepted_error,
+    partly,
     remaining_sentence,
 )
 from wingfit.diagnosis.verdict.verdict import Decision
@@ -25,7 +26,7 @@ from wingfit.records import Channel, Series
 
 def decision(verdict: Verdict) -> Decision:
     probabilities: dict[str, float] = {**dict.fromkeys(map(str, VERDICTS), 0.0), verdict: 0.97, "unnamed": 0.03}
-    names = ("drag",) if verdict in ("named", "measurement fault") else ()
+    names = ("drag",) if verdict in NAMING else ()
     return Decision(verdict, probabilities, names, (), cast("Any", SimpleNamespace(names=("drag",), excess=25.0)))
 
 
@@ -50,7 +51,7 @@ def data(kind: str = "series", accepted: float = 0.0) -> Any:
     )
 
 
-@pytest.mark.parametrize("verdict", ["named", "ambiguous", "measurement fault"])
+@pytest.mark.parametrize("verdict", ["named", "partly named", "ambiguous", "measurement fault"])
 def test_effects_that_predict_no_better_are_not_named(verdict: Verdict) -> None:
     before, useless = decision(verdict), proof(2.1, 2.1, improved=False)
     after = doubted_by_held_out(before, useless, data())
@@ -162,3 +163,19 @@ def test_a_model_that_is_adequate_by_the_accepted_error_alone_says_so(
     words = accepted_sentence(data(accepted=accepted), found, found.best, 0.0)
     assert words == (" What exceeds the noise is within the accepted error: 0.5 m in height." if stated else "")
     assert accepted_sentence(data(accepted=accepted), decision("unnamed"), found.best, 0.0) == ""
+
+
+@pytest.mark.parametrize("verdict", VERDICTS)
+def test_effects_that_leave_more_than_noise_and_form_are_a_part(verdict: Verdict) -> None:
+    before = decision(verdict)  # leaves an excess of 25
+    nominal = cast("Any", SimpleNamespace(excess=400.0))
+    after = partly(before, data("forces"), nominal, 0.0)
+    if verdict not in NAMING:
+        assert after is before
+        return
+    assert (after.verdict, after.named) == ("partly named", ("drag",))
+    assert after.probabilities["partly named"] == before.probabilities[verdict]
+    assert sum(after.probabilities.values()) == pytest.approx(1.0)
+    other_form = cast("Any", SimpleNamespace(excess=25.0 / POLICY.form**2))
+    assert partly(before, data("forces"), other_form, 0.0).verdict == verdict, "laws of two forms differ by as much"
+    assert partly(before, data("forces"), nominal, 5.0).verdict == verdict, "the discretisation explains it"
