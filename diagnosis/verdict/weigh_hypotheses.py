@@ -81,6 +81,11 @@ def weigh(
         possible &= [_explains_drift(data, nominal, one) for one in hypotheses]
     imitates = _imitation(data, hypotheses, floor, error)
     weight = np.where(possible, evidence - imitates, -np.inf)
+    if data.kind != "series":
+        with_unknown = _evidence(
+            data, tau + policy.unknown_residual**2 * excess, genes + policy.unknown_genes, effects, suspects
+        )
+        weight = _with_unknown_rest(hypotheses, weight, with_unknown - imitates)
     top = max(weight.max(), unknown)
     weight, other = np.exp(weight - top), np.exp(unknown - top)
     total = weight.sum() + other
@@ -89,6 +94,20 @@ def weigh(
         doubted = max(probabilities[0] - policy.doubted_noise, 0.0)
         probabilities[0], unknown = probabilities[0] - doubted, unknown + doubted
     return HypothesisWeights(hypotheses, evidence - evidence[0], probabilities, unknown, excess, data.policy)
+
+
+def _with_unknown_rest(hypotheses: Sequence[Refit], weight: Array, with_unknown: Array) -> Array:
+    """Return the log weights [H], with that of effects beside a law outside the library where others contain them.
+
+    Further effects may only imitate such a law. So the effects of a hypothesis weigh as much as the best one that
+    contains them, if ``with_unknown`` [H], their log weight together with such a law, is as large.
+    """
+    found, names = weight.copy(), [set(one.names) for one in hypotheses]
+    for k, own in enumerate(names):
+        larger = [weight[j] for j, other in enumerate(names) if own < other]
+        if own and larger:
+            found[k] = max(weight[k], min(with_unknown[k], max(larger)))
+    return found
 
 
 def _imitation(data: WhitenedData, hypotheses: Sequence[Refit], floor: float, error: float) -> Array:

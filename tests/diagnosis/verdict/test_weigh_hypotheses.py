@@ -130,6 +130,15 @@ def test_an_effect_that_explains_nearly_all_is_named() -> None:
     assert verdict(2.0, refit(0.3, ("a",)), refit(1.5, ("b",))) == ("named", ("a",))
 
 
+def test_further_effects_that_an_unknown_law_may_replace_are_not_named() -> None:
+    one, three = refit(1.6, ("a",)), refit(0.6, ("a", "b", "c"), 2)
+    assert verdict(5.0, one, three) == ("named", ("a",)), "a law outside the library explains as much for less"
+    clearly = refit(0.0, ("a", "b"))
+    assert verdict(5.0, refit(2.5, ("a",)), clearly) == ("named", ("a", "b"))
+    assert verdict(5.0, refit(4.0, ("a",)), three) == ("named", ("a", "b", "c")), "alone it explains too little"
+    assert verdict(5.0, refit(1.6, ("d",)), refit(0.3, ("a", "b"))) == ("named", ("a", "b")), "of its own effects only"
+
+
 def test_a_measurement_fault_has_its_own_verdict() -> None:
     found = verdict(2.0, refit(0.3, ("a",), family="measurement"), refit(1.5, ("b",)))
     assert found == ("measurement fault", ("a",))

@@ -23,7 +23,7 @@ EFFECT = effect_of_drive(
     source="Armanini et al. (2016), Eqs. 20 and 21: the mean flap angle, called eta there",
     signature="the whole wing is rotated by a constant angle about its flapping axis, and forces change with the wing "
     "pitch, which follows the stroke",
-    confused_with=("camera_rotation", "balance_tilt"),
+    confused_with=("camera_rotation", "balance_tilt", "wing_pitch_zero"),
     wing=_wing,
     vehicle=_vehicle,
 )
