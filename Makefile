@@ -20,11 +20,13 @@ serve: $(RUNS)  ## start the service and stay
 test: $(INSTALLED)  ## every check and every test, four at a time: programs, servers and browsers wait more than they compute
 	@$(MAKE) --no-print-directory -k -j4 test-service test-rest test-programs test-pages check
 
+# Those of jobs and pages take as long as the others of the service.
+BESIDE := tests/service/jobs tests/service/pages
 test-service:
-	$(BIN)/python -m pytest tests/service --ignore tests/service/pages
+	$(BIN)/python -m pytest tests/service $(BESIDE:%=--ignore %)
 
 test-pages:
-	$(BIN)/python -m pytest tests/service/pages
+	$(BIN)/python -m pytest $(BESIDE)
 
 # They start programs, and wait for them.
 PROGRAMS := tests/docs tests/benchmarks tests/workers

@@ -11,7 +11,7 @@ from typing import Any, Literal, get_args
 
 from wingfit.records import Condition
 
-Group = Literal["null", "listed", "unlisted", "smooth", "measurement", "pairs", "partly", "drift", "advice"]
+Group = Literal["null", "listed", "unlisted", "smooth", "measurement", "pairs", "partly", "every", "drift", "advice"]
 GROUPS: tuple[Group, ...] = get_args(Group)
 Side = Literal["physics", "measurement"]
 

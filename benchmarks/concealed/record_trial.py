@@ -22,8 +22,8 @@ from benchmarks.concealed.benches.choose import bench_of
 from benchmarks.concealed.plant.law import Concealed
 from benchmarks.concealed.seal import read, seal
 from benchmarks.concealed.strength import Refit, rms, stacked, strength_for
-from benchmarks.concealed.trials import DRIFT, REST, Trial, conditions, name_of
-from wingfit.records import Condition, Dataset, Recording, load_dataset, save_dataset, wing_or_vehicle
+from benchmarks.concealed.trials import DRIFT, ENTIRE, REST, Trial, conditions, name_of
+from wingfit.records import Condition, Dataset, Recording, Vehicle, load_dataset, save_dataset, wing_or_vehicle
 
 Array = npt.NDArray[np.float64]
 
@@ -139,7 +139,8 @@ def make(order: Order) -> str:
 def add(order: Addition) -> None:
     """Record one more condition of a trial's rig, and save the dataset extended by it."""
     dataset, answer = wing_or_vehicle(load_dataset(order.dataset)), read(order.sealed / f"{order.trial.name}.json")
-    hidden = {secret.name: dict(secret.parameters) for secret in answer.secrets}
+    secrets = [secret for secret in answer.secrets if secret.name not in order.trial.build.by_nature]
+    hidden = {secret.name: dict(secret.parameters) for secret in secrets}
     bench = bench_of(order.trial.build)
     specimen = Specimen(bench, answer.seed, answer.attempt, answer.genome, hidden, answer.level)
     more = specimen.made(len(dataset.recordings), order.condition).recording
@@ -169,10 +170,13 @@ def _made(trial: Trial, attempt: int) -> tuple[Dataset, Answer]:
         rig=trial.build.rig,
         division=trial.build.division,
         plant=trial.build.plant,
-        secrets=tuple(specimen.secret(name, fitted[0]) for name in specimen.hidden),
+        secrets=(
+            *(specimen.secret(name, fitted[0]) for name in specimen.hidden),
+            *(Secret(name, listed=True, side="physics", strength=1.0) for name in trial.build.by_nature),
+        ),
         genome=specimen.genome,
         target=trial.target,
-        strength=0.0 if DRIFT in drawn else strength.final(specimen) / noise[False],
+        strength=_reached(trial, specimen, strength) / noise[False],
         strength_of_division=strength.division() / noise[False],
         noise=noise[False],
         noise_held_out=noise[True],
@@ -184,6 +188,13 @@ def _made(trial: Trial, attempt: int) -> tuple[Dataset, Answer]:
     )
     described = bench.described(np.random.default_rng([trial.seed, attempt, 4]))
     return Dataset(trial.name, described, tuple(one.recording for one in every), held_out), answer
+
+
+def _reached(trial: Trial, specimen: Specimen, strength: Strength) -> float:
+    """RMS residual (m or N) that a refit of the nominal model leaves of what is hidden; 0 of a drift."""
+    if DRIFT in trial.hidden:
+        return 0.0
+    return strength.division() if trial.build.by_nature else strength.final(specimen)
 
 
 def _targets(trial: Trial, bench: Bench[Any, Any]) -> dict[str, float]:
@@ -243,6 +254,9 @@ class Strength:
         hidden, level, noise = {}, bare.level, bare.noise(self.conditions)
         for name, parameters in drawn.items():
             target = targets[name]
+            if isinstance(bare.bench.rig, Vehicle) and name in ENTIRE:
+                hidden[name] = dict(parameters)
+                continue
             hidden[name], found = self._sized(name, parameters, target, noise)
             if found < LITTLE * target:
                 level = min(level, max(found / target, bare.least_level))

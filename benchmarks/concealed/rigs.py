@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from benchmarks.concealed.plant.vortex_lattice.vehicle import FLIGHTS, ornithopter
 from wingfit.records import (
     ChordStation,
     FourierDrive,
@@ -157,7 +158,11 @@ WINGS: Mapping[str, tuple[Wing, Grid]] = {
     "bird": (bird_wing(), BIRD),
     "insect": (insect_wing(), INSECT),
 }
-VEHICLES: Mapping[str, tuple[Vehicle, Grid]] = {"delfly": (delfly(), DELFLY), "pair": (pair_vehicle(), PAIR)}
+VEHICLES: Mapping[str, tuple[Vehicle, Grid]] = {
+    "delfly": (delfly(), DELFLY),
+    "pair": (pair_vehicle(), PAIR),
+    "ornithopter": (ornithopter(), Grid(flights=FLIGHTS)),
+}
 GRIDS = {name: grid for name, (_, grid) in (*WINGS.items(), *VEHICLES.items())}
 
 

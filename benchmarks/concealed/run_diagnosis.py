@@ -20,7 +20,8 @@ class Task:
 
     ``trial``: label of the dataset; ``dataset``: its path; ``division``: discretisation of a wing's model, "" for a
     vehicle; ``without``: force terms that a vehicle's model omits; ``policy``: thresholds of the diagnosis;
-    ``suspects``: considered, all if empty; ``exhaustive``: whether every pair of them is fitted.
+    ``suspects``: considered, all if empty; ``exhaustive``: whether every pair of them is fitted;
+    ``effects``: that the model has.
     """
 
     trial: str
@@ -30,6 +31,7 @@ class Task:
     policy: Policy = POLICY
     suspects: tuple[str, ...] = ()
     exhaustive: bool = False
+    effects: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -45,7 +47,7 @@ class Outcome:
 def run(task: Task) -> Outcome:
     """Run the diagnosis ``task`` in this process. An exception in it becomes the ``reason`` of the outcome."""
     start, finding, reason = time.perf_counter(), None, ""
-    calibration = CalibrationSpec(without=task.without)
+    calibration = CalibrationSpec(without=task.without, effects=task.effects)
     if task.division:
         calibration = replace(calibration, division=task.division)
     evaluator = make_evaluator("in_process")

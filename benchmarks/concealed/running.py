@@ -133,4 +133,4 @@ def _stored(request: Task, folders: Folders) -> Outcome | None:
 def task(trial: Trial, label: str, folders: Folders) -> Task:
     """The diagnosis request for the dataset ``label`` of a trial: only what a user would know, without the answer."""
     build = trial.build
-    return Task(label, folders.dataset(label), build.division, build.without)
+    return Task(label, folders.dataset(label), build.division, build.without, effects=build.effects)

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from benchmarks.concealed.answer import Answer, Group, Side
+from benchmarks.concealed.plant.measurement.balance import CHOICES
 from wingfit.diagnosis.finding import NAMING, Finding, GeneValue, Hypothesis, Interval
 from wingfit.sim.effects.registry import EFFECTS
 
@@ -176,7 +177,7 @@ def _covered(finding: Finding, answer: Answer) -> tuple[int, int]:
     true = _nominal(answer)
     if finding.verdict in NAMING:
         for secret in answer.secrets:
-            if secret.name in finding.named:
+            if secret.name in finding.named and secret.name not in CHOICES:
                 true.update(secret.values)
     inside = [_holds(gene, true[gene.name]) for gene in finding.genes if gene.name in true]
     known = [one for one in inside if one is not None]

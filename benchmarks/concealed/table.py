@@ -131,6 +131,8 @@ class Table:
             "said with 95 %: right": rate(sure(self.marks), verdict_is_right),
             "measurement: right side": rate(seen(of(self.marks, "measurement")), lambda m: m.right_side),
             "pairs: both": rate(of(self.marks, "pairs"), lambda m: m.found == 2),
+            "every: top-1": rate(seen(of(self.marks, "every")), lambda m: m.first),
+            "every: wrong name": rate(of(self.marks, "every"), lambda m: m.wrong),
             "partly: the part alone": rate(of(self.marks, "partly"), part_is_right),
             "partly: left unnamed": rate(of(self.marks, "partly"), lambda m: m.verdict == "unnamed"),
             "pairs: at least one": rate(of(self.marks, "pairs"), lambda m: (m.found or 0) >= 1),
@@ -202,6 +204,12 @@ class Table:
                 "n": rates["smooth: wrong name"].n,
                 "wrong_percent": rates["smooth: wrong name"].percent,
                 "unnamed_percent": rates["smooth: left unnamed"].percent,
+            },
+            "every": {
+                "n": len(of(self.marks, "every")),
+                "seen": rates["every: top-1"].n,
+                "top1_percent": rates["every: top-1"].percent,
+                "wrong_percent": rates["every: wrong name"].percent,
             },
             "partly": {
                 "n": rates["partly: the part alone"].n,

@@ -26,8 +26,10 @@ INCIDENCE = math.radians(4.0)
 class Build:
     """A rig, with the discretisations of the diagnosed model and of the plant (the simulator that makes the data).
 
-    ``division`` (model) and ``plant``: bodies of the wing, such as "8x4" (8 strips of 4 bodies); both "" for a vehicle.
+    ``division`` (model) and ``plant``: bodies of the wing, such as "8x4" (8 strips of 4 bodies), both "" for a vehicle;
+    or another kind of plant, ROD or LATTICE.
     ``without``: force terms omitted both from the vehicle's model and from its plant. ``body``: which wing or vehicle.
+    ``effects``: that the model has. ``by_nature``: effects that the plant always has, and this model does not.
     """
 
     rig: Literal["wing", "vehicle"]
@@ -35,6 +37,8 @@ class Build:
     plant: str = ""
     without: tuple[str, ...] = ()
     body: str = "robird"
+    effects: tuple[str, ...] = ()
+    by_nature: tuple[str, ...] = ()
 
     @property
     def grid(self) -> Grid:
@@ -47,12 +51,27 @@ BEYOND = Build("wing", "4", "10x1")  # a discretisation that no diagnosis refine
 ELEVEN, ELEVEN_FINER = Build("wing", "11", "11"), Build("wing", "11", "6x3")
 WHOLE, WHOLE_FINER = Build("wing", "24", "24"), Build("wing", "24", "8x4")
 BIRD, INSECT = Build("wing", "4", "9x1", body="bird"), Build("wing", "4", "8x1", body="insect")
+ROD = "rod"  # as a plant: a continuous wing, in finite elements
+ELEVEN_ROD, STRIPS_ROD, FOUR_ROD = Build("wing", "11", ROD), Build("wing", "8x1", ROD), Build("wing", "4", ROD)
+BIRD_ROD, INSECT_ROD = replace(FOUR_ROD, body="bird"), replace(FOUR_ROD, body="insect")
+BODIES_ONLY = (
+    "backlash", "mass_offset", "tether", "rotational_circulation", "plate_drag", "viscous_drag", "compliant_drive",
+)  # fmt: skip  # effects that only the multi-body plant has
 FLING = "clap_and_peel"
 VEHICLE, BARE = Build("vehicle", body="delfly"), Build("vehicle", without=(FLING,), body="delfly")
 PAIR = Build("vehicle", body="pair")
+LATTICE = "lattice"  # as a plant: an unsteady vortex lattice
+IN_LATTICE = ("circulation_lag", "tip_loss", "wing_acceleration")  # what it has, and the quasi-steady model does not
+VORTICES = Build("vehicle", plant=LATTICE, body="ornithopter", effects=IN_LATTICE)
+MOVED = (
+    "stroke_amplitude", "stroke_bias", "wing_pitch_zero", "wing_pitch_amplitude", "wing_pitch_phase", "residual_air",
+)  # fmt: skip
 VEHICLES = (VEHICLE, BARE, PAIR)  # some models omit the fling, so that its absence does not reveal what is hidden
-SMALL = (FINER, EQUAL, BIRD, BEYOND, INSECT, EQUAL, FINER, BIRD, BEYOND, EQUAL, INSECT, FINER)
-WINGS = (*SMALL, ELEVEN, *SMALL, *SMALL, ELEVEN_FINER, *SMALL)
+SMALL = (
+    FINER, EQUAL, BIRD, FOUR_ROD, BEYOND, INSECT, EQUAL, BIRD_ROD, FINER, BIRD, STRIPS_ROD, BEYOND, EQUAL, INSECT,
+    INSECT_ROD, FINER,
+)  # fmt: skip
+WINGS = (*SMALL, ELEVEN, *SMALL, ELEVEN_ROD, *SMALL, ELEVEN_FINER, *SMALL)
 
 
 @dataclass(frozen=True)
@@ -129,6 +148,25 @@ PARTLY_VEHICLE = (
     ("balance_tilt", "stop_knock"),
     ("clap_and_peel", "tail_in_wake"),
 )
+# All others of the library, each once.
+EVERY_WING = (
+    "cubic_stiffness", "rod_slip", "hysteresis", "viscoelastic", "dynamic_stall", "plate_drag", "viscous_drag",
+    "rotational_circulation", "residual_air", "stroke_bias", "mass_offset", "tether", "compliant_drive", "marker_swap",
+    "exponential_smoothing", "strobe_rate",
+)  # fmt: skip
+EVERY_VEHICLE = (
+    "airspeed_error", "body_pitch_error", "body_drag", "tail_lift", "residual_air", "stroke_bias", "wing_pitch_zero",
+    "wing_pitch_amplitude", "wing_pitch_phase", "zero_lift_angle", "varying_coefficients", "dynamic_stall",
+    "stall_vortex", "tip_loss", "wake_tip_loss", "downwash", "wake_capture", "mass_offset", "added_mass_error",
+    "wing_acceleration", "inertial", "added_mass", "effective_chord", "translation", "rotational_circulation",
+    "viscous", "balance_drift", "scale_error", "axis_sign", "axis_swap", "unit_error", "phase_reference",
+)  # fmt: skip
+LEFT_OUT = {
+    "clap_and_peel": FLING, "inertial": "inertial", "added_mass": "added_mass", "effective_chord": "effective_chord",
+    "translation": "translation", "rotational_circulation": "rotation", "viscous": "viscous",
+}  # fmt: skip  # terms that the model of a vehicle does not have where an effect is hidden
+ENTIRE = (*(name for name in LEFT_OUT if name != FLING), "axis_sign", "axis_swap", "unit_error", "phase_reference")
+"""Effects of vehicles that are hidden as they are: whole terms, and faults that are choices."""
 REST = 0.4  # of the strength of the effect that can be named
 # Hidden in few similar conditions, so that other hypotheses may fit equally well: delays look like lags, tilted hinges
 # like rotated cameras.
@@ -136,25 +174,28 @@ OPEN_WING = ("phase_lag_error", "rolling_shutter", "hinge_tilt", "tracker_lag", 
 OPEN_VEHICLE = ("filter_delay", "clock_offset", "circulation_lag", "balance_tilt", "induced_inflow")
 
 COUNTS: dict[str, int] = {
-    "null": 150, "listed": 15, "unlisted": 20, "smooth": 8, "measurement": 60, "pairs": 21, "partly": 21, "drift": 20,
-    "advice": 40,
+    "null": 150, "listed": 15, "unlisted": 20, "smooth": 8, "measurement": 60, "pairs": 21, "partly": 21, "every": 48,
+    "drift": 20, "advice": 40,
 }  # fmt: skip
 QUICK: dict[str, int] = {
-    "null": 6, "listed": 1, "unlisted": 1, "smooth": 1, "measurement": 4, "pairs": 2, "partly": 2, "drift": 1,
-    "advice": 2,
+    "null": 6, "listed": 1, "unlisted": 1, "smooth": 1, "measurement": 4, "pairs": 2, "partly": 2, "every": 2,
+    "drift": 1, "advice": 2,
 }  # fmt: skip
 SPARSE = 9  # every ninth null trial has as few recordings as an ambiguous one
+QUICK_LATTICE = 6  # the quick sample contains every sixth of the trials in a vortex lattice
 QUICK_KINDS = 3  # the quick sample contains every third of the listed and of the unlisted effects
 
 
-def plan(seed: int, *, quick: bool = False, only: Sequence[str] = ()) -> tuple[Trial, ...]:
+def plan(seed: int, *, quick: bool = False, only: Sequence[str] = (), lattice: bool = False) -> tuple[Trial, ...]:
     """All trials of a test in random order, with names that reveal nothing; the same ``seed`` gives the same trials.
 
-    ``quick``: a small sample; ``only``: names of the groups to include, all if empty.
+    ``quick``: a small sample; ``only``: names of the groups to include, all if empty; ``lattice``: also trials in a
+    vortex lattice.
     """
     counts = QUICK if quick else COUNTS
     thinned = QUICK_KINDS if quick else 1
     drafts = [draft for group in GROUPS for draft in _group(group, counts[group], thinned)]
+    drafts += of_lattice()[:: QUICK_LATTICE if quick else 1] if lattice else []
     order = np.random.default_rng([seed, 1]).permutation(len(drafts))
     named = [replace(drafts[k], name=f"trial-{n:04d}", seed=seed * 100_000 + n) for n, k in enumerate(order)]
     return tuple(trial for trial in named if not only or trial.group in only)
@@ -189,12 +230,35 @@ def _group(group: Group, n: int, thinned: int) -> Iterator[Trial]:
         yield from _mixed(group, [(name,) for name in wing], [(name,) for name in vehicle], n)
     elif group == "pairs":
         yield from _mixed(group, PAIRS_WING, PAIRS_VEHICLE, n)
+    elif group == "every":
+        found = _mixed(group, [(name,) for name in EVERY_WING], [(name,) for name in EVERY_VEHICLE], n)
+        yield from (replace(draft, target=TARGETS[1]) for draft in found)
     elif group == "partly":
         found = _mixed(group, PARTLY_WING, PARTLY_VEHICLE, n)
         yield from (replace(draft, target=max(TARGETS)) for draft in found)
     else:
         found = _mixed(group, [(name,) for name in OPEN_WING], [(name,) for name in OPEN_VEHICLE], n)
         yield from (replace(draft, poor=True, target=2.0) for draft in found)
+
+
+def of_lattice() -> list[Trial]:
+    """The trials of the vehicle in a vortex lattice, still without name and seed: the lattice takes minutes a trial.
+
+    Its model has all that the lattice has beyond a quasi-steady model, or lacks one of these.
+    """
+    lag, *_, acceleration = IN_LATTICE
+    lacking = [
+        replace(VORTICES, effects=tuple(one for one in IN_LATTICE if one != name), by_nature=(name,))
+        for name in (lag, acceleration)
+    ]
+    measured = zip(("balance_tilt", "filter_delay", "balance_offset"), TARGETS, strict=True)
+    moved = zip(MOVED, cycle(TARGETS), strict=False)
+    return [
+        *(_draft("null", VORTICES) for _ in range(4)),
+        *(_draft("listed", build) for build in lacking),
+        *(_draft("listed", VORTICES, (name,), target) for name, target in moved),
+        *(_draft("measurement", VORTICES, (name,), target) for name, target in measured),
+    ]
 
 
 def _each(group: Group, names: Sequence[str], builds: Sequence[Build], n: int) -> Iterator[Trial]:
@@ -219,7 +283,12 @@ def _mixed(
 
 
 def _draft(group: Group, build: Build, hidden: tuple[str, ...] = (), target: float = 0.0) -> Trial:
-    return Trial("", group, BARE if FLING in hidden else build, hidden, target, False, 0)
+    terms = tuple(LEFT_OUT[name] for name in hidden if name in LEFT_OUT)
+    if terms and build.rig == "vehicle":
+        build = replace(VEHICLE, without=terms)
+    elif build.plant == ROD and set(hidden) & set(BODIES_ONLY):
+        build = replace(build, plant=BEYOND.plant)
+    return Trial("", group, build, hidden, target, False, 0)
 
 
 def conditions(trial: Trial, rng: np.random.Generator) -> list[tuple[Condition, bool]]:

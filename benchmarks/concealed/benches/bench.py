@@ -29,7 +29,7 @@ Motion = TypeVar("Motion")
 
 SPREAD = 1.6  # true parameters are drawn between estimate / SPREAD and estimate * SPREAD
 SMALLEST, LARGEST = 0.02, 4.0  # limits of a strength, as multiples of the typical strength
-MOST = {"marker_swap": 1.9, "tip_loss": 2.0, "dynamic_stall": 1.4, "circulation_lag": 1.0}
+MOST = {"marker_swap": 1.9, "tip_loss": 2.0, "dynamic_stall": 1.4, "circulation_lag": 1.0, "stall_vortex": 2.0}
 """Upper limits, as multiples of the typical strength, of laws that are only valid below LARGEST."""
 KEPT = 64  # simulated beats that are cached
 
@@ -109,7 +109,7 @@ class Bench(ABC, Generic[Motion, Quality]):
     @cached_property
     def model(self) -> Model:
         """The nominal model that will be diagnosed; it is refitted to measure the strength of hidden effects."""
-        spec = CalibrationSpec(without=self.build.without)
+        spec = CalibrationSpec(without=self.build.without, effects=self.build.effects)
         if self.build.division:
             spec = replace(spec, division=self.build.division)
         return model_for(Dataset("nominal", self.rig, ()), spec)

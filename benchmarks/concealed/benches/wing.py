@@ -109,11 +109,7 @@ class WingBench(Bench[Beat, Filmset]):
 
     def simulated(self, condition: Condition, genome: Mapping[str, float], hidden: Concealed) -> Beat:
         """One periodic beat of the plant, with the true tracks of all markers, m."""
-        effects = tuple(
-            Effect(name, values["strength"], {key: value for key, value in values.items() if key != "strength"})
-            for name, values in hidden.items()
-        )
-        return simulate_wing(self.rig, self.build.plant, genome, condition, Hidden(effects))
+        return simulate_wing(self.rig, self.build.plant, genome, condition, hidden_of(hidden))
 
     def shown(
         self, beat: Beat, condition: Condition, hidden: Concealed, quality: Filmset, rng: np.random.Generator
@@ -121,6 +117,16 @@ class WingBench(Bench[Beat, Filmset]):
         """Film the ``beat`` under ``condition``, with the faults ``hidden`` of cameras, clocks and trackers."""
         made = film(beat.tracks, self.rig, condition, quality.filming, rng, hidden, cameras=quality.cameras)
         return Made(made.recording, made.noise)
+
+
+def hidden_of(hidden: Concealed) -> Hidden:
+    """Convert the parameters of hidden effects to the class that the wing's plants use."""
+    return Hidden(
+        tuple(
+            Effect(name, values["strength"], {key: value for key, value in values.items() if key != "strength"})
+            for name, values in hidden.items()
+        )
+    )
 
 
 def _law(kind: Kind, wing: Wing) -> Law:

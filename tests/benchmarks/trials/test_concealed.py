@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from benchmarks.concealed.answer import GROUPS, Answer, Secret
+from benchmarks.concealed.plant.continuum.simulate import EFFECTS as ROD_EFFECTS
 from benchmarks.concealed.plant.measurement import balance, film
 from benchmarks.concealed.plant.wing_effects.catalogue import UNKNOWN
 from benchmarks.concealed.record_trial import Addition, Order, add, make
@@ -19,10 +20,23 @@ from benchmarks.concealed.seal import MANIFEST, BrokenSealError, close, digest, 
 from benchmarks.concealed.strength import rms
 from benchmarks.concealed.suite import make as make_all
 from benchmarks.concealed.table import Advised, Rate, Table, at
-from benchmarks.concealed.trials import COUNTS, EQUAL, VEHICLE, Trial, any_condition, conditions, name_of, plan
+from benchmarks.concealed.trials import (
+    COUNTS,
+    DRIFT,
+    EQUAL,
+    LATTICE,
+    ROD,
+    VEHICLE,
+    Trial,
+    any_condition,
+    conditions,
+    name_of,
+    plan,
+)
 from wingfit.diagnosis.finding import Finding, Floors, GeneValue, Hypothesis, Interval, RecordingMisfit, Verdict, Where
 from wingfit.records import Condition, load_dataset, wing_or_vehicle
 from wingfit.report import finding_json
+from wingfit.sim.effects.registry import EFFECTS
 
 CONDITION = Condition(3.0, 0.05, 1e5, 293.15)
 MASS = Secret("lumped_mass", True, "physics", 1.0, span=0.8, chord=0.3, phase=0.02, values={"lumped_mass.mass": 0.004})
@@ -260,7 +274,7 @@ def test_the_plan_has_the_requested_trials_and_names_reveal_nothing() -> None:
     assert len(by_group["measurement"]) >= 60
     assert len(by_group["pairs"]) >= 21
     assert sum(trial.build.plant != trial.build.division for trial in trials) >= len(trials) / 3
-    assert {trial.build.division for trial in trials} == {"", "4", "11", "24"}
+    assert {trial.build.division for trial in trials} == {"", "4", "8x1", "11", "24"}
     assert len({trial.name for trial in trials}) == len(trials) == len({trial.seed for trial in trials})
     physics = {kind for (kind,) in set(unlisted)} - set(film.FAULTS) - set(balance.FAULTS)
     assert len(physics & set(UNKNOWN)) >= 3  # of the wing's plant
@@ -270,6 +284,21 @@ def test_the_plan_has_the_requested_trials_and_names_reveal_nothing() -> None:
     assert trials == plan(3)
     assert trials != plan(4)
     assert plan(3, only=["pairs"]) == tuple(trial for trial in trials if trial.group == "pairs")
+
+
+def test_every_effect_of_the_library_is_hidden() -> None:
+    hidden = {name for trial in plan(3) for name in trial.hidden}
+    assert set(EFFECTS) - hidden == set()
+
+
+def test_a_plant_of_another_kind_is_in_every_group_of_wings() -> None:
+    trials = plan(3, lattice=True)
+    assert {trial.group for trial in trials if trial.build.plant == ROD} >= set(GROUPS) - {"every"}
+    rods = {name for trial in trials if trial.build.plant == ROD for name in trial.hidden}
+    assert rods <= {*ROD_EFFECTS, *film.FAULTS, DRIFT}
+    of_lattice = [trial for trial in trials if trial.build.plant == LATTICE]
+    assert {trial.group for trial in of_lattice} == {"null", "listed", "measurement"}
+    assert not any(trial.build.plant == LATTICE for trial in plan(3))
 
 
 def test_the_quick_sample_has_every_group_and_both_rigs() -> None:

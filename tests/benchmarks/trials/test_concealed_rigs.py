@@ -3,18 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from benchmarks.concealed.answer import Group
+from benchmarks.concealed.benches.bench import Bench
+from benchmarks.concealed.benches.choose import bench_of
+from benchmarks.concealed.benches.continuous import ContinuousBench
 from benchmarks.concealed.benches.drifting import drifting
 from benchmarks.concealed.benches.vehicle import VehicleBench
+from benchmarks.concealed.benches.vortex_lattice import VortexLatticeBench
 from benchmarks.concealed.benches.wing import WingBench
+from benchmarks.concealed.plant.law import Concealed
+from benchmarks.concealed.plant.vortex_lattice.simulate import VARIABLE
 from benchmarks.concealed.rigs import BY_HAND, VEHICLES, WINGS, as_described, size_of
 from benchmarks.concealed.score import Mark
 from benchmarks.concealed.table import Table, figures_of, verdict_is_right
-from benchmarks.concealed.trials import Build, chamber, flight, tunnel
+from benchmarks.concealed.trials import FOUR_ROD, VORTICES, Build, chamber, flight, tunnel
 from wingfit.records import Recording
 from wingfit.sim.model import Array
 from wingfit.sim.virtual_rigs.campaign import blank_recording
@@ -52,6 +60,38 @@ def test_plant_and_model_of_every_vehicle_agree(name: str) -> None:
         [np.interp(np.arange(len(own)) / len(own), np.arange(len(forces)) / len(forces), c) for c in forces.T]
     )
     assert np.sqrt(np.mean((apart.T - own) ** 2)) < 0.02 * np.sqrt(np.mean(own**2))
+
+
+def test_a_continuous_wing_is_filmed_and_its_changes_are_those_of_the_bodies() -> None:
+    bench = bench_of(replace(FOUR_ROD, division="8x1"))
+    assert isinstance(bench, ContinuousBench)
+    assert type(bench.coarse()) is WingBench
+    assert "backlash" not in bench.laws
+    genome, condition = {gene.name: gene.nominal for gene in bench.model.genes}, chamber(1000.0, 0.05, 2.5)
+    hidden = {"hinge_offset": {"strength": 0.01, "direction": 0.6}}
+    quality = bench.ideal(bench.quality(np.random.default_rng(1)))
+
+    def values(one: Bench[Any, Any], concealed: Concealed) -> Array:
+        made: Array = one.recording(condition, genome, concealed, quality, np.random.default_rng(2)).recording.values
+        return made
+
+    rod, bodies = (values(one, hidden) - values(one, {}) for one in (bench, bench.coarse()))
+    assert 2e-3 < np.sqrt(np.mean(rod**2)) < 2e-2
+    assert np.sqrt(np.mean((rod - bodies) ** 2)) < 0.1 * np.sqrt(np.mean(rod**2))
+
+
+def test_a_vortex_lattice_has_what_its_model_must_contain(monkeypatch: pytest.MonkeyPatch) -> None:
+    bench = bench_of(VORTICES)
+    assert isinstance(bench, VortexLatticeBench)
+    genome = bench.genome(np.random.default_rng(1))
+    assert {"circulation_lag.share", "tip_loss.spacing", "wing_acceleration.share", "C_l"} <= set(genome)
+    assert set(genome) == {gene.name for gene in bench.model.genes}
+    assert {"C_l", "C_D0", "circulation_lag.share"} <= set(bench.searched)
+    assert type(bench.coarse()) is VehicleBench
+    assert bench.coarse().simulated(flight(6.0, 4.0, 4.2), genome, {}).shape[1] == 2
+    monkeypatch.delenv(VARIABLE, raising=False)
+    with pytest.raises(RuntimeError, match=f"set the environment variable {VARIABLE}"):
+        bench.simulated(flight(6.0, 4.0, 4.2), genome, {})
 
 
 def test_a_description_has_the_errors_of_a_laboratory_in_proportion_to_the_wing() -> None:

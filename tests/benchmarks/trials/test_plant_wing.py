@@ -36,7 +36,11 @@ MODEL = FlexibleWing(WING, "4")
 NOMINAL = {gene.name: gene.nominal for gene in MODEL.genes}
 THIN, THICK, STREAM = vacuum(10.0, 0.12, 4.0), vacuum(1000.0, 0.05, 3.0), tunnel(0.05, 3.5, 6.0)
 # Where each effect of the air shows; all else shows in thin air.
-IN_STREAM = ("dynamic_stall", "circulation_lag", "leading_edge_vortex", "added_mass", "jet", "closed_cells")
+IN_STREAM = (
+    "dynamic_stall", "circulation_lag", "leading_edge_vortex", "added_mass", "jet", "closed_cells", "plate_drag",
+    "rotational_circulation", "viscous_drag",
+)  # fmt: skip
+LEAST = {"rotational_circulation": 5e-5, "viscous_drag": 3e-6}  # m: these hardly move a wing of this size
 
 
 def genome(seed: int) -> dict[str, float]:
@@ -189,7 +193,7 @@ def test_every_effect_vanishes_at_zero_strength_and_grows(name: str) -> None:
     sizes = [rms(beat(condition, name, part * typical).tracks - nominal) for part in (0.02, 0.3, 1.0)]
     assert sizes[0] < 0.4 * sizes[1]
     assert sizes[1] < 0.8 * sizes[2]
-    assert 4e-4 < sizes[2] < 1e-2
+    assert LEAST.get(name, 4e-4) < sizes[2] < 1e-2
 
 
 @pytest.mark.parametrize(

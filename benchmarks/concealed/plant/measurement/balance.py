@@ -28,6 +28,7 @@ _STAGES = 4  # low-pass stages of a delaying amplifier
 _UNEQUAL = 0.9  # gain error of z relative to that of x
 _DECIMALS = 5
 _CUT = 0.4  # cut-off of the filter before the decimation, relative to the sampling rate
+_UNITS = (1000.0 / STANDARD_GRAVITY, 1000.0, 1.0 / 4.4482216)  # gram-force, millinewtons and pounds in a newton
 
 
 @dataclass(frozen=True)
@@ -121,7 +122,8 @@ def _measured(
     at = _clock(t, hidden) * frequency
     size, start = (_by_beat(at, memory, rng) for memory in (0.3, 0.0))
     force = CubicSpline(np.arange(len(forces) + 1) / len(forces), np.concatenate([forces, forces[:1]]), 0, "periodic")
-    felt = force((at + weighing.jitter * start) % 1.0) * (1.0 + weighing.scatter * size)[:, None]
+    start = weighing.jitter * start + _mark(hidden)
+    felt = force((at + start) % 1.0) * (1.0 + weighing.scatter * size)[:, None]
     felt = _through(felt, fine, hidden)
     felt = felt + _noise(weighing, len(t), fine, rng)
     felt = sosfiltfilt(butter(8, 2.0 * _CUT / _FINER, output="sos"), felt, axis=0)
@@ -133,6 +135,11 @@ def _measured(
 def _clock(t: Array, hidden: Concealed) -> Array:
     """True times (s) of samples whose recorded times are ``t``: the clock may have an offset or a wrong rate."""
     return np.asarray(t * (1.0 + strength(hidden, "strobe_rate")) + strength(hidden, "clock_offset"))
+
+
+def _mark(hidden: Concealed) -> float:
+    """Phase (beats) at which the recorded time is zero: that of the sensor's mark on the mechanism."""
+    return hidden["phase_reference"]["mark"] if strength(hidden, "phase_reference") else 0.0
 
 
 def _by_beat(at: Array, memory: float, rng: np.random.Generator) -> Array:
@@ -207,7 +214,10 @@ def _stuck(forces: Array, p: Parameters) -> Array:
 
 
 def _shown(forces: Array, t: Array, vehicle: Vehicle, hidden: Concealed) -> Array:
-    """Forces [T, 2] (N) at times ``t`` [T] (s) after the faults of the output: gain, saturation, zero error, drift."""
+    """Forces [T, 2] (N) at times ``t`` [T] (s) after the faults of the output.
+
+    Gain, saturation, zero error, drift, and confusion of signs, axes or units.
+    """
     gain = 1.0 + strength(hidden, "scale_error") * np.array([1.0, _UNEQUAL])
     forces = forces * gain
     if strength(hidden, "clipping"):
@@ -218,7 +228,36 @@ def _shown(forces: Array, t: Array, vehicle: Vehicle, hidden: Concealed) -> Arra
     if strength(hidden, "balance_drift"):
         p = hidden["balance_drift"]
         forces = forces + p["strength"] * np.log1p(t / p["time"])[:, None] * _way(p)
+    return _confused(np.asarray(forces), hidden)
+
+
+def _confused(forces: Array, hidden: Concealed) -> Array:
+    """Forces [T, 2] with the mistakes of whoever wrote them down: signs, axes, units. Any strength above zero is all.
+
+    Components are in the order of the balance, whose channels may be exchanged.
+    """
+    if strength(hidden, "axis_sign"):
+        forces = forces * _signs(hidden["axis_sign"])
+    if strength(hidden, "axis_swap"):
+        forces = forces[:, ::-1]
+    if strength(hidden, "unit_error"):
+        forces = forces * _unit(hidden["unit_error"])
     return np.asarray(forces)
+
+
+def _signs(p: Parameters) -> Array:
+    """Signs [2] of the forces along x and z, of which that of the ``axis`` is wrong: 0 to 1 for x, 1 to 2 for z."""
+    return np.array([-1.0, 1.0] if p["axis"] < 1.0 else [1.0, -1.0])
+
+
+def _unit(p: Parameters) -> float:
+    """Recorded number per newton in the ``unit`` that the forces are in: a number from 0 to 3 chooses it."""
+    return _UNITS[min(int(p["unit"]), len(_UNITS) - 1)]
+
+
+def _sign_values(p: Parameters) -> dict[str, float]:
+    x, z = _signs(p)
+    return {"axis_sign.x": 0.5 * (1.0 - x), "axis_sign.z": 0.5 * (1.0 - z)}
 
 
 def _way(p: Parameters) -> Array:
@@ -228,6 +267,8 @@ def _way(p: Parameters) -> Array:
 _WAY = {"azimuth": (0.0, 2.0 * math.pi)}
 _listed = partial(Law, side="measurement")
 _unlisted = partial(Law, side="measurement", listed=False)
+CHOICES = ("phase_reference", "axis_sign", "axis_swap", "unit_error")
+"""Faults without a size: they are there at any strength above zero."""
 FAULTS = {
     law.name: law
     for law in (
@@ -266,6 +307,33 @@ FAULTS = {
             source="clock error",
             both_signs=True,
             values=lambda p: {"strobe_rate.part": p["strength"]},
+        ),
+        _listed(
+            "phase_reference",
+            typical=1.0,
+            source="Armanini et al. (2016), sect. 3.2.2: a sensor's mark at another phase of the beat",
+            shape={"mark": (0.15, 0.85)},
+            values=lambda p: {"phase_reference.share": 1.0, "phase_reference.phase": p["mark"]},
+        ),
+        _listed(
+            "axis_sign",
+            typical=1.0,
+            source="sign convention of the other body axes (AIAA R-091A 2020)",
+            shape={"axis": (0.0, 2.0)},
+            values=_sign_values,
+        ),
+        _listed(
+            "axis_swap",
+            typical=1.0,
+            source="channels in another order (AIAA R-091A 2020)",
+            values=lambda _: {"axis_swap.part": 1.0},
+        ),
+        _listed(
+            "unit_error",
+            typical=1.0,
+            source="units beside the newton (BIPM 2019)",
+            shape={"unit": (0.0, 3.0)},
+            values=lambda p: {"unit_error.part": _unit(p) - 1.0},
         ),
         _unlisted("dry_friction", typical=0.02, source="play operator (Krejci 1996)"),
         _unlisted("clipping", typical=0.5, source="saturation of an amplifier, rounded"),

@@ -28,6 +28,7 @@ _KEPT_REFERENCES = 4  # reference markers that are never lost: the start of a be
 _DECIMALS = 5  # of positions in m
 _AROUND = 8  # neighbours from which the rotation of the skin at a marker is computed
 _SWAP_FRAMES = 8.0  # mean length of a swap
+_MOST_SMOOTH = 0.9  # largest share of the past that a smoothed position keeps
 _WANDER = 0.15  # fraction of a clock error that grows with time; the rest is constant
 
 
@@ -112,6 +113,7 @@ def film(
     both = []
     for one in (noisy, true):
         followed = tracked(_crept(_exchanged(one, wing, swapped, hidden), times, hidden), hole, hidden)
+        followed = smoothed(followed, hole, strength(hidden, "exponential_smoothing"))
         followed[hole] = np.nan
         both.append(np.ascontiguousarray(followed[:, kept].reshape(len(times), -1)))
     values, clean = both
@@ -248,6 +250,27 @@ def tracked(tracks: Array, hole: Bools, hidden: Concealed) -> Array:
     return out
 
 
+def smoothed(tracks: Array, hole: Bools, share: float) -> Array:
+    """Tracks [T, M, 3] (m) after the low-pass of a tracker: an RC filter of the straight lines between frames.
+
+    Its time constant is share / (1 - share) frames, the lag of exponential smoothing of this weight (Brown 1963); the
+    step is exact for a signal that is linear between frames (Franklin, Powell and Workman 1998, sect. 6.3). It starts
+    again after a gap, where the mask ``hole`` [T, M] is True.
+    """
+    if not share:
+        return tracks
+    part = min(share, _MOST_SMOOTH)
+    frames = part / (1.0 - part)
+    keep = math.exp(-1.0 / frames)
+    new, last = 1.0 - (1.0 - keep) * frames, (1.0 - keep) * frames - keep
+    out = np.empty_like(tracks)
+    out[0] = tracks[0] - frames * (tracks[1] - tracks[0])
+    for t in range(1, len(tracks)):
+        followed = keep * out[t - 1] + new * tracks[t] + last * tracks[t - 1]
+        out[t] = np.where(hole[t - 1][:, None], tracks[t], followed)
+    return out
+
+
 def _started(tracks: Array) -> Array:
     """Initial state [3, M, 3] of the filter: position, velocity, acceleration one frame before the first (per frame).
 
@@ -289,6 +312,11 @@ FAULTS = {
             values=lambda p: {"marker_swap.part": p["strength"]},
         ),
         _listed("tracker_lag", typical=2.0, source="Kalman filter (Bar-Shalom, Li and Kirubarajan 2001, sect. 6.2)"),
+        _listed(
+            "exponential_smoothing",
+            typical=0.2,
+            source="RC filter of a signal linear between frames (Franklin, Powell and Workman 1998), of the same lag",
+        ),
         _listed("rolling_shutter", typical=4e-3, source="row by row (Liang, Chang and Chen 2008)", both_signs=True),
         _listed(
             "camera_desync",

@@ -12,18 +12,21 @@ import numpy as np
 import numpy.typing as npt
 
 from benchmarks.concealed.plant.law import Concealed, check_known, strength
-from benchmarks.concealed.plant.vehicle.laws import (
-    AFTERWARDS,
-    CIRCULATION,
-    GUSTS,
-    LAWS,
-    Flow,
-    blocked,
-    disc_inflow,
+from benchmarks.concealed.plant.vehicle.flow import Flow, mass_per_length
+from benchmarks.concealed.plant.vehicle.flow import density as density
+from benchmarks.concealed.plant.vehicle.laws import AFTERWARDS, CIRCULATION, GUSTS, LAWS
+from benchmarks.concealed.plant.vehicle.laws_circulation import (
+    cambered,
     fling,
-    levered,
+    revolving_drag,
+    revolving_lift,
     tip,
+    varied,
+    wake_tip,
 )
+from benchmarks.concealed.plant.vehicle.laws_inertia import moved_air, wing_inertia
+from benchmarks.concealed.plant.vehicle.laws_motion import flapped, pitched
+from benchmarks.concealed.plant.vehicle.laws_stream import deflected, disc_inflow, flown
 from wingfit.records import Condition, FourierFlap, FourierPitch, SplitCycleFlap, Vehicle
 from wingfit.records.vehicle import Flap
 
@@ -32,7 +35,7 @@ Complex = npt.NDArray[np.complex128]
 
 PROPOSED = ("inertial", "translation", "rotation", "clap_and_peel", "added_mass", "effective_chord", "viscous")
 BERMAN_WANG = ("inertial", "translation", "rotation", "added_mass", "viscous")
-GAS = 287.05  # J/(kg K), of dry air
+_FLING = "clap_and_peel"
 _FINE = 4096  # samples of the flap law for its Fourier series
 _HARMONICS = 100
 _NODES = 10  # Gauss points between two stations
@@ -66,37 +69,35 @@ def simulate(
         coefficients: C_l, C_r, C_F, C_D0 and C_Dpi2; those of disabled terms are not needed.
         condition: frequency, air, airspeed and body pitch.
         hidden: parameters of the hidden effects, by name as in :data:`.laws.LAWS`.
-        terms: force terms of the nominal model to include, from PROPOSED.
+        terms: force terms of the nominal model to include, from PROPOSED. The terms that can be hidden ("inertial",
+            "translation", "rotational_circulation" for "rotation", "added_mass", "effective_chord", "viscous") are
+            for models without them; what they add does not depend on ``coefficients``.
         instants: number of instants in the beat.
     """
     hidden = hidden or {}
     check_known(hidden, LAWS)
     if vehicle.velocities != "mirrored":
         raise ValueError(f"vehicle {vehicle.name!r} has printed velocities; this plant supports mirrored ones only")
-    air = blocked(condition, strength(hidden, "airspeed_error"))
+    air = flown(condition, hidden)
+    if strength(hidden, "varying_coefficients"):
+        coefficients = varied(coefficients, condition, hidden["varying_coefficients"])
     inflow = None
     if strength(hidden, "induced_inflow"):
         inflow = _inflow(vehicle, coefficients, air, hidden, terms, instants)
     return _forces(vehicle, coefficients, air, hidden, terms, instants, inflow)[0]
 
 
-def density(air: Condition) -> float:
-    """Density of dry air at the pressure and temperature of ``air``, kg/m^3."""
-    return air.pressure / (GAS * air.temperature)
-
-
 def motion_of(vehicle: Vehicle, frequency: float, instants: int, hidden: Concealed) -> Motion:
     """Flap and pitch angle with two time derivatives, at ``instants`` equal steps of a beat of ``frequency`` (Hz)."""
-    flap = levered(_flap_samples(vehicle.motion.flap), strength(hidden, "stroke_amplitude"))
+    flap = flapped(_flap_samples(vehicle.motion.flap), hidden)
     rates = [_derived(flap, frequency, order) for order in range(4)]
     law = vehicle.motion.pitch
     if isinstance(law, FourierPitch):
-        samples = _series(law.mean, law.cosine, law.sine)
-        pitch = [_derived(samples, frequency, order) for order in range(3)]
+        samples, rest = _series(law.mean, law.cosine, law.sine), law.mean
     else:
-        angle = np.pi / 2 + law.constant + law.flap * rates[0]
-        pitch_samples = angle + law.flap_rate * rates[1] + law.flap_rate_squared * rates[1] ** 2
-        pitch = [_derived(pitch_samples, frequency, order) for order in range(3)]
+        rest = np.pi / 2 + law.constant
+        samples = rest + law.flap * rates[0] + law.flap_rate * rates[1] + law.flap_rate_squared * rates[1] ** 2
+    pitch = [_derived(pitched(samples, rest, hidden), frequency, order) for order in range(3)]
     keep = _FINE / instants * np.arange(instants)
     grid = np.arange(_FINE + 1)
     both = [np.stack([np.interp(keep, grid, np.append(a, a[0])) for a in these]) for these in (rates[:3], pitch)]
@@ -174,7 +175,7 @@ def _forces(
     alike = 1.0 if vehicle.layout == "single" else 2.0
     for sign in (1.0, -1.0) if vehicle.layout == "x4" else (1.0,):
         flow = _flow(vehicle, air, motion, r, chord, sign)
-        lifted, inert = _element_forces(flow, vehicle, coefficients, hidden, terms, inflow)
+        lifted, inert = _element_forces(flow, vehicle, coefficients, air, hidden, terms, inflow)
         carried += alike * lifted.real @ width
         stroke = lifted + inert
         total[:, 0] += alike * stroke.real @ width
@@ -242,6 +243,7 @@ def _element_forces(
     flow: Flow,
     vehicle: Vehicle,
     coefficients: Mapping[str, float],
+    air: Condition,
     hidden: Concealed,
     terms: tuple[str, ...],
     inflow: Array | None,
@@ -251,31 +253,42 @@ def _element_forces(
     Complex: the real part is along body x, the imaginary part along the normal of the wing at zero pitch.
     """
     rho, chord = flow.rho, flow.chord
-    air = flow.own if inflow is None else flow.own + inflow[:, None] * flow.r / flow.span
-    stream = flow.turned(air)
+    met = flow.own if inflow is None else flow.own + inflow[:, None] * flow.r / flow.span
+    stream = flow.turned(met)
     for name, gust in GUSTS.items():
         if strength(hidden, name):
-            air = air + gust(flow, hidden[name])
-    flow = replace(flow, met=flow.turned(air))
-    force = 1j * rho * _circulation(flow, vehicle, coefficients, hidden, terms) * flow.met
+            met = met + gust(flow, hidden[name])
+    flow = replace(flow, met=flow.turned(met))
+    if strength(hidden, "downwash"):  # not by the fling, whose vortices on both wings are opposite
+        single, other = tuple(t for t in terms if t != _FLING), {k: p for k, p in hidden.items() if k != _FLING}
+        bound, slope = _circulation(flow, vehicle, coefficients, air, other, single), 2.0 * coefficients.get("C_l", 0.0)
+        flow = replace(flow, met=deflected(flow, bound, vehicle, slope, strength(hidden, "downwash")))
+    gamma = _circulation(flow, vehicle, coefficients, air, hidden, terms)
+    force = 1j * rho * gamma * flow.met
     if "viscous" in terms:
         drag = coefficients["C_D0"] * flow.met.real**2 + coefficients["C_Dpi2"] * flow.met.imag**2
         force -= 0.5 * rho * chord * drag / flow.speed * flow.met
-    return flow.turned(force), flow.turned(_inertia(flow, stream, vehicle, terms))
+    if strength(hidden, "viscous"):
+        force -= 0.5 * rho * chord * revolving_drag(flow, strength(hidden, "viscous")) * flow.speed * flow.met
+    return flow.turned(force), flow.turned(_inertia(flow, stream, vehicle, hidden, terms))
 
 
 def _circulation(
-    flow: Flow, vehicle: Vehicle, coefficients: Mapping[str, float], hidden: Concealed, terms: tuple[str, ...]
+    flow: Flow,
+    vehicle: Vehicle,
+    coefficients: Mapping[str, float],
+    air: Condition,
+    hidden: Concealed,
+    terms: tuple[str, ...],
 ) -> Array:
     """Circulation [n, E] (m^2/s) by Armanini et al. (2016), Eqs. 2-4 and 7, changed by the hidden effects.
 
     Circulation lag and stall act on the circulation of a single wing, not on that of two wings that peel apart.
     """
     half = 0.5 * flow.chord**2 * flow.turn
-    rotation = coefficients["C_r"] * (0.75 - vehicle.pitch_axis) * half if "rotation" in terms else 0.0 * half
-    gamma = rotation.copy()
-    if "translation" in terms:
-        gamma -= coefficients["C_l"] * flow.chord * flow.met.real * flow.met.imag / flow.speed
+    turning = (coefficients["C_r"] if "rotation" in terms else 0.0) + strength(hidden, "rotational_circulation")
+    rotation = turning * (0.75 - vehicle.pitch_axis) * half
+    gamma = rotation + _translation(flow, coefficients, hidden, terms)
     for name, law in CIRCULATION.items():
         if strength(hidden, name):
             gamma = law(flow, gamma, rotation, hidden[name])
@@ -283,10 +296,26 @@ def _circulation(
         gamma -= (coefficients["C_F"] * half + rotation) * flow.peel[:, None]
     if strength(hidden, "clap_and_peel"):
         gamma += fling(flow, hidden["clap_and_peel"])
-    return gamma * tip(flow, hidden["tip_loss"]["strength"]) if strength(hidden, "tip_loss") else gamma
+    if strength(hidden, "tip_loss"):
+        gamma = gamma * tip(flow, strength(hidden, "tip_loss"))
+    if strength(hidden, "wake_tip_loss"):
+        gamma = gamma * wake_tip(flow, vehicle, air, _swept(vehicle), strength(hidden, "wake_tip_loss"))
+    return gamma
 
 
-def _inertia(flow: Flow, stream: Complex, vehicle: Vehicle, terms: tuple[str, ...]) -> Complex:
+def _translation(flow: Flow, coefficients: Mapping[str, float], hidden: Concealed, terms: tuple[str, ...]) -> Array:
+    """Circulation [n, E] (m^2/s) by the angle of attack, Armanini et al. (2016), Eqs. 2-3, with the hidden effects."""
+    gamma = np.zeros(flow.met.shape)
+    if "translation" in terms:
+        gamma -= coefficients["C_l"] * flow.chord * flow.met.real * flow.met.imag / flow.speed
+        if strength(hidden, "zero_lift_angle"):
+            gamma += cambered(flow, coefficients["C_l"], strength(hidden, "zero_lift_angle"))
+    if strength(hidden, "translation"):
+        gamma += revolving_lift(flow, strength(hidden, "translation"))
+    return gamma
+
+
+def _inertia(flow: Flow, stream: Complex, vehicle: Vehicle, hidden: Concealed, terms: tuple[str, ...]) -> Complex:
     """Inertial and added-mass forces (N/m of span) [n, E], complex, in axes of the chord.
 
     Armanini et al. (2016), Eqs. 9-14. The wing's own mass moves with the wing, the added mass with the velocity
@@ -294,16 +323,13 @@ def _inertia(flow: Flow, stream: Complex, vehicle: Vehicle, terms: tuple[str, ..
     """
     rho, chord, own = flow.rho, flow.chord, flow.turned(flow.own)
     peeled = flow.peeled[:, None] if "effective_chord" in terms else 1.0
-    r, chords = [s.r for s in vehicle.stations], [s.chord for s in vehicle.stations]
-    mass = vehicle.wing_mass * chord / np.trapezoid(chords, r)
-    along, across = np.pi / 4 * rho * vehicle.thickness**2, np.pi / 4 * rho * (chord * peeled) ** 2
-    force = np.zeros(own.shape, complex)
-    if "inertial" in terms:
-        force += flow.turn * (mass * (own.imag - 1j * own.real) + across * stream.imag - 1j * along * stream.real)
-    if "added_mass" in terms:
-        rate = flow.turned(flow.own_rate) - 1j * flow.turn * stream - 0.5j * chord * flow.turn_rate
-        force -= along * rate.real + 1j * across * rate.imag
-    return force
+    mass, along = mass_per_length(flow, vehicle), np.pi / 4 * rho * vehicle.thickness**2
+    across = moved_air(flow, vehicle, np.pi / 4 * rho * (chord * peeled) ** 2, hidden)
+    inertial, moved = (float(name in terms) + strength(hidden, name) for name in ("inertial", "added_mass"))
+    turning = mass * (own.imag - 1j * own.real) + across * stream.imag - 1j * along * stream.real
+    rate = flow.turned(flow.own_rate) - 1j * flow.turn * stream - 0.5j * chord * flow.turn_rate
+    force = inertial * flow.turn * turning - moved * (along * rate.real + 1j * across * rate.imag)
+    return np.asarray(force + wing_inertia(flow, own, vehicle, hidden))
 
 
 def _inflow(
@@ -319,8 +345,7 @@ def _inflow(
     The area of the actuator disc is that which the wings sweep. ValueError if the iteration does not converge.
     """
     p = hidden["induced_inflow"]
-    swept = min(0.5 * vehicle.wings * float(np.ptp(_flap_samples(vehicle.motion.flap))), np.pi) * vehicle.span**2
-    v = np.zeros(_COARSE)
+    swept, v = _swept(vehicle), np.zeros(_COARSE)
     for _ in range(_ROUNDS):
         thrust = _forces(vehicle, coefficients, air, hidden, terms, _COARSE, v)[1]
         change = 0.5 * (disc_inflow(thrust, swept, air, density(air), p) - v)
@@ -328,3 +353,8 @@ def _inflow(
         if np.abs(change).max() < _SETTLED:
             return np.fft.irfft(np.fft.rfft(v) * (instants / _COARSE), instants)
     raise ValueError(f"the inflow at {air.airspeed:g} m/s does not converge; choose a strength below {p['strength']:g}")
+
+
+def _swept(vehicle: Vehicle) -> float:
+    """Area (m^2) that all wings sweep with the described motion."""
+    return min(0.5 * vehicle.wings * float(np.ptp(_flap_samples(vehicle.motion.flap))), np.pi) * vehicle.span**2

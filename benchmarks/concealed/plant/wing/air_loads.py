@@ -5,6 +5,9 @@ Circulation lag: the normal velocity that causes lift lags by Wagner's function,
 by the exponentials of Leishman and Beddoes (1989), with a first-order lag after an angle of attack that lags too.
 Leading-edge vortex: lift and drag coefficients measured by Dickinson, Lehmann and Sane (1999), beyond an angle of
 attack. Added mass: that of a thin elliptic section (Munk 1924), for heave and pitch of the strip as a whole.
+Rotational circulation: the normal velocity that causes lift is that at three quarters of the chord (Pistolesi 1929).
+Plate drag: cross-flow principle (Hoerner 1965, ch. III) with the normal velocity of each body at its centroid. Skin
+friction: that of a turbulent boundary layer, coefficient 0.074 Re^(-1/5) for each face (Prandtl 1927).
 """
 
 from __future__ import annotations
@@ -20,9 +23,12 @@ from benchmarks.concealed.plant.wing.rig import (
     CARRIED,
     LAG,
     LAG_RATE,
+    PLATE,
+    SKIN,
     STALL,
     STALL_ANGLE,
     STALL_DELAY,
+    TURNING,
     VORTEX,
     VORTEX_ANGLE,
     Motion,
@@ -112,6 +118,8 @@ def air_loads(rig: Rig, m: Motion, old: Array, hg: float, z: Array, first: int, 
             rate = hg * laws[LAG_RATE] * 2.0 * math.sqrt(along * along + across * across) / rig.chord[s]
             y1, y2 = _relax(old[k], 0.041 * rate, across, z, k), _relax(old[k + 1], 0.32 * rate, across, z, k + 1)
             felt = across - laws[LAG] * (0.165 * (across - y1) + 0.335 * (across - y2))
+        if laws[TURNING] != 0.0:
+            felt += 0.25 * laws[TURNING] * rig.chord[s] * _pitch_rate(rig, m, s, cross(normal, chord))
         speed = math.sqrt(along * along + across * across + _STILL * _STILL)
         x = min(max(along / (_TURN * speed), -1.0), 1.0)
         side = 0.5 * x * (3.0 - x * x)
@@ -137,8 +145,32 @@ def air_loads(rig: Rig, m: Motion, old: Array, hg: float, z: Array, first: int, 
             ):
                 here = plus(ZERO, share, force)
                 act(load, n, here, cross(turned(m.R, n, (place, rig.centroid[n, 1], 0.0)), here))
+        if laws[PLATE] > 0.0 or laws[SKIN] > 0.0:
+            _resist(rig, m, s, chord, along, load)
         if laws[CARRIED] > 0.0:
             _carry(rig, m, s, normal, cross(normal, chord), plus(ZERO, -1.0, flow), load)
+
+
+@compiled
+def _pitch_rate(rig: Rig, m: Motion, s: int, span: V3) -> float:
+    """Rate (rad/s, nose up) at which strip ``s`` turns about the direction ``span``: mean over its bodies by area."""
+    rate = 0.0
+    for n in range(rig.strip[s], rig.strip[s + 1]):
+        rate += rig.weight[n] * dot(row(m.w, n), span)
+    return float(rate)
+
+
+@compiled
+def _resist(rig: Rig, m: Motion, s: int, chord: V3, along: float, load: Array) -> None:
+    """Add plate drag and skin friction of strip ``s`` to its bodies; ``along`` (m/s): flow along the ``chord``."""
+    laws, wind = rig.air_laws, row(rig.wind.reshape(1, 3), 0)
+    rubbing = laws[SKIN] * rig.chord[s] ** -0.2 * abs(along) ** 0.8 * along
+    for n in range(rig.strip[s], rig.strip[s + 1]):
+        pressure = 0.5 * rig.air * rig.weight[n] * rig.area[s]
+        arm, normal = turned(m.R, n, (rig.centroid[n, 0], rig.centroid[n, 1], 0.0)), axis(m.R, n, 2)
+        w = dot(normal, plus(plus(wind, -1.0, row(m.v, n)), -1.0, cross(row(m.w, n), arm)))
+        force = plus(plus(ZERO, pressure * laws[PLATE] * abs(w) * w, normal), pressure * rubbing, chord)
+        act(load, n, force, cross(arm, force))
 
 
 @compiled

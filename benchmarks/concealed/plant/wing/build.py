@@ -21,7 +21,7 @@ from wingfit.records import Condition, Drive, Wing
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 
-_GAS = 287.05  # J/(kg K), dry air
+GAS = 287.05  # J/(kg K), dry air
 
 
 @dataclass
@@ -30,13 +30,16 @@ class Draft:
 
     Attributes:
         wing, genome, condition: what is simulated; ``division``: its bodies, as in :func:`.geometry.counts_of`.
-        lumps: additional point masses; to be added before :meth:`cut_up`, which divides the wing.
+        lumps: additional point masses; to be added before :meth:`cut_up`, which divides the wing, like ``aft`` (m), as
+            in :class:`.geometry.Cut`.
         cut, joints: the divided wing and its C joints.
         factor: [C] factor on stiffness and damping of each joint.
         hardening, play: [C], as in :class:`.rig.Rig`, like ``air_laws``, ``jets``, ``hinge`` and ``axle``.
         memory: joints with an internal state: (joint, axis, kind, stiffness, parameter), as in ``Rig.memory``.
         points: loads at one point: (body, row of ``Rig.points``).
         rods: [K, 2] complex Fourier series of the angles of the front and rear driving rod, rad.
+        motor: loss of speed per power (1/W) and time constant (s) of a compliant drive; 0 for a stiff one.
+        lead: [K] complex Fourier series of the angle by which the crank leads uniform rotation, rad.
     """
 
     wing: Wing
@@ -44,6 +47,9 @@ class Draft:
     genome: Mapping[str, float]
     condition: Condition
     lumps: list[Lump] = field(default_factory=list)
+    aft: float = 0.0
+    motor: tuple[float, float] = (0.0, 0.0)
+    lead: Complex = field(default_factory=lambda: np.zeros(1, np.complex128))
     memory: list[tuple[int, int, float, float, float]] = field(default_factory=list)
     jets: list[list[float]] = field(default_factory=list)
     points: list[tuple[int, list[float]]] = field(default_factory=list)
@@ -51,7 +57,7 @@ class Draft:
 
     def cut_up(self) -> None:
         """Divide the wing, with its ``lumps``, into bodies and joints, and set the attributes that depend on them."""
-        self.cut = Cut(self.wing, self.division, self.lumps)
+        self.cut = Cut(self.wing, self.division, self.lumps, self.aft)
         self.joints: list[Joint] = joints(self.cut, self.genome)
         count = len(self.joints)
         self.factor, self.hardening, self.play = np.ones(count), np.zeros(count), np.zeros(count)
@@ -122,7 +128,7 @@ def rig_of(draft: Draft) -> Rig:
         coefficients=np.array([genome[name] for name in ("L_a", "L_b", "ID_a", "ID_b")]),
         lift=shares(cut, genome, "L"),
         drag=shares(cut, genome, "ID"),
-        air=condition.pressure / (_GAS * condition.temperature),
+        air=condition.pressure / (GAS * condition.temperature),
         wind=condition.airspeed * np.array([np.cos(incidence), 0.0, np.sin(incidence)]),
         gravity=float(condition.gravity),
         air_laws=draft.air_laws,
@@ -139,8 +145,12 @@ def rig_of(draft: Draft) -> Rig:
 
 def rod_table(draft: Draft, steps: int) -> Array:
     """[steps + 1, STAGES, 2 rods, 2]: angle (rad) and rate (rad/s) of both rods at all integrator stages of a beat."""
-    psi = 2 * np.pi * (np.arange(steps + 1)[:, None] + C) / steps
+    psi, pace = 2 * np.pi * (np.arange(steps + 1)[:, None] + C) / steps, 1.0
+    if draft.lead.any():
+        k = np.arange(len(draft.lead))
+        turn = np.exp(1j * psi[..., None] * k)
+        psi, pace = psi + (turn @ draft.lead).real, 1.0 + (turn @ (1j * k * draft.lead)).real[..., None]
     k = np.arange(len(draft.rods))
     turn = np.exp(1j * psi[..., None] * k)
-    angle, slope = (turn @ draft.rods).real, (turn @ (1j * k[:, None] * draft.rods)).real
+    angle, slope = (turn @ draft.rods).real, pace * (turn @ (1j * k[:, None] * draft.rods)).real
     return np.ascontiguousarray(np.stack([angle, 2 * np.pi * draft.condition.flap_frequency * slope], axis=-1))

@@ -54,6 +54,8 @@ class Lump:
 class Cut:
     """A wing divided into bodies, with additional point masses ``lumps``.
 
+    Its mass lies further aft than described by ``aft`` (m) at a mean chord, by the same fraction of every chord.
+
     Attributes:
         counts: [S] bodies along the chord of each strip; ``start`` [S + 1]: first body of each strip.
         strip: [N] strip of each body.
@@ -61,8 +63,8 @@ class Cut:
         edges: [S + 1] span positions y of the strips' borders, m.
     """
 
-    def __init__(self, wing: Wing, division: str, lumps: Sequence[Lump] = ()) -> None:
-        self.wing, self.counts, self.lumps = wing, counts_of(division), tuple(lumps)
+    def __init__(self, wing: Wing, division: str, lumps: Sequence[Lump] = (), aft: float = 0.0) -> None:
+        self.wing, self.counts, self.lumps, self.aft = wing, counts_of(division), tuple(lumps), aft
         table = np.array([(s.y, s.leading_edge, s.chord, s.thickness) for s in wing.stations])
         self._y, self._sections = table[:, 0], table[:, 1:]
         self.edges = np.linspace(self._y[0], self._y[-1], len(self.counts) + 1)
@@ -148,7 +150,12 @@ class Cut:
     def bodies(self) -> tuple[Array, Array, Array]:
         """Mass [N] kg, centre of mass [N, 3] m and inertia about it [N, 3, 3] kg m^2 of each body, wing frame."""
         found = [self._body(n) for n in range(len(self.strip))]
-        return np.array([f[0] for f in found]), np.array([f[1] for f in found]), np.array([f[2] for f in found])
+        mass, centre, inertia = (np.array([f[k] for f in found]) for k in range(3))
+        if self.aft:
+            area = np.add.reduceat(self.area, self.start[:-1])
+            chord = area / np.diff(self.edges)
+            centre[:, 0] += self.aft * (chord * (self.edges[-1] - self.edges[0]) / area.sum())[self.strip]
+        return mass, centre, inertia
 
     def _body(self, n: int) -> tuple[float, Array, Array]:
         materials = self.wing.materials

@@ -83,7 +83,7 @@ class _Work(NamedTuple):
 
 
 @compiled
-def _drive(rig: Rig, rods: Array, m: Motion) -> None:
+def drive(rig: Rig, rods: Array, m: Motion) -> None:
     """Set frames N and N + 1 of ``m``, the driving rods, from their angles and rates ``rods`` [2, 2] (rad, rad/s)."""
     n, x = len(rig.mass), (rig.axle[0], rig.axle[1], rig.axle[2])
     for rod in range(2):
@@ -232,7 +232,7 @@ def _begin(rig: Rig, rods: Array, start: State, tolerance: float, work: _Work) -
     n, z, m = len(rig.mass), start.z.copy(), work.m
     m.R[:n], m.p[:n], m.v[:n], m.w[:n] = start.R, start.p, start.v, start.w
     work.R0[:], work.g[:] = start.R, 0.0
-    _drive(rig, rods, m)
+    drive(rig, rods, m)
     _base(rig, 0.0, 0, start, work)
     assemble(rig, m, _START, work.band)
     factor(work.band)
@@ -277,7 +277,7 @@ def beat(rig: Rig, rods: Array, start: State, tolerance: float, R: Array, p: Arr
         R[step], p[step], z[step] = now.R, now.p, now.z
         work.R0[:], work.g[:] = now.R, 0.0
         for stage in range(1, STAGES):
-            _drive(rig, rods[step, stage], work.m)
+            drive(rig, rods[step, stage], work.m)
             _base(rig, h, stage, now, work)
             # a beat may start from an extrapolated state, whose accelerations are not useful
             _guess(work, hg, stage - 1 if step + stage > 1 else -1)

@@ -115,18 +115,18 @@ class _Search:
                 continue
             best = min(best, size)
             xs, fs = [*xs[-_WINDOW:], x], [*fs[-_WINDOW:], f]
-            leap = _leap(xs, fs)
-            way = _largest(leap - x, len(self.rig.mass))
+            ahead = leap(xs, fs)
+            way = _largest(ahead - x, len(self.rig.mass))
             self.error = max(size, min(way, 10 * size)) if len(xs) > 1 else 10 * size
             if self.error < self.near:
                 return end, count
-            x = leap if way < _FAR else x + f
+            x = ahead if way < _FAR else x + f
         raise ArithmeticError(
             f"no periodic motion within {most} beats: {1e3 * self.error:.3g} mm remain; check genome and strength"
         )
 
 
-def _leap(xs: list[Array], fs: list[Array]) -> Array:
+def leap(xs: list[Array], fs: list[Array]) -> Array:
     """The next state, extrapolated (Anderson 1965) from earlier states ``xs`` and their changes over a beat ``fs``."""
     if len(xs) == 1:
         return xs[0] + fs[0]

@@ -1,6 +1,6 @@
-"""Hidden loads at one point of the wing: elastic band, stop, brake, appendage (mass on a spring).
+"""Hidden loads at one point of the wing: elastic band, stop, brake, tether, appendage (mass on a spring).
 
-The diagnosis has no effect of these kinds in its library.
+Of these kinds the diagnosis has only the tether in its library.
 """
 
 from __future__ import annotations
@@ -11,12 +11,13 @@ import numpy as np
 import numpy.typing as npt
 
 from benchmarks.concealed.plant.compiled import compiled
-from benchmarks.concealed.plant.wing.rig import BAND, BRAKE, STOP, Motion, Rig
+from benchmarks.concealed.plant.wing.rig import BAND, BRAKE, STOP, TETHER, Motion, Rig
 from benchmarks.concealed.plant.wing.vectors import V3, ZERO, act, axis, cross, dot, plus, row, turned
 
 Array = npt.NDArray[np.float64]
 
 _SLACK = 5e-4  # m: range over which a band becomes tight
+_NOTHING = 1e-9  # m
 
 
 @compiled
@@ -38,6 +39,12 @@ def _held(q: Array, place: V3, velocity: V3) -> V3:
         return 0.0, 0.0, -q[5] * push
     if q[0] == BRAKE:  # against the velocity, by its third power: N s^3/m^3
         return plus(ZERO, -q[4] * dot(velocity, velocity), velocity)
+    if q[0] == TETHER:  # rubber cord of length q5 (m) to its place at rest, N/m at first, with a damper: N s/m
+        away = plus(place, -1.0, (q[7], q[8], q[9]))
+        length = math.sqrt(dot(away, away))
+        ratio = 1.0 + length / q[5]  # of stretched to natural length; neo-Hookean (Treloar 1975)
+        stiff = q[4] * q[5] / 3.0 * (ratio - 1.0 / (ratio * ratio)) / length if length > _NOTHING else q[4]
+        return plus(plus(ZERO, -stiff, away), -q[6], velocity)
     return ZERO
 
 
@@ -56,7 +63,7 @@ def point_loads(rig: Rig, m: Motion, old: Array, hg: float, z: Array, first: int
         place = plus(row(m.p, n), 1.0, arm)
         velocity = plus(row(m.v, n), 1.0, cross(row(m.w, n), arm))
         force = _held(q, place, velocity)
-        if q[0] > BRAKE + 0.5:
+        if q[0] > TETHER + 0.5:
             normal, i = axis(m.R, n, 2), first + 2 * k
             square, loss, base = q[5] * q[5], 2.0 * q[6] * q[5], dot(normal, velocity)
             pull = dot(cross(row(m.w, n), normal), velocity) - rig.gravity * normal[2]

@@ -14,14 +14,14 @@ Index = npt.NDArray[np.int64]
 KEEPS, STIFF, PARAMETER = range(3)
 MAXWELL, DAHL, SLIDER = range(3)
 # Indices of Rig.air_laws
-LAG, LAG_RATE, STALL, STALL_ANGLE, STALL_DELAY, VORTEX, VORTEX_ANGLE, CARRIED = range(8)
-AIR_LAWS = 8
+LAG, LAG_RATE, STALL, STALL_ANGLE, STALL_DELAY, VORTEX, VORTEX_ANGLE, CARRIED, TURNING, PLATE, SKIN = range(11)
+AIR_LAWS = 11
 AIR_STATES = 4  # per strip: two lagged downwashes, lagged angle of attack, attached fraction
 # Columns of Rig.jets: strip, velocity of the air, height and half height of the stream
 JETS = 6
 # Columns of Rig.points: kind, place from the body's centre, parameters of the law; and its kinds
 POINTS = 11
-BAND, STOP, BRAKE, APPENDAGE = range(4)
+BAND, STOP, BRAKE, TETHER, APPENDAGE = range(5)
 
 
 class Rig(NamedTuple):

@@ -10,9 +10,10 @@ import numpy as np
 import numpy.typing as npt
 from scipy.signal import resample
 
-from benchmarks.concealed.plant.wing.build import Draft, rig_of, rod_table
+from benchmarks.concealed.plant.wing.build import Draft, rig_of
 from benchmarks.concealed.plant.wing.integrator import State
-from benchmarks.concealed.plant.wing.periodic import Accuracy, settle
+from benchmarks.concealed.plant.wing.motor import driven
+from benchmarks.concealed.plant.wing.periodic import Accuracy
 from benchmarks.concealed.plant.wing.rig import Rig, states_of
 from benchmarks.concealed.plant.wing_effects.hidden import Effect, Hidden, Truth
 from wingfit.records import Condition, Wing
@@ -92,7 +93,7 @@ def simulate(
     places = np.array([marker.position for marker in wing.markers])
     carrier = cut.under(places[:, 0], places[:, 1])
     arms = places - cut.bodies[1][carrier]
-    R, p, error, beats = settle(rig, lambda steps: rod_table(draft, steps), at_rest(rig), accuracy or Accuracy())
+    R, p, error, beats = driven(rig, draft, at_rest(rig), accuracy or Accuracy())
     tracks = p[:, carrier] + np.einsum("tmij,mj->tmi", R[:, carrier], arms)
     if len(tracks) < SAMPLES:
         tracks = np.asarray(resample(tracks, SAMPLES, axis=0))

@@ -20,8 +20,10 @@ from benchmarks.concealed.plant.wing.rig import (
     KEEPS,
     MAXWELL,
     PARAMETER,
+    PLATE,
     STIFF,
     STOP,
+    TETHER,
     Motion,
     Rig,
 )
@@ -142,6 +144,7 @@ def _air(rig: Rig, m: Motion, hg: float, band: Array) -> None:
         speed = math.sqrt(along * along + across * across)
         slope = rig.coefficients[0] + rig.coefficients[2] * abs(math.atan2(across, abs(along))) + rig.coefficients[3]
         heave = hg * 0.5 * rig.air * speed * rig.area[s] * slope
+        heave += hg * rig.air * rig.area[s] * rig.air_laws[PLATE] * abs(across)
         pitch = 0.0
         if rig.air_laws[CARRIED] > 0.0:
             mass, pitch = carried(rig, s)
@@ -173,6 +176,8 @@ def _point(rig: Rig, m: Motion, k: int, hg: float, band: Array) -> None:
         size = 1.5 * hg * hg * q[6] * math.sqrt(depth)
     elif q[0] == BRAKE:
         size = 2.0 * hg * q[4] * dot(v, v)
+    elif q[0] == TETHER:
+        size = hg * hg * q[4] + hg * q[6]
     x = np.zeros(6)
     for i in range(3):
         unit = (1.0 if i == 0 else 0.0, 1.0 if i == 1 else 0.0, 1.0 if i == 2 else 0.0)

@@ -62,6 +62,24 @@ def _stroke_genes(wing: Wing, strength: float, _: Values) -> dict[str, float]:
     return {"stroke_amplitude.part": float(abs(first + _further(wing, strength)[1]) / abs(first) - 1)}
 
 
+def _biased(draft: Draft, strength: float, _: Values) -> None:
+    """Mount both rods at another angle on their axis."""
+    draft.rods[0] += strength
+
+
+def _bias_genes(_: Wing, strength: float, __: Values) -> dict[str, float]:
+    return {"stroke_bias.angle": strength}
+
+
+def _yielding(draft: Draft, strength: float, at: Values) -> None:
+    """Let the speed of the motor fall by ``strength`` per watt, with a time constant (:mod:`..wing.motor`)."""
+    draft.motor = strength, at["time"]
+
+
+def _yielding_genes(_: Wing, __: float, at: Values) -> dict[str, float]:
+    return {"compliant_drive.t": at["time"]}
+
+
 def _shape(draft: Draft, strength: float, _: Values) -> None:
     _add(draft, _otherwise(draft.wing, strength))
 
@@ -128,6 +146,10 @@ LISTED_DRIVE = (
         genes=_stroke_genes,
     ),
     Kind(
+        "stroke_bias", "actuation", True, "rad", 0.03, 0.2,
+        "rods at another angle on their axis (Armanini et al. 2016, Eqs. 20-21: eta)", _biased, genes=_bias_genes,
+    ),
+    Kind(
         "drive_harmonics", "actuation", True, "1", 0.04, 0.13,
         "a linkage with a longer frame but the same stroke: all harmonics change; the library has two", _shape,
         genes=_shape_genes,
@@ -149,5 +171,10 @@ LISTED_DRIVE = (
         "backlash", "actuation", True, "rad", 0.03, 0.12,
         "dead zone with logarithmic edges about the chord (Dubowsky and Freudenstein 1971; soft stops); the "
         "library has a pin in series with the spring", _loose, genes=_loose_genes,
+    ),
+    Kind(
+        "compliant_drive", "actuation", True, "1/W", 0.002, 0.01,
+        "motor with a governor of another gain, of the mean load exactly; the library's adapts to the load",
+        _yielding, shape={"time": (0.04, 0.02, 0.08)}, genes=_yielding_genes,
     ),
 )  # fmt: skip

@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 from scipy.optimize import brentq
 
 from benchmarks.concealed.plant.wing.build import Draft
 from benchmarks.concealed.plant.wing.geometry import Cut, Lump
-from benchmarks.concealed.plant.wing.rig import DAHL, MAXWELL, SLIDER
+from benchmarks.concealed.plant.wing.rig import DAHL, MAXWELL, POINTS, SLIDER, TETHER
 from benchmarks.concealed.plant.wing_effects.kind import Kind, Values
 from wingfit.records import Wing
 
@@ -35,6 +36,33 @@ def _lump_genes(_: Wing, strength: float, at: Values) -> dict[str, float]:
         "lumped_mass.station": at["span"],
         "lumped_mass.chord": at["chord"],
     }
+
+
+def _aft(draft: Draft, strength: float, _: Values) -> None:
+    draft.aft = strength * _mean_chord(draft.wing)
+
+
+def _aft_genes(wing: Wing, strength: float, _: Values) -> dict[str, float]:
+    return {"mass_offset.distance": strength * _mean_chord(wing)}
+
+
+def _mean_chord(wing: Wing) -> float:
+    y = [station.y for station in wing.stations]
+    return float(np.trapezoid([station.chord for station in wing.stations], y)) / (y[-1] - y[0])
+
+
+def _tethered(draft: Draft, strength: float, at: Values) -> None:
+    """Tie one place of the wing to its position at rest by a rubber cord of ``strength`` N/m, half a span long.
+
+    The cord is neo-Hookean (Treloar 1975), with a damper in parallel of ``strength`` times ``at["time"]`` (s).
+    """
+    body, arm, rest = draft.at(at["span"], at["chord"])
+    row = [float(TETHER), *arm.tolist(), strength, 0.5 * draft.span, at["time"] * strength, *rest.tolist()]
+    draft.points.append((body, row + [0.0] * (POINTS - len(row))))
+
+
+def _tether_genes(_: Wing, __: float, at: Values) -> dict[str, float]:
+    return {"tether.station": at["span"], "tether.chord": at["chord"]}
 
 
 def _damage(draft: Draft, strength: float, at: Values) -> None:
@@ -102,6 +130,17 @@ LISTED_STRUCTURE = (
         "lumped_mass", "inertia", True, "kg", 0.003, 0.012,
         "a point in the mass integrals of the wing itself; Steiner's theorem for the whole body", _lump,
         shape=_PLACE, genes=_lump_genes, before=True,
+    ),
+    Kind(
+        "mass_offset", "inertia", True, "1", 0.05, 0.3,
+        "mass aft by the same fraction of every chord; the library moves it by the same distance", _aft,
+        genes=_aft_genes, before=True,
+    ),
+    Kind(
+        "tether", "structure", True, "N/m", 1.0, 20.0,
+        "rubber cord with damper in parallel: Treloar, The Physics of Rubber Elasticity (1975), ch. 4; the library "
+        "has a linear spring", _tethered,
+        shape={"span": (0.8, 0.4, 0.95), "chord": (0.5, 0.2, 0.8), "time": (0.01, 0.004, 0.02)}, genes=_tether_genes,
     ),
     Kind(
         "damage", "structure", True, "1", 0.6, 0.9,

@@ -1,0 +1,99 @@
+"""Hidden changes of the inertia of a vehicle's wings and of the air that they accelerate."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+
+from benchmarks.concealed.plant.law import Concealed, Law, strength
+from benchmarks.concealed.plant.vehicle.flow import Array, Complex, Flow, mass_per_length, mean_chord
+from wingfit.records import Vehicle
+
+_NEAR = 2.0  # relative error of the added mass of wings that touch, over that one chord apart
+
+
+def moved_air(flow: Flow, vehicle: Vehicle, mass: Array, hidden: Concealed) -> Array:
+    """Added mass [n, E] (kg/m) across the chord with its hidden changes, for that of the nominal model, ``mass``.
+
+    While wings peel apart, the part (1 - x) of the added mass is missing, with x the flap angle since the start of the
+    beat over that at the end of the peel. The relative error of added mass falls as the gap g to the other wing grows,
+    2 strength / (1 + g / c) with the chord c (Sedov 1965: plates near each other).
+    """
+    whole = np.pi / 4 * flow.rho * flow.chord**2
+    share = strength(hidden, "effective_chord")
+    if share and vehicle.claps:
+        mass = np.maximum(mass - share * whole * (1.0 - _opened(flow, vehicle))[:, None], 0.0)
+    error = strength(hidden, "added_mass_error")
+    if error:
+        gap = 2.0 * flow.r * np.sin(flow.zeta - flow.zeta.min())[:, None]
+        mass = mass * np.maximum(1.0 + _NEAR * error / (1.0 + gap / flow.chord), 0.0)
+    return np.asarray(mass)
+
+
+def _opened(flow: Flow, vehicle: Vehicle) -> Array:
+    """Flap angle since the start of the beat over that at the end of the peel [n], 0 to 1."""
+    end = float(np.interp(vehicle.motion.peel_end, flow.t, flow.zeta))
+    x = np.where(flow.t < vehicle.motion.peel_end, (flow.zeta - flow.zeta[0]) / (end - flow.zeta[0]), 1.0)
+    x[0] = 0.5  # the mean of both sides of the jump
+    return np.clip(x, 0.0, 1.0)
+
+
+def wing_inertia(flow: Flow, own: Complex, vehicle: Vehicle, hidden: Concealed) -> Complex:
+    """Inertial force (N/m of span) [n, E], complex, in axes of the chord, that the nominal model does not have.
+
+    With ``own`` [n, E] the velocity of the wing in these axes, and in rotating axes -m dv/dt (Armanini et al. 2016 have
+    the other part, Eqs. 12-14). Mass that lies behind the axis of pitch, by the same fraction of every chord, adds
+    m e (i theta'' - theta'^2), with ``strength`` the mean of the distance e.
+    """
+    mass, force = mass_per_length(flow, vehicle), np.zeros(own.shape, complex)
+    part = strength(hidden, "wing_acceleration")
+    if part:
+        force -= part * mass * (flow.turned(flow.own_rate) - 1j * flow.turn * own)
+    behind = strength(hidden, "mass_offset")
+    if behind:
+        arm = behind * flow.chord / mean_chord(vehicle)
+        force += mass * arm * (1j * flow.turn_rate - flow.turn**2)
+    return force
+
+
+_listed = partial(Law, side="physics")
+INERTIA = (
+    _listed(
+        "inertial",
+        typical=1.0,
+        source="Armanini et al. (2016), Eqs. 12-14",
+        values=lambda p: {"inertial.share": p["strength"]},
+    ),
+    _listed(
+        "wing_acceleration",
+        typical=1.0,
+        source="Newton (1687): the part of the acceleration that Armanini et al. (2016), Eqs. 12-14, omit",
+        values=lambda p: {"wing_acceleration.share": p["strength"]},
+    ),
+    _listed(
+        "added_mass",
+        typical=1.0,
+        source="Armanini et al. (2016), Eqs. 9-10",
+        values=lambda p: {"added_mass.k": p["strength"]},
+    ),
+    _listed(
+        "added_mass_error",
+        typical=0.2,
+        source="Sedov (1965): plates near each other; largest where the wings are near",
+        both_signs=True,
+    ),
+    _listed(
+        "effective_chord",
+        typical=1.0,
+        source="added mass in proportion to the opening angle, not to the square of time",
+        values=lambda p: {"effective_chord.share": min(p["strength"], 1.0)},
+    ),
+    _listed(
+        "mass_offset",
+        typical=4e-3,
+        source="Newton (1687): centre of mass at the same fraction of every chord, not at the same distance",
+        both_signs=True,
+        values=lambda p: {"mass_offset.distance": p["strength"]},
+    ),
+)
