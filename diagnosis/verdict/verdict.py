@@ -179,7 +179,9 @@ def summary(decision: Decision, suspects: Mapping[str, Suspect], texts: Mapping[
     larger = [one for one in decision.alternatives if named <= set(one)]
     others = [one for one in decision.alternatives if not named <= set(one)]
     additional = dict.fromkeys(name for one in larger for name in one if name not in decision.named)
-    alternatives = [_titles(suspects, one, " with ") for one in others]
+    alternatives = [
+        _titles(suspects, one, " with ") + (" beside something unknown" if set(one) < named else "") for one in others
+    ]
     more = (
         f" Whether {_titles(suspects, list(additional), ' or ')} is missing as well is undecided." if additional else ""
     )

@@ -97,16 +97,19 @@ def weigh(
 
 
 def _with_unknown_rest(hypotheses: Sequence[Refit], weight: Array, with_unknown: Array) -> Array:
-    """Return the log weights [H], with that of effects beside a law outside the library where others contain them.
+    """Return the log weights [H], a part of which goes to effects that a law outside the library accompanies.
 
-    Further effects may only imitate such a law. So the effects of a hypothesis weigh as much as the best one that
-    contains them, if ``with_unknown`` [H], their log weight together with such a law, is as large.
+    Further effects may only imitate such a law. So a hypothesis shares its weight with the best of those whose effects
+    it contains, if ``with_unknown`` [H], their log weight together with such a law, is comparable.
     """
     found, names = weight.copy(), [set(one.names) for one in hypotheses]
-    for k, own in enumerate(names):
-        larger = [weight[j] for j, other in enumerate(names) if own < other]
-        if own and larger:
-            found[k] = max(weight[k], min(with_unknown[k], max(larger)))
+    for k in sorted(np.flatnonzero(np.isfinite(weight)), key=lambda k: -len(names[k])):
+        contained = [j for j, other in enumerate(names) if other and other < names[k]]
+        if contained:
+            best = max(contained, key=lambda j: with_unknown[j])
+            both = np.logaddexp(weight[k], with_unknown[best])
+            found[k] += weight[k] - both
+            found[best] = np.logaddexp(found[best], weight[k] + with_unknown[best] - both)
     return found
 
 
