@@ -11,7 +11,7 @@ INSTALLED := $(VENV)/installed
 demo: $(RUNS)  ## start the service, calibrate the example campaign, print what came out
 	@$(BIN)/python -m examples.demo
 
-proof: $(RUNS)  ## play both stories on concealed data, each ending with a report; under 15 minutes
+proof: $(RUNS)  ## play three stories on concealed data, each ending with a report; under 15 minutes
 	@$(BIN)/python -m benchmarks.proof --json
 
 serve: $(RUNS)  ## start the service and stay

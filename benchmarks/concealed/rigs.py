@@ -171,9 +171,12 @@ def size_of(wing: Wing) -> float:
     return wing.span / WINGS["robird"][0].span
 
 
-def as_described(wing: Wing, rng: np.random.Generator) -> Wing:
-    """Return the description of ``wing`` that a laboratory makes: positions by hand, densities by weighing a sample."""
-    deviation = size_of(wing) * float(rng.uniform(*BY_HAND))
+def as_described(wing: Wing, rng: np.random.Generator, deviation: float | None = None) -> Wing:
+    """Return the description of ``wing`` that a laboratory makes: positions by hand, densities by weighing a sample.
+
+    ``deviation``: standard deviation of rest positions along each axis (m), drawn if None.
+    """
+    deviation = size_of(wing) * float(rng.uniform(*BY_HAND)) if deviation is None else deviation
     moves = deviation * rng.standard_normal((len(wing.markers), 3))
     markers = tuple(
         replace(one, position=tuple(np.round(np.array(one.position) + move, 5).tolist()))

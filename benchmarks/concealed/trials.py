@@ -52,7 +52,7 @@ ELEVEN, ELEVEN_FINER = Build("wing", "11", "11"), Build("wing", "11", "6x3")
 WHOLE, WHOLE_FINER = Build("wing", "24", "24"), Build("wing", "24", "8x4")
 BIRD, INSECT = Build("wing", "4", "9x1", body="bird"), Build("wing", "4", "8x1", body="insect")
 ROD = "rod"  # as a plant: a continuous wing, in finite elements
-ELEVEN_ROD, STRIPS_ROD, FOUR_ROD = Build("wing", "11", ROD), Build("wing", "8x1", ROD), Build("wing", "4", ROD)
+STRIPS_ROD, FOUR_ROD = Build("wing", "8x1", ROD), Build("wing", "4", ROD)
 BIRD_ROD, INSECT_ROD = replace(FOUR_ROD, body="bird"), replace(FOUR_ROD, body="insect")
 BODIES_ONLY = (
     "backlash", "mass_offset", "tether", "rotational_circulation", "plate_drag", "viscous_drag", "compliant_drive",
@@ -71,7 +71,7 @@ SMALL = (
     FINER, EQUAL, BIRD, FOUR_ROD, BEYOND, INSECT, EQUAL, BIRD_ROD, FINER, BIRD, STRIPS_ROD, BEYOND, EQUAL, INSECT,
     INSECT_ROD, FINER,
 )  # fmt: skip
-WINGS = (*SMALL, ELEVEN, *SMALL, ELEVEN_ROD, *SMALL, ELEVEN_FINER, *SMALL)
+WINGS = (*SMALL, ELEVEN, *SMALL, *SMALL, ELEVEN_FINER, *SMALL)
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Both case studies in one command: ``python -m benchmarks.proof`` (or ``make proof``), under 15 minutes on 2 cores.
+"""All case studies in one command: ``python -m benchmarks.proof`` (or ``make proof``), under 15 minutes on 2 cores.
 
 The data come from "the plant", a simulator that shares no code with wingfit's own and contains hidden physics. The
 files are diagnosed, and each study ends with a report. Claims about the result are checked; the exit status is 1 if any
@@ -15,7 +15,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from benchmarks.common.machine import commit, cpu
-from benchmarks.proof import delfly, robird
+from benchmarks.proof import continuous, delfly, robird
 from benchmarks.proof.story import Story, opened
 from wingfit.cli.base.output import note, say
 
@@ -24,6 +24,7 @@ WORKERS = 2
 TITLES = {
     "robird": "(a) The Robird: a displaced axis and a linkage of another shape are hidden",
     "delfly": "(b) The DelFly: clap-and-peel is hidden from a model after Berman and Wang",
+    "continuous": "(c) A continuous wing with markers measured by hand: a displaced axis is hidden",
 }
 
 
@@ -42,6 +43,7 @@ def main(words: list[str] | None = None) -> int:
     plays: dict[str, Callable[[], Story]] = {
         "robird": lambda: robird.play(options.out, options.seed, options.workers, options.search_s),
         "delfly": lambda: delfly.play(options.out, options.seed, options.workers),
+        "continuous": lambda: continuous.play(options.out, options.seed, options.workers),
     }
     began, stories = time.monotonic(), {}
     for name in TITLES if options.only is None else (options.only,):

@@ -10,10 +10,14 @@ import numpy as np
 import pytest
 
 from benchmarks.concealed.answer import GROUPS, Answer, Secret
+from benchmarks.concealed.benches.wing import WingBench
 from benchmarks.concealed.plant.continuum.simulate import EFFECTS as ROD_EFFECTS
 from benchmarks.concealed.plant.measurement import balance, film
-from benchmarks.concealed.plant.wing_effects.catalogue import UNKNOWN
+from benchmarks.concealed.plant.wing.build import Draft
+from benchmarks.concealed.plant.wing_effects.catalogue import KINDS, UNKNOWN
+from benchmarks.concealed.plant.wing_effects.hidden import Hidden
 from benchmarks.concealed.record_trial import Addition, Order, add, make
+from benchmarks.concealed.rigs import WINGS
 from benchmarks.concealed.running import Folders, diagnosed, task
 from benchmarks.concealed.score import Mark, beats_apart, blank, failed, mark
 from benchmarks.concealed.seal import MANIFEST, BrokenSealError, close, digest, open_seal, read, seal
@@ -26,9 +30,12 @@ from benchmarks.concealed.trials import (
     EQUAL,
     LATTICE,
     ROD,
+    THICK_PA,
     VEHICLE,
+    Build,
     Trial,
     any_condition,
+    chamber,
     conditions,
     name_of,
     plan,
@@ -289,6 +296,16 @@ def test_the_plan_has_the_requested_trials_and_names_reveal_nothing() -> None:
 def test_every_effect_of_the_library_is_hidden() -> None:
     hidden = {name for trial in plan(3) for name in trial.hidden}
     assert set(EFFECTS) - hidden == set()
+
+
+def test_every_wing_can_have_what_a_trial_hides_in_it() -> None:
+    pairs = {(t.build.body, name) for t in plan(3) if t.build.rig == "wing" for name in t.hidden if name in KINDS}
+    for body, name in sorted(pairs):
+        wing, grid = WINGS[body]
+        genome = {gene.name: gene.nominal for gene in WingBench(Build("wing", "4", "4", body=body)).model.genes}
+        draft = Draft(wing, "4", genome, chamber(THICK_PA, 0.05, grid.frequencies[2]))
+        Hidden.one(name, KINDS[name].typical).put_into(draft)
+        assert draft.joints, (body, name)
 
 
 def test_a_plant_of_another_kind_is_in_every_group_of_wings() -> None:

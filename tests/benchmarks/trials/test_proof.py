@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from benchmarks.concealed.trials import chamber
-from benchmarks.proof import delfly, robird
+from benchmarks.proof import continuous, delfly, robird
 from benchmarks.proof.__main__ import main
 from benchmarks.proof.delfly import FLING, Lift
 from benchmarks.proof.robird import HIDDEN, Campaign, Stall
@@ -128,6 +128,21 @@ def test_the_robird_claims_fail_if_the_diagnosis_is_wrong(filmed: Campaign) -> N
     assert held(robird.story_of(made, moving, found, PAGE))[0] is False
     near = replace(search, result=replace(search.result, after=0.004))
     assert held(robird.story_of(made, near, found, PAGE))[0] is False
+
+
+def test_the_claims_of_the_continuous_wing_fail_if_the_diagnosis_is_wrong(filmed: Campaign) -> None:
+    made = continuous.Campaign(filmed.dataset, {"hinge_offset.y": 0.0120, "hinge_offset.z": -0.0015})
+    proof = Proof(Interval(4.4, 4.1, 4.7), Interval(1.04, 1.0, 1.1), 1e-3, True, "")
+    remarks = ("the described rest positions of the markers are wrong by about 0.7 mm along each axis",)
+    found = replace(wing_finding(), named=("hinge_offset",), proof=proof, remarks=remarks)
+    assert held(continuous.story_of(made, found, PAGE)) == [True] * 4
+    assert held(continuous.story_of(made, wing_finding(), PAGE))[0] is False, "the drive is right"
+    far = replace(made, truth={"hinge_offset.y": 0.0120, "hinge_offset.z": -0.005})
+    assert held(continuous.story_of(far, found, PAGE)) == [True, False, True, True]
+    assert held(continuous.story_of(made, replace(found, genes=()), PAGE))[1] is False
+    assert held(continuous.story_of(made, replace(found, remarks=()), PAGE))[2] is False
+    worse = replace(found, proof=replace(proof, after=Interval(1.2, 1.1, 1.3)))
+    assert held(continuous.story_of(made, worse, PAGE))[3] is False
 
 
 def test_an_effect_that_is_not_named_has_no_estimate() -> None:

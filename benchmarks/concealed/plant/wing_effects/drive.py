@@ -13,23 +13,21 @@ import numpy as np
 import numpy.typing as npt
 
 from benchmarks.concealed.plant.wing.build import Draft
-from benchmarks.concealed.plant.wing.linkage import series_of
+from benchmarks.concealed.plant.wing.linkage import angles, series_of
 from benchmarks.concealed.plant.wing_effects.kind import Kind, Values
 from wingfit.records import FourBarDrive, Wing
 
 Complex = npt.NDArray[np.complex128]
 
 
-def _linkage(wing: Wing) -> FourBarDrive:
-    if not isinstance(wing.drive, FourBarDrive):
-        raise ValueError(f"wing {wing.name!r} is driven by a series; this effect needs the links of a four-bar")
-    return wing.drive
-
-
 def _further(wing: Wing, strength: float) -> Complex:
-    """Change [K] (rad) of the rods' Fourier series for a crank longer by the fraction ``strength``; same mean."""
-    link = _linkage(wing)
-    change = series_of(replace(link, crank=link.crank * (1 + strength))) - series_of(link)
+    """Change [K] (rad) of the rods' Fourier series for a crank longer by the fraction ``strength``; same mean.
+
+    A drive without links moves farther by that fraction.
+    """
+    nominal = series_of(wing.drive)
+    longer = isinstance(wing.drive, FourBarDrive) and replace(wing.drive, crank=wing.drive.crank * (1 + strength))
+    change = series_of(longer) - nominal if longer else strength * nominal
     change[0] = 0.0
     return change
 
@@ -37,14 +35,26 @@ def _further(wing: Wing, strength: float) -> Complex:
 def _otherwise(wing: Wing, strength: float) -> Complex:
     """Change [K] (rad) of the rods' Fourier series for a ground link longer by the fraction ``strength``.
 
-    Mean and first harmonic stay the same.
+    The motor of a drive without links turns unevenly instead, by that fraction. Mean and first harmonic stay the same.
     """
-    link = _linkage(wing)
-    nominal, changed = series_of(link), series_of(replace(link, ground=link.ground * (1 + strength)))
+    nominal = series_of(wing.drive)
+    if isinstance(wing.drive, FourBarDrive):
+        changed = series_of(replace(wing.drive, ground=wing.drive.ground * (1 + strength)))
+    else:
+        changed = _unevenly(nominal, strength)
     shift, size = np.angle(nominal[1] / changed[1]), abs(nominal[1] / changed[1])
     change = size * changed * np.exp(1j * shift * np.arange(len(changed))) - nominal
     change[:2] = 0.0
     return np.asarray(change)
+
+
+def _unevenly(series: Complex, part: float) -> Complex:
+    """Fourier series [K] of the motion ``series`` [K] at the phase psi + 2 ``part`` sin psi instead of psi."""
+    n = 1024
+    psi = 2 * np.pi * np.arange(n) / n
+    found = 2 * np.fft.rfft(angles(series, psi + 2 * part * np.sin(psi))[:, 0])[: len(series)] / n
+    found[0] *= 0.5
+    return np.asarray(found)
 
 
 def _add(draft: Draft, change: Complex) -> None:
