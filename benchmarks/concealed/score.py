@@ -11,6 +11,9 @@ from benchmarks.concealed.plant.measurement.balance import CHOICES
 from wingfit.diagnosis.finding import NAMING, Finding, GeneValue, Hypothesis, Interval
 from wingfit.sim.effects.registry import EFFECTS
 
+BINS = {2: (1.6, 2.45), 3: (2.45, 3.87), 5: (3.87, math.inf)}
+"""Range of the measured strength d (misfit / noise) by intended d. Trials below the first are too weak to count."""
+WEAK = BINS[2][0]
 WORSE = 1.01  # ratio of held-out misfits above which the second counts as worse
 
 

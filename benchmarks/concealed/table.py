@@ -9,16 +9,12 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.concealed.calibration import bins_of, sure, verdict_is_right
 from benchmarks.concealed.exhaustive import Compared
-from benchmarks.concealed.score import Mark
-from wingfit.diagnosis.finding import NAMING
+from benchmarks.concealed.score import BINS, WEAK, Mark
 from wingfit.sim.effects.registry import EFFECTS
 
 NORMAL_90 = 1.6448536269514722
-BINS = {2: (1.6, 2.45), 3: (2.45, 3.87), 5: (3.87, math.inf)}
-"""Range of the measured strength d (misfit / noise) by intended d. Trials below the first are too weak to count."""
-WEAK = BINS[2][0]
-SURE = 0.95  # probability of a verdict that is given with certainty
 
 
 @dataclass(frozen=True)
@@ -220,6 +216,7 @@ class Table:
             "calibration": {
                 "said_95": rates["said with 95 %: right"].n,
                 "right_percent": rates["said with 95 %: right"].percent,
+                "bins": bins_of(self.marks),
             },
             "by_plant": {name: figures_of(marks) for name, marks in by_plant(self.marks).items()},
             "measurement": {
@@ -336,27 +333,6 @@ def figures_of(marks: Sequence[Mark]) -> dict[str, float | int | None]:
         "said_95": len([one for one in sure(marks) if verdict_is_right(one) is not None]),
         "said_95_right_percent": rate(sure(marks), verdict_is_right).percent,
     }
-
-
-def sure(marks: Iterable[Mark]) -> list[Mark]:
-    """Scores of the trials whose verdict was given with a probability of at least SURE."""
-    return [one for one in marks if one.probability >= SURE]
-
-
-def verdict_is_right(one: Mark) -> bool | None:
-    """Whether the verdict is true; None if what is hidden is too weak for a verdict to be expected.
-
-    A name is right if all that it names is hidden, and "unnamed" if what is hidden is not in the library.
-    """
-    if not one.truth:
-        return one.verdict == "adequate"
-    if one.group == "drift":
-        return one.verdict == "unnamed"
-    if one.strength < WEAK:
-        return None
-    if one.group in ("unlisted", "smooth") or (one.group == "partly" and one.verdict == "unnamed"):
-        return one.verdict == "unnamed"
-    return one.verdict in (*NAMING, "ambiguous") and not one.wrong and bool(one.found)
 
 
 def part_is_right(one: Mark) -> bool:

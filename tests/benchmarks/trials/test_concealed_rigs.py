@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from benchmarks.common.svg import svg
 from benchmarks.concealed.answer import Group
 from benchmarks.concealed.benches.bench import Bench
 from benchmarks.concealed.benches.choose import bench_of
@@ -17,12 +18,14 @@ from benchmarks.concealed.benches.drifting import drifting
 from benchmarks.concealed.benches.vehicle import VehicleBench
 from benchmarks.concealed.benches.vortex_lattice import VortexLatticeBench
 from benchmarks.concealed.benches.wing import WingBench
+from benchmarks.concealed.calibration import bins_of, verdict_is_right
 from benchmarks.concealed.plant.law import Concealed
 from benchmarks.concealed.plant.vortex_lattice.simulate import VARIABLE
 from benchmarks.concealed.rigs import BY_HAND, VEHICLES, WINGS, as_described, size_of
 from benchmarks.concealed.score import Mark
-from benchmarks.concealed.table import Table, figures_of, verdict_is_right
+from benchmarks.concealed.table import Table, figures_of
 from benchmarks.concealed.trials import FOUR_ROD, VORTICES, Build, chamber, flight, tunnel
+from docs.generate.reliability_figure import panel
 from wingfit.records import Recording
 from wingfit.sim.model import Array
 from wingfit.sim.virtual_rigs.campaign import blank_recording
@@ -137,7 +140,16 @@ def test_a_verdict_is_right_if_all_that_it_names_is_hidden() -> None:
     )
     assert [verdict_is_right(one) for one in marks] == [True, True, False, True, True, False, False]
     table = Table(marks, (), 0, 1.0).as_json()
-    assert table["calibration"] == {"said_95": 7, "right_percent": 57.1}
+    together = {"n": 7, "said_percent": 97.0, "right_percent": 57.1}
+    assert table["calibration"] == {"said_95": 7, "right_percent": 57.1, "bins": [together]}
+    certain = [replace(one, probability=1.0) for one in marks[:2]]
+    found = bins_of([*marks, *certain, replace(marks[2], probability=0.5)])
+    assert found == [
+        {"n": 1, "said_percent": 50.0, "right_percent": 0.0},
+        together,
+        {"n": 2, "said_percent": 100.0, "right_percent": 100.0},
+    ]
+    assert "Reliability of verdicts" in svg([panel(found)])
     assert table["drift"] == {"n": 1, "adequate_percent": 100.0}
     assert table["smooth_unlisted"] == {"n": 1, "wrong_percent": 0.0, "unnamed_percent": 100.0}
     assert table["by_plant"] == {"bird: wing 4 of 9x1": figures_of(marks)}
