@@ -180,7 +180,7 @@ def _covered(finding: Finding, answer: Answer) -> tuple[int, int]:
     true = _nominal(answer)
     if finding.verdict in NAMING:
         for secret in answer.secrets:
-            if secret.name in finding.named and secret.name not in CHOICES:
+            if secret.name in finding.named and secret.name not in (*CHOICES, "body_pitch_convention"):
                 true.update(secret.values)
     inside = [_holds(gene, true[gene.name]) for gene in finding.genes if gene.name in true]
     known = [one for one in inside if one is not None]

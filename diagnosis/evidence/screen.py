@@ -38,7 +38,7 @@ class Trial:
         changes: [S, D] change of the D Fourier coefficients of all recordings by each size.
         gain: decrease of chi-squared when the sizes and the nominal genes are fitted, by the linearised model.
         multiples: [S] factors by which the fit multiplies the sizes.
-        freedom: number of genes E, location and shape included.
+        freedom: number of genes E, location and shape included; sizes that are choices count as one gene together.
         remaining_chi_squared: chi-squared after that fit.
     """
 
@@ -190,7 +190,7 @@ def _trial(suspect: Suspect, genes: Array, changes: Array, nuisance: Nuisance) -
         changes,
         max(float(residual @ residual) - remaining_chi_squared, 0.0),
         found,
-        len(suspect.genes),
+        len(suspect.genes) - max(len(suspect.positions) - 1, 0),
         remaining_chi_squared,
     )
 

@@ -18,7 +18,7 @@ _FILES = (
     ("actuation", "wing_pitch_zero wing_pitch_amplitude wing_pitch_phase"),
     ("actuation", "hinge_tilt hinge_offset compliant_drive backlash"),
     # each acts on the result of those before: stream, coefficients of the angle of attack, circulation, wake
-    ("stream", "residual_air airspeed_error body_pitch_error body_drag tail_lift"),
+    ("stream", "residual_air airspeed_error body_pitch_convention body_pitch_error body_drag tail_lift"),
     ("aerodynamics", "added_mass"),
     ("terms", "added_mass_error effective_chord translation viscous"),
     ("aerodynamics", "zero_lift_angle leading_edge_vortex viscous_drag plate_drag dynamic_stall stall_vortex"),

@@ -44,9 +44,9 @@ def late(one: Recording) -> Recording:
         (lambda one: replace(one, values=one.values[:, ::-1].copy()), {"axis_swap"}),
         (lambda one: replace(one, values=one.values / POUND), {"unit_error"}),
         (late, {"phase_reference"}),
-        (pitched(math.pi / 180), {"body_pitch_error"}),
+        (pitched(math.pi / 180), {"body_pitch_convention"}),
         # with the same wings above and below, nothing distinguishes these two
-        (pitched(-1.0), {"axis_sign", "body_pitch_error"}),
+        (pitched(-1.0), {"axis_sign", "body_pitch_convention"}),
     ],
     ids=["sign", "swap", "pounds", "phase", "degrees", "mirror"],
 )

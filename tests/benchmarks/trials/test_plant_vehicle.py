@@ -59,7 +59,7 @@ def test_other_layouts_agree_too(layout: str) -> None:
     assert (off(ours, theirs) < WITHIN).all()
 
 
-@pytest.mark.parametrize("name", LAWS)
+@pytest.mark.parametrize("name", [name for name in LAWS if name != "body_pitch_convention"])  # which has no size
 def test_zero_strength_changes_nothing_and_a_larger_one_changes_more(name: str) -> None:
     terms, law = BERMAN_WANG if name == "clap_and_peel" else PROPOSED, LAWS[name]
     drawn = law.draw(np.random.default_rng(4))

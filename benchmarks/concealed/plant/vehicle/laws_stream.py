@@ -29,6 +29,8 @@ def flown(condition: Condition, hidden: Concealed) -> Condition:
     the "strength" of residual_air (kg/m^3), with the gas constant R and T_0 = 293 K.
     """
     air = blocked(condition, strength(hidden, "airspeed_error"))
+    if strength(hidden, "body_pitch_convention"):
+        air = replace(air, angle_of_attack=-air.angle_of_attack)
     angle = strength(hidden, "body_pitch_error")
     if angle:
         airspeed, attack = air.airspeed / math.cos(angle), air.angle_of_attack + angle
@@ -120,6 +122,12 @@ STREAM = (
         source="Barlow, Rae and Pope (1999), ch. 6: flow angularity, a velocity across the stream",
         both_signs=True,
         values=lambda p: {"body_pitch_error.angle": p["strength"]},
+    ),
+    _listed(
+        "body_pitch_convention",
+        typical=1.0,
+        source="a mistake: the body pitch with the other sign; any strength above zero is all",
+        values=lambda _: {"body_pitch_convention.part": -2.0},
     ),
     _listed(
         "residual_air",

@@ -22,6 +22,6 @@ EFFECT = fault_of_forces(
     law="X' = (1 - 2 x) X\nZ' = (1 - 2 z) Z",
     source="AIAA R-091A (2020), Calibration and Use of Internal Strain-Gage Balances: sign conventions of body axes",
     signature="the force along an axis is mirrored, its mean included, in every condition",
-    confused_with=("axis_swap", "body_pitch_error"),
+    confused_with=("axis_swap", "body_pitch_convention"),
     observe=_observe,
 )

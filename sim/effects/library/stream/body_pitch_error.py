@@ -1,4 +1,4 @@
-"""Fault of the description: the body pitch has the wrong sign, another zero, or is in degrees instead of radians."""
+"""Fault of the description: the body pitch is measured from another zero."""
 
 from __future__ import annotations
 
@@ -7,21 +7,16 @@ from wingfit.sim.effects.ports.vehicle import VehicleScene
 
 
 def _vehicle(scene: VehicleScene, values: Values) -> None:
-    scene.incidence = scene.incidence * (1.0 + values["part"]) + values["angle"]
+    scene.incidence = scene.incidence + values["angle"]
 
 
 EFFECT = effect_of_air(
     name="body_pitch_error",
     title="Body pitch error",
-    size=(
-        Parameter("angle", "rad", -0.5, 0.5, 0.05, "angle added to the body pitch"),
-        Parameter(
-            "part", "1", -2.0, 60.0, 56.3, "-2: wrong sign, 56.3: degrees instead of radians", positions=(-2.0, 56.3)
-        ),
-    ),
-    law="alpha' = (1 + part) alpha + angle",
+    size=(Parameter("angle", "rad", -0.5, 0.5, 0.05, "angle added to the body pitch"),),
+    law="alpha' = alpha + angle",
     source="Armanini et al. (2016), Table 4 and Eqs. 18 and 19: the body pitch gives the direction of the stream",
     signature="mean forces change with the direction of the stream, most in a fast stream and least in hover",
-    confused_with=("axis_sign", "balance_tilt", "airspeed_error", "tail_lift"),
+    confused_with=("balance_tilt", "airspeed_error", "tail_lift"),
     vehicle=_vehicle,
 )
