@@ -30,7 +30,7 @@ from wingfit.records import Condition, load_dataset
 if TYPE_CHECKING:
     from benchmarks.concealed.peers import PeerOutcome
 
-CASES = 40  # most ambiguous trials that are followed up
+CASES = 60  # most ambiguous trials that are followed up
 
 
 def make(trials: Sequence[Trial], folders: Folders, jobs: int) -> str:
