@@ -102,25 +102,33 @@ def _substituted_refits(state: SearchState) -> Iterator[str]:
             yield from _refit_untried(state, tried, [*others, trial])
 
 
-def every_pair(state: SearchState) -> Iterator[str]:
-    """Fit each suspect alone and each pair of them that was not fitted yet; yields the name of each stage.
+def every_pair(state: SearchState) -> Iterator[tuple[float, str]]:
+    """Fit each suspect alone and each pair of them that was not fitted yet; yields the fraction done and the stage.
 
-    A pair starts from the better of its two single fits, at which the other effect is score-tested.
+    A pair starts from the better of its two single fits, at which the other effect is score-tested, or from the nominal
+    fit where neither has one.
     """
     tried = {frozenset(one.names) for one in state.refits}
-    for trials in list(state.trials):
-        if trials:
-            yield from _refit_untried(state, tried, trials[:1])
+    found = [trials[0] for trials in state.trials if trials]
+    whole = max(len(found) * (len(found) - 1) // 2, 1)
+
+    def done(stage: str) -> tuple[float, str]:
+        return min(sum(len(names) == 2 for names in tried) / whole, 1.0), stage
+
+    for trial in found:
+        yield from map(done, _refit_untried(state, tried, [trial]))
     singles = [fit_to_convergence(state.context, one) for one in state.by_excess if len(one.trials) == 1]
-    for k, base in enumerate(singles):
+    for base in singles:
         state.add(base)
-        later = {one.names[0] for one in singles[k + 1 :]}
         others = [
-            one for one in state.suspects if one.name in later and frozenset((*base.names, one.name)) not in tried
+            one for one in state.suspects if frozenset((*base.names, one.name)) not in tried | {frozenset(base.names)}
         ]
         for _, trials in score_tests(state.context, base.fit, others, base.names):
             if trials:
-                yield from _refit_untried(state, tried, [*base.trials, trials[0]], base.fit)
+                yield from map(done, _refit_untried(state, tried, [*base.trials, trials[0]], base.fit))
+    for k, one in enumerate(found):
+        for other in found[:k]:
+            yield from map(done, _refit_untried(state, tried, [one, other]))
 
 
 def smaller_refits(state: SearchState) -> Iterator[str]:

@@ -57,6 +57,7 @@ def _check_search(subject: Subject, spec: DiagnosisSpec) -> None:
 def diagnose(dataset: Dataset, spec: DiagnosisSpec, evaluator: Evaluator) -> Iterator[Progress]:
     """Diagnose ``dataset``; yields progress, with the finding last. ValueError where ``spec`` does not fit."""
     subject, fitted, held_out, free = _prepare(dataset, spec)
+    _check_search(subject, spec)
     yield from diagnose_subject(
         subject, dataset.name, fitted, held_out, spec, evaluator, free=free, axes=_axes(dataset, spec)
     )

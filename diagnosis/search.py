@@ -35,7 +35,7 @@ Steps = Iterator[tuple[float, str]]  # fraction of the work done, and the next s
 FAULTS = ("measurement", "input")  # families of suspects that do not act within the simulation
 MAX_INNER = 12  # suspects that are fitted from a large size
 MAX_RESTARTED = 3  # suspects that are also fitted from the estimates
-MAX_RIVALS = 3  # hypotheses for which a second effect is tried
+MAX_OVERTAKING = 3  # hypotheses that have not converged and are looked at
 
 
 def run_search(state: SearchState, free: tuple[str, ...]) -> Steps:
@@ -66,7 +66,7 @@ def run_search(state: SearchState, free: tuple[str, ...]) -> Steps:
     yield from ((0.93, stage) for stage in _refine_and_extend(state))
     yield from ((0.93, stage) for stage in smaller_refits(state))
     if spec.exhaustive and state.refits:
-        yield from ((0.93, stage) for stage in every_pair(state))
+        yield from ((0.93 + 0.01 * part, stage) for part, stage in every_pair(state))
     yield 0.94, "continuing the best refits"
     if state.refits:
         _continue_best(state)
@@ -146,7 +146,7 @@ def _unconverged(weights: HypothesisWeights) -> Refit | None:
     if best.trials and not (best.fit.converged and best.fit.jacobian_measured):
         return best
     evidence = weights.evidence[1:]
-    for k in np.argsort(-evidence, kind="stable")[: MAX_RIVALS if best.trials else 0]:
+    for k in np.argsort(-evidence, kind="stable")[: MAX_OVERTAKING if best.trials else 0]:
         rival: Refit = weights.refits[1:][k]
         if evidence[k] > evidence.max() - weights.policy.overtake and not rival.fit.converged:
             return rival

@@ -20,7 +20,8 @@ def sure(marks: Iterable[Mark]) -> list[Mark]:
 def verdict_is_right(one: Mark) -> bool | None:
     """Whether the verdict is true; None if what is hidden is too weak for a verdict to be expected.
 
-    A name is right if all that it names is hidden, and "unnamed" if what is hidden is not in the library.
+    A name is right if all that it names is hidden, an ambiguity if what is hidden is one of the alternatives, and
+    "unnamed" if what is hidden is not in the library.
     """
     if not one.truth:
         return one.verdict == "adequate"
@@ -30,7 +31,9 @@ def verdict_is_right(one: Mark) -> bool | None:
         return None
     if one.group in ("unlisted", "smooth") or (one.group == "partly" and one.verdict == "unnamed"):
         return one.verdict == "unnamed"
-    return one.verdict in (*NAMING, "ambiguous") and not one.wrong and bool(one.found)
+    if one.verdict == "ambiguous":
+        return bool(one.among)
+    return one.verdict in NAMING and not one.wrong and bool(one.found)
 
 
 def bins_of(marks: Iterable[Mark]) -> list[dict[str, float | int]]:

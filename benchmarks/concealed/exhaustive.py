@@ -24,17 +24,20 @@ SAME = 0.5  # natural logarithm: evidence that two fits of the same hypothesis m
 
 @dataclass(frozen=True)
 class Compared:
-    """One trial: the best hypotheses of the two searches, and by how much the evidence of the default one is less."""
+    """One trial: the best hypotheses of the two searches, and by how much the evidence of the default one is less.
+
+    None if one of the two failed.
+    """
 
     trial: str
     best: tuple[str, ...]
     default: tuple[str, ...]
-    behind: float
+    behind: float | None
 
     @property
     def found(self) -> bool:
         """Whether the default search found the best hypothesis, or one with as much evidence."""
-        return self.behind <= SAME
+        return self.behind is not None and self.behind <= SAME
 
 
 def compare(
@@ -44,7 +47,7 @@ def compare(
     pairs = [pair for one in _chosen(trials, first) for pair in _tasks(one, first[one.name], folders)]
     outcomes = diagnosed(tool, pairs, folders, "comparing with an exhaustive search")
     both = zip(outcomes[::2], outcomes[1::2], strict=True)
-    return tuple(_compared(default, every) for default, every in both if default.finding and every.finding)
+    return tuple(_compared(default, every) for default, every in both)
 
 
 def _chosen(trials: Sequence[Trial], first: Mapping[str, Outcome]) -> list[Trial]:
@@ -71,12 +74,11 @@ def _tasks(trial: Trial, outcome: Outcome, folders: Folders) -> tuple[Task, Task
 
 
 def _compared(default: Outcome, every: Outcome) -> Compared:
+    trial = default.trial.removesuffix("-few")
     if default.finding is None or every.finding is None:
-        raise ValueError(f"{default.trial} has no finding")
+        return Compared(trial, (), (), None)
     one, best = _best(default.finding), _best(every.finding)
-    return Compared(
-        default.trial.removesuffix("-few"), best.effects, one.effects, round(best.evidence - one.evidence, 2)
-    )
+    return Compared(trial, best.effects, one.effects, round(best.evidence - one.evidence, 2))
 
 
 def _best(finding: Finding) -> Hypothesis:

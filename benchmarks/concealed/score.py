@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 from benchmarks.concealed.answer import Answer, Group, Side
 from benchmarks.concealed.plant.measurement.balance import CHOICES
+from benchmarks.concealed.trials import LATTICE
 from wingfit.diagnosis.finding import NAMING, Finding, GeneValue, Hypothesis, Interval
 from wingfit.sim.effects.registry import EFFECTS
 
@@ -30,6 +31,7 @@ class Mark:
         alarm: the verdict is not "adequate".
         first: ``top`` are the hidden effects and no others; exact: the verdict names these and no others.
         found: number of hidden effects among those that the verdict names, or among ``top`` if it names none.
+        among: the hidden effects are one of the hypotheses that an ambiguous verdict leaves open.
         wrong: the verdict names an effect that was not hidden.
         side: physics or measurement, according to the verdict; None if the verdict does not decide.
         right_side: whether all hidden effects are of this side.
@@ -56,6 +58,7 @@ class Mark:
     first: bool | None = None
     exact: bool | None = None
     found: int | None = None
+    among: bool | None = None
     wrong: bool = False
     side: Side | None = None
     right_side: bool | None = None
@@ -128,6 +131,7 @@ def mark(finding: Finding, answer: Answer) -> Mark:
         first=set(top) == answer.names,
         exact=bool(named) and set(named) == answer.names,
         found=len(credited & answer.names),
+        among=any(set(one) == answer.names for one in finding.indistinguishable),
         side=side,
         right_side=all(side == secret.side for secret in answer.secrets),
         span=span,
@@ -190,9 +194,9 @@ def _covered(finding: Finding, answer: Answer) -> tuple[int, int]:
 def _nominal(answer: Answer) -> dict[str, float]:
     """True values of the nominal genes by name, in a null trial of a vehicle; empty otherwise.
 
-    Of a wing, the description has wrong densities, which fitted moduli make up for.
+    Of a wing, the description has wrong densities, which fitted moduli make up for; a vortex lattice has no genes.
     """
-    if answer.secrets or answer.rig == "wing":
+    if answer.secrets or answer.rig == "wing" or answer.plant == LATTICE:
         return {}
     return dict(answer.genome)
 

@@ -54,7 +54,7 @@ def _made(trial: Trial, folders: Folders) -> bool:
     earlier = seal.read(folders.answer(trial.name))
     stored, requested = (
         (earlier.seed, earlier.names, earlier.plant, earlier.target),
-        (trial.seed, frozenset(trial.hidden)),
+        (trial.seed, frozenset((*trial.hidden, *trial.build.by_nature))),
     )
     if stored != (*requested, trial.build.plant, trial.target):
         raise ValueError(

@@ -277,7 +277,12 @@ def _each(group: Group, names: Sequence[str], builds: Sequence[Build], n: int) -
     turn = count()
     for first, name in enumerate(names):
         for k in range(n):
-            yield _draft(group, builds[next(turn) % len(builds)], (name,), TARGETS[(first + k) % len(TARGETS)])
+            yield _draft(
+                group,
+                builds[next(turn) % len(builds)],
+                (name,),
+                TARGETS[(first + k + k // len(TARGETS)) % len(TARGETS)],
+            )
 
 
 def _mixed(
@@ -290,7 +295,7 @@ def _mixed(
         names, flexible = kinds[(k * step + len(kinds) - 1) % len(kinds)]
         builds = WINGS if flexible else VEHICLES
         build = builds[(k // len(kinds) + k) % len(builds)]
-        yield _draft(group, build, names, TARGETS[(k // len(kinds) + k) % len(TARGETS)])
+        yield _draft(group, build, names, TARGETS[(k // len(kinds) + k // len(TARGETS)) % len(TARGETS)])
 
 
 def _draft(group: Group, build: Build, hidden: tuple[str, ...] = (), target: float = 0.0) -> Trial:
@@ -339,7 +344,7 @@ def _flights(trial: Trial, rng: np.random.Generator) -> list[tuple[Condition, bo
     flights = trial.build.grid.flights
     order = rng.permutation(len(flights))
     if trial.poor:  # neighbours, which are as alike as flights can be
-        order = (order[0] + np.arange(3)) % len(flights)
+        order = rng.integers(len(flights) - 2) + np.arange(3)
     chosen = np.sort(order[:2]) if trial.poor else np.sort(order[:5])
     held_out = order[2:3] if trial.poor else order[5:7]
     return [(flight(*flights[k]), False) for k in chosen] + [(flight(*flights[k]), True) for k in held_out]

@@ -84,7 +84,10 @@ def story_of(made: Campaign, finding: Finding, page: Path) -> Story:
         "diagnosis_seconds": finding.seconds,
     }
     claims = (
-        Claim("it names the displaced axis and nothing else", set(finding.named) == set(HIDDEN)),
+        Claim(
+            "it names the displaced axis and nothing else",
+            finding.verdict == "named" and set(finding.named) == set(HIDDEN),
+        ),
         Claim(f"and finds it to {1e3 * NEAR:g} mm", len(errors) == len(rows) and max(errors, default=1.0) < NEAR),
         Claim("it notices that rest positions are wrong", bool(remark)),
         Claim("the held-out misfit falls to the floor", after is not None and after <= AT_FLOOR),

@@ -74,7 +74,7 @@ def _only_drifts(state: SearchState, decision: Decision) -> bool:
 def _is_load(decision: Decision, best: Refit) -> bool:
     """Return whether the named effects act as loads: faults of a drive or camera move markers without a load."""
     families = {trial.suspect.family for trial in best.trials}
-    return decision.verdict in ("named", "ambiguous") and not families & {"actuation", "measurement"}
+    return decision.verdict in (*NAMING, "ambiguous") and not families & {"actuation", "measurement"}
 
 
 def _locate(state: SearchState, *, unnamed: bool) -> Iterator[tuple[float, str, MissingPhysics]]:

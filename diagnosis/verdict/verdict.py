@@ -174,19 +174,20 @@ def summary(decision: Decision, suspects: Mapping[str, Suspect], texts: Mapping[
         )
     fault = is_measurement_fault(decision.best)
     kind, link = ("the recordings have a fault", ": ") if fault else ("the model is missing", " ")
-    kind = f"In part, {kind}" if decision.verdict == "partly named" else kind.capitalize()
+    kind, part = kind.capitalize(), ", and that is only a part" if decision.verdict == "partly named" else ""
     named = set(decision.named)
     larger = [one for one in decision.alternatives if named <= set(one)]
     others = [one for one in decision.alternatives if not named <= set(one)]
     additional = dict.fromkeys(name for one in larger for name in one if name not in decision.named)
     alternatives = [
-        _titles(suspects, one, " with ") + (" beside something unknown" if set(one) < named else "") for one in others
+        _titles(suspects, one, " with ") + (" alone or beside something unknown" if set(one) < named else "")
+        for one in others
     ]
     more = (
         f" Whether {_titles(suspects, list(additional), ' or ')} is missing as well is undecided." if additional else ""
     )
     more += f" Less probable alternatives: {' or '.join(alternatives)}." if alternatives else ""
-    return f"{kind}{link}{names}.{more} {start} With it the misfit is {texts['after']}. {texts['held_out']}"
+    return f"{kind}{link}{names}{part}.{more} {start} With it the misfit is {texts['after']}. {texts['held_out']}"
 
 
 def _titles(suspects: Mapping[str, Suspect], names: Sequence[str], between: str = " and ") -> str:

@@ -107,9 +107,9 @@ def _with_unknown_rest(hypotheses: Sequence[Refit], weight: Array, with_unknown:
         contained = [j for j, other in enumerate(names) if other and other < names[k]]
         if contained:
             best = max(contained, key=lambda j: with_unknown[j])
-            both = np.logaddexp(weight[k], with_unknown[best])
-            found[k] += weight[k] - both
-            found[best] = np.logaddexp(found[best], weight[k] + with_unknown[best] - both)
+            whole, both = found[k], np.logaddexp(weight[k], with_unknown[best])
+            found[k] = whole + weight[k] - both
+            found[best] = np.logaddexp(found[best], whole + with_unknown[best] - both)
     return found
 
 

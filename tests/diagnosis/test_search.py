@@ -14,7 +14,7 @@ import pytest
 from tests.diagnosis.pendulum_rig import GENES, SUSPECTS, PendulumRig, recorded
 from wingfit.diagnosis import DiagnosisSpec
 from wingfit.diagnosis.combinations import smaller_refits
-from wingfit.diagnosis.diagnose import check
+from wingfit.diagnosis.diagnose import check, diagnose
 from wingfit.diagnosis.evidence.competing_fits import StartPoint
 from wingfit.diagnosis.evidence.context import FitContext
 from wingfit.diagnosis.evidence.screen import Trial
@@ -157,5 +157,9 @@ def test_an_exhaustive_search_fits_every_pair(exhaustive: bool) -> None:
 
 
 def test_an_exhaustive_search_of_the_whole_library_is_refused() -> None:
-    with pytest.raises(ValueError, match=r"exhaustive fits every pair of suspects, and there are \d+: name at most 20"):
-        check(wing_or_vehicle(load_dataset(ROOT / "examples/delfly")), DiagnosisSpec(exhaustive=True))
+    delfly, spec = wing_or_vehicle(load_dataset(ROOT / "examples/delfly")), DiagnosisSpec(exhaustive=True)
+    why = r"exhaustive fits every pair of suspects, and there are \d+: name at most 20"
+    with pytest.raises(ValueError, match=why):
+        check(delfly, spec)
+    with pytest.raises(ValueError, match=why):
+        next(diagnose(delfly, spec, InProcessEvaluator()))

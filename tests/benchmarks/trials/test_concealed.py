@@ -37,6 +37,7 @@ from benchmarks.concealed.trials import (
     any_condition,
     chamber,
     conditions,
+    flight,
     name_of,
     plan,
 )
@@ -324,6 +325,13 @@ def test_the_quick_sample_has_every_group_and_both_rigs() -> None:
     for group in GROUPS:
         rigs = {trial.build.rig for trial in sample if trial.group == group}
         assert rigs == ({"wing"} if group == "drift" else {"wing", "vehicle"}), group
+
+
+def test_few_flights_are_as_alike_as_can_be() -> None:
+    for trial in (one for one in plan(2) if one.poor and one.build.rig == "vehicle"):
+        drawn = [one for one, _ in conditions(trial, np.random.default_rng(trial.seed))]
+        places = [[flight(*one) for one in trial.build.grid.flights].index(one) for one in drawn]
+        assert np.diff(places).tolist() == [1, 1]
 
 
 def test_conditions_suit_the_rig() -> None:

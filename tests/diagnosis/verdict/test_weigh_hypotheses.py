@@ -139,6 +139,26 @@ def test_further_effects_that_an_unknown_law_may_replace_are_not_named() -> None
     assert verdict(5.0, refit(1.6, ("d",)), refit(0.3, ("a", "b"))) == ("named", ("a", "b")), "of its own effects only"
 
 
+def test_sharing_with_parts_beside_an_unknown_law_loses_no_probability() -> None:
+    names = ((), ("a",), ("b",), ("a", "b"), ("a", "b", "c"))
+    each = [refit(1.0, one) for one in names]
+    rng = np.random.default_rng(3)
+    for _ in range(50):
+        weight, beside = rng.normal(0.0, 3.0, (2, len(names)))
+        found = weigh_hypotheses._with_unknown_rest(each, weight, beside)
+        assert np.logaddexp.reduce(found) == pytest.approx(np.logaddexp.reduce(weight))
+        assert found[0] == weight[0]
+        assert found[-1] <= weight[-1]
+        assert found[1] >= weight[1]
+    ordered = np.array([4, 2, 0, 3, 1])
+    other = weigh_hypotheses._with_unknown_rest([each[k] for k in ordered], weight[ordered], beside[ordered])
+    np.testing.assert_allclose(other, found[ordered])
+    assert verdict(4.07, refit(1.82, ("a",)), refit(1.62, ("a", "b")), refit(1.12, ("a", "b", "c"))) == (
+        "named",
+        ("a",),
+    )
+
+
 def test_a_measurement_fault_has_its_own_verdict() -> None:
     found = verdict(2.0, refit(0.3, ("a",), family="measurement"), refit(1.5, ("b",)))
     assert found == ("measurement fault", ("a",))
