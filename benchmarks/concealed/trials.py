@@ -185,8 +185,8 @@ OPEN_VEHICLE = (
 )  # fmt: skip
 
 COUNTS: dict[str, int] = {
-    "null": 150, "listed": 15, "unlisted": 20, "smooth": 8, "measurement": 60, "pairs": 21, "partly": 21, "every": 50,
-    "drift": 20, "advice": 240,
+    "null": 150, "listed": 12, "unlisted": 12, "smooth": 8, "measurement": 60, "pairs": 21, "partly": 21, "every": 50,
+    "drift": 20, "advice": 204,
 }  # fmt: skip
 QUICK: dict[str, int] = {
     "null": 6, "listed": 1, "unlisted": 1, "smooth": 1, "measurement": 4, "pairs": 2, "partly": 2, "every": 2,
