@@ -20,8 +20,8 @@ serve: $(RUNS)  ## start the service and stay
 test: $(INSTALLED)  ## every check and every test, four at a time: programs, servers and browsers wait more than they compute
 	@$(MAKE) --no-print-directory -k -j4 test-service test-rest test-programs test-pages check
 
-# Those of jobs and pages take as long as the others of the service.
-BESIDE := tests/service/jobs tests/service/pages
+# Taken out of two of the four parts, so that all take about as long.
+BESIDE := tests/service/jobs tests/service/pages tests/contract
 test-service:
 	$(BIN)/python -m pytest tests/service $(BESIDE:%=--ignore %)
 
@@ -34,7 +34,7 @@ test-programs:
 	$(BIN)/python -m pytest $(PROGRAMS)
 
 test-rest:
-	$(BIN)/python -m pytest --ignore tests/service $(PROGRAMS:%=--ignore %)
+	$(BIN)/python -m pytest --ignore tests/service --ignore tests/contract $(PROGRAMS:%=--ignore %)
 
 check: $(INSTALLED) check-image  ## every check, no test
 	$(BIN)/ruff check .
