@@ -120,9 +120,7 @@ def every_pair(state: SearchState) -> Iterator[tuple[float, str]]:
     singles = [fit_to_convergence(state.context, one) for one in state.by_excess if len(one.trials) == 1]
     for base in singles:
         state.add(base)
-        others = [
-            one for one in state.suspects if frozenset((*base.names, one.name)) not in tried | {frozenset(base.names)}
-        ]
+        others = [one for one in state.suspects if frozenset((*base.names, one.name)) not in tried]
         for _, trials in score_tests(state.context, base.fit, others, base.names):
             if trials:
                 yield from map(done, _refit_untried(state, tried, [*base.trials, trials[0]], base.fit))

@@ -255,10 +255,10 @@ def _group(group: Group, n: int, thinned: int) -> Iterator[Trial]:
 def of_lattice() -> list[Trial]:
     """The trials of the vehicle in a vortex lattice, still without name and seed: the lattice takes minutes a trial.
 
-    Its model has all that the lattice has beyond a quasi-steady model, or lacks one of these.
+    Its model has all that the lattice has beyond a quasi-steady model, or all but one of these.
     """
     lag, *_, acceleration = IN_LATTICE
-    lacking = [
+    without_one = [
         replace(VORTICES, effects=tuple(one for one in IN_LATTICE if one != name), by_nature=(name,))
         for name in (lag, acceleration)
     ]
@@ -266,7 +266,7 @@ def of_lattice() -> list[Trial]:
     moved = zip(MOVED, cycle(TARGETS), strict=False)
     return [
         *(_draft("null", VORTICES) for _ in range(4)),
-        *(_draft("listed", build) for build in lacking),
+        *(_draft("listed", build) for build in without_one),
         *(_draft("listed", VORTICES, (name,), target) for name, target in moved),
         *(_draft("measurement", VORTICES, (name,), target) for name, target in measured),
     ]

@@ -7,23 +7,19 @@ description for physics. Its model has eight rigid strips, because ribs keep the
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from benchmarks.concealed.benches.bench import record_all
 from benchmarks.concealed.benches.continuous import ContinuousBench
 from benchmarks.concealed.plant.law import Concealed
 from benchmarks.concealed.rigs import as_described
-from benchmarks.concealed.trials import ROD, Build, name_of
-from benchmarks.proof.robird import AT_FLOOR, FITTED, HELD_OUT
+from benchmarks.concealed.trials import ROD, Build
+from benchmarks.proof.robird import AT_FLOOR, Campaign, filmed
 from benchmarks.proof.story import Claim, Story, beside_truth, diagnosed, leader, nominal_misfit, over_floor, saved
-from wingfit.cli.base.output import progress
 from wingfit.diagnosis.finding import Finding
-from wingfit.records import Dataset, Recording
 
 BY_HAND = 7e-4  # m: standard deviation of rest positions along each axis
 DIVISION = "8x1"
@@ -31,26 +27,12 @@ HIDDEN: Concealed = {"hinge_offset": {"strength": 0.012, "direction": -0.8}}  # 
 NEAR = 2e-3  # m: largest error of the displacement
 
 
-@dataclass(frozen=True)
-class Campaign:
-    """Recordings of the wing with its description, and the true values of the genes of the hidden effect."""
-
-    dataset: Dataset
-    truth: Mapping[str, float]
-
-
 def campaign(seed: int, hidden: Concealed = HIDDEN) -> Campaign:
     """Film the wing with random moduli under the conditions of the Robird study, reproducibly from ``seed``."""
     bench = ContinuousBench(Build("wing", DIVISION, ROD))
-    genome = bench.genome(np.random.default_rng([seed, 1]))
-    recordings, conditions = list[Recording](), (*FITTED, *HELD_OUT)
-    with progress("continuous: filming the plant") as tell:
-        for recording in record_all(bench, conditions, genome, hidden, seed):
-            recordings.append(recording)
-            tell(len(recordings) / len(conditions), None, recording.name)
-    truth = {gene: value for name, one in hidden.items() for gene, value in bench.laws[name].values(one).items()}
+    made = filmed("continuous", bench, seed, hidden)
     wing = as_described(bench.rig, np.random.default_rng([seed, 4]), BY_HAND)
-    return Campaign(Dataset("continuous", wing, tuple(recordings), tuple(map(name_of, HELD_OUT))), truth)
+    return replace(made, dataset=replace(made.dataset, rig=wing))
 
 
 def play(folder: Path, seed: int, workers: int) -> Story:

@@ -109,15 +109,19 @@ class Stall:
 
 def campaign(seed: int, hidden: Concealed = HIDDEN) -> Campaign:
     """Simulate recordings of the plant with random parameters under all conditions, reproducibly from ``seed``."""
-    bench = WingBench(Build("wing", DIVISION, DIVISION))
+    return filmed("robird", WingBench(Build("wing", DIVISION, DIVISION)), seed, hidden)
+
+
+def filmed(name: str, bench: WingBench, seed: int, hidden: Concealed) -> Campaign:
+    """Film the wing of ``bench`` with random parameters and the effects ``hidden``; ``name``: of the dataset."""
     genome = bench.genome(np.random.default_rng([seed, 1]))
     recordings, conditions = list[Recording](), (*FITTED, *HELD_OUT)
-    with progress("robird: filming the plant") as tell:
+    with progress(f"{name}: filming the plant") as tell:
         for recording in record_all(bench, conditions, genome, hidden, seed):
             recordings.append(recording)
             tell(len(recordings) / len(conditions), None, recording.name)
-    truth = {gene: value for name, one in hidden.items() for gene, value in bench.laws[name].values(one).items()}
-    dataset = Dataset("robird", bench.rig, tuple(recordings), tuple(name_of(condition) for condition in HELD_OUT))
+    truth = {gene: value for law, one in hidden.items() for gene, value in bench.laws[law].values(one).items()}
+    dataset = Dataset(name, bench.rig, tuple(recordings), tuple(name_of(condition) for condition in HELD_OUT))
     return Campaign(dataset, genome, truth)
 
 

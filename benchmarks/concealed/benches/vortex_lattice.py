@@ -1,6 +1,6 @@
 """The bench of a flapping vehicle in an unsteady vortex lattice, on a force balance.
 
-The nominal model is quasi-steady, so it lacks the lag of the circulation and the loss of lift at the tips; and its
+The nominal model is quasi-steady, so it has no lag of the circulation and no loss of lift at the tips; and its
 inertia is as printed, which is not what a balance feels. All are effects of the library, and in most trials the model
 has them.
 """

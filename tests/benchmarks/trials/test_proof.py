@@ -131,7 +131,7 @@ def test_the_robird_claims_fail_if_the_diagnosis_is_wrong(filmed: Campaign) -> N
 
 
 def test_the_claims_of_the_continuous_wing_fail_if_the_diagnosis_is_wrong(filmed: Campaign) -> None:
-    made = continuous.Campaign(filmed.dataset, {"hinge_offset.y": 0.0120, "hinge_offset.z": -0.0015})
+    made = replace(filmed, truth={"hinge_offset.y": 0.0120, "hinge_offset.z": -0.0015})
     proof = Proof(Interval(4.4, 4.1, 4.7), Interval(1.04, 1.0, 1.1), 1e-3, True, "")
     remarks = ("the described rest positions of the markers are wrong by about 0.7 mm along each axis",)
     found = replace(wing_finding(), named=("hinge_offset",), proof=proof, remarks=remarks)

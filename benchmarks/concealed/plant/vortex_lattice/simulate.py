@@ -1,7 +1,7 @@
 """Unsteady vortex lattice simulation of a flapping pair of wings, by PteraSoftware, which produces test data.
 
-It has what a quasi-steady blade-element model lacks: shed and trailing vortices with their downwash and lag, and the
-loss of lift at the tips. It has no stall, leading-edge vortex or friction. PteraSoftware 5 (Urban, MIT licence) has
+Unlike a quasi-steady blade-element model, it has shed and trailing vortices with their downwash and lag, and the loss
+of lift at the tips. It has no stall, leading-edge vortex or friction. PteraSoftware 5 (Urban, MIT licence) has
 large dependencies, so it runs in a virtual environment of its own (:mod:`.worker`).
 """
 
