@@ -25,8 +25,8 @@ def verdict_is_right(one: Mark) -> bool | None:
     """
     if not one.truth:
         return one.verdict == "adequate"
-    if one.group == "drift":
-        return one.verdict == "unnamed"
+    if one.group == "drift":  # of which few beats show that there is one, but not which
+        return one.verdict == "unnamed" or (one.verdict in NAMING and not one.wrong and bool(one.found))
     if one.strength < WEAK:
         return None
     if one.group in ("unlisted", "smooth") or (one.group == "partly" and one.verdict == "unnamed"):

@@ -22,7 +22,7 @@ from benchmarks.concealed.benches.choose import bench_of
 from benchmarks.concealed.plant.law import Concealed
 from benchmarks.concealed.seal import read, seal
 from benchmarks.concealed.strength import Refit, rms, stacked, strength_for
-from benchmarks.concealed.trials import DRIFT, ENTIRE, REST, Trial, conditions, name_of
+from benchmarks.concealed.trials import ENTIRE, REST, Trial, conditions, name_of
 from wingfit.records import Condition, Dataset, Recording, Vehicle, load_dataset, save_dataset, wing_or_vehicle
 
 Array = npt.NDArray[np.float64]
@@ -157,7 +157,8 @@ def _made(trial: Trial, attempt: int) -> tuple[Dataset, Answer]:
     bare = Specimen(bench, trial.seed, attempt, bench.genome(rng), {})
     drawn = {name: bench.laws[name].draw(rng) for name in trial.hidden}
     strength = Strength.of(bare, fitted)
-    specimen = replace(bare, hidden=drawn) if DRIFT in drawn else strength.set(bare, drawn, _targets(trial, bare.bench))
+    as_drawn = trial.group == "drift"
+    specimen = replace(bare, hidden=drawn) if as_drawn else strength.set(bare, drawn, _targets(trial, bare.bench))
     every = [specimen.made(number, condition) for number, (condition, _) in enumerate(planned)]
     held_out = tuple(one.recording.name for one, (_, held) in zip(every, planned, strict=True) if held)
     noise = {
@@ -192,7 +193,7 @@ def _made(trial: Trial, attempt: int) -> tuple[Dataset, Answer]:
 
 def _reached(trial: Trial, specimen: Specimen, strength: Strength) -> float:
     """RMS residual (m or N) that a refit of the nominal model leaves of what is hidden; 0 of a drift."""
-    if DRIFT in trial.hidden:
+    if trial.group == "drift":
         return 0.0
     return strength.division() if trial.build.by_nature else strength.final(specimen)
 

@@ -114,7 +114,7 @@ UNLISTED_WING = ("stop", "appendage", "tooth")
 UNLISTED_VEHICLE = ("stop_knock", "tail_in_wake")
 SMOOTH_WING = ("band", "brake", "closed_cells")
 SMOOTH_VEHICLE = ("inertial_camber",)
-DRIFT = "stiffness_drift"
+DRIFTS = ("stiffness_drift", "motor_drift")  # during every recording; the second is not in the library
 FAULTS_WING = (
     "camera_shift",
     "camera_rotation",
@@ -235,7 +235,8 @@ def _group(group: Group, n: int, thinned: int) -> Iterator[Trial]:
         yield from _each(group, SMOOTH_WING[::thinned], WINGS, n)
         yield from _each(group, SMOOTH_VEHICLE, VEHICLES, n)
     elif group == "drift":
-        yield from (_draft(group, WINGS[k % len(WINGS)], (DRIFT,)) for k in range(n))
+        which = [DRIFTS[(k + k // len(WINGS)) % len(DRIFTS)] for k in range(n)]
+        yield from (_draft(group, WINGS[k % len(WINGS)], (name,)) for k, name in enumerate(which))
     elif group == "measurement":
         wing, vehicle = FAULTS_WING + LOOKALIKES_WING, 2 * (FAULTS_VEHICLE + LOOKALIKES_VEHICLE)
         yield from _mixed(group, [(name,) for name in wing], [(name,) for name in vehicle], n)

@@ -43,6 +43,7 @@ from wingfit.diagnosis.verdict.reservations import (
 )
 from wingfit.diagnosis.verdict.series_remarks import series_remarks
 from wingfit.diagnosis.verdict.verdict import Decision, decide, hypotheses, summary
+from wingfit.diagnosis.verdict.weigh_hypotheses import explains_drift
 from wingfit.records import AnyRecording, Condition
 
 Step = tuple[float, str, Finding | None]
@@ -160,7 +161,7 @@ def _finding(
         model=subject.description,
         verdict=decision.verdict,
         summary=summary(decision, suspects, _summary_texts(data, nominal, best, located, proved))
-        + ("" if data.kind == "series" else drift_sentence(data))
+        + ("" if data.kind == "series" else _drift_sentence(data, nominal, best))
         + remaining_sentence(data, decision, best, floor)
         + accepted_error_sentence(decide(weights), first)
         + accepted_sentence(data, decision, nominal, floor)
@@ -194,6 +195,10 @@ def _finding(
             *_worsened(rows, best, unit),
         ),
     )
+
+
+def _drift_sentence(data: WhitenedData, nominal: Refit, best: Refit) -> str:
+    return drift_sentence(data, explained=bool(best.names) and explains_drift(data, nominal, best))
 
 
 def _noise_remarks(data: WhitenedData, nominal: Refit, unit: str, decision: Decision) -> tuple[str, ...]:

@@ -98,11 +98,15 @@ def marker_remarks(data: WhitenedData, errors: MarkerErrors | None, best: Fit) -
     return (remark,)
 
 
-def drift_sentence(data: WhitenedData) -> str:
-    """Return a sentence for the summary if the beat changes slowly during recordings; empty if it does not."""
+def drift_sentence(data: WhitenedData, *, explained: bool) -> str:
+    """Return a sentence for the summary if the beat changes slowly during recordings; empty if it does not.
+
+    ``explained``: whether the effects that were added explain it.
+    """
     drifting, shared, every = len(_drifts(data)), len(_shared(data)), len(data.recordings)
     cause = "which may be the cause" if drifts(data) else "by too little to matter"
-    found = f" The beat changes slowly during {drifting} of {every} recordings: something drifts, {cause}."
+    seen = f" The beat changes slowly during {drifting} of {every} recordings"
+    found = f"{seen}, as the added effects explain." if explained else f"{seen}: something drifts, {cause}."
     more = f" The beats of {shared} of {every} recordings differ by a motion that all markers share."
     return (found if drifting else "") + (more if shared else "")
 

@@ -78,7 +78,7 @@ def weigh(
         for k in np.flatnonzero(~possible & (excess < policy.drift_left * excess[0])):
             possible[k] = hypotheses[k].predicted is not None and not absent(data, hypotheses[k])
     if drift_alone:
-        possible &= [_explains_drift(data, nominal, one) for one in hypotheses]
+        possible &= [explains_drift(data, nominal, one) for one in hypotheses]
     imitates = _imitation(data, hypotheses, floor, error)
     weight = np.where(possible, evidence - imitates, -np.inf)
     if data.kind != "series":
@@ -183,7 +183,8 @@ def absent(data: WhitenedData, refit: Refit) -> bool:
     return all((v.low is None or v.low <= 0.0) and (v.high is None or v.high >= 0.0) for v in sizes)
 
 
-def _explains_drift(data: WhitenedData, nominal: Refit, refit: Refit) -> bool:
+def explains_drift(data: WhitenedData, nominal: Refit, refit: Refit) -> bool:
+    """Return whether ``refit`` explains most of the slow changes that the ``nominal`` model leaves."""
     left, before = (data.change_of_beat(one.fit.coefficients) for one in (refit, nominal))
     return left < data.policy.drift_left * before
 

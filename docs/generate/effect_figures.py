@@ -34,7 +34,7 @@ LAG, FREQUENCY, AIRSPEED, EMPTY = math.radians(3.0), 3.0, 6.0, 10.0  # rad, Hz, 
 FREQUENCIES, AIRSPEEDS, PRESSURES = (2.0, 3.0, 4.0), (1.0, 3.5, 6.0, 8.5, 11.0), (10.0, 100.0, 300.0, 1000.0)
 OF_PRESSURE = ("residual_air", "added_mass")  # effects that depend on air density rather than airspeed
 IN_VACUUM = ("residual_air",)  # effects drawn over the beat in vacuum
-GROWING = ("strobe_rate", "balance_drift")  # effects that change from beat to beat: drawn over the whole recording
+GROWING = ("strobe_rate", "balance_drift", "stiffness_drift")  # effects that change from beat to beat
 TRIAL = 3  # test of the DelFly, from 0, that is drawn over the beat
 LEAST = 0.01  # mm or mN: smallest range of an axis to either side
 

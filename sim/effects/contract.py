@@ -101,6 +101,9 @@ class Effect:
         wing, vehicle: functions that change the input of a simulation, a scene; None where the effect does not apply.
         term: term of a vehicle's model (:data:`wingfit.sim.vehicle.terms.TERMS`) that the effect is; it is for models
             without that term only. "" if it is none.
+        during: whether its sizes are changes from the start of a recording to its end. Then ``wing`` is called with
+            minus half of them for the start and with half of them for the end. The middle is without the effect, and
+            in between the wing changes smoothly.
         of_term: term of a vehicle's model that the effect changes; it is for models with that term only. "" if it
             changes none.
         observe: function that changes a simulated beat before it is compared with a recording; only for the port
@@ -124,6 +127,7 @@ class Effect:
     vehicle: Callable[[VehicleScene, Values], None] | None = None
     term: str = ""
     of_term: str = ""
+    during: bool = False
     observe: Callable[[Sampling, Values], None] | None = None
     observed: tuple[Literal["tracks", "forces"], ...] = ()
 
@@ -132,6 +136,11 @@ class Effect:
             raise ValueError(
                 f"effect {self.name!r}: family {self.family!r} does not fit port {self.port!r}, which takes "
                 f"{' or '.join(map(repr, FAMILIES[self.port]))}: change the family, or act through another port"
+            )
+        if self.during and (self.wing is None or self.vehicle is not None):
+            raise ValueError(
+                f"effect {self.name!r}: only the wing can change during a recording: give `wing` and no `vehicle`, or "
+                "leave out `during`"
             )
         observing = self.port == "observation"
         if bool(self.observe) != observing or bool(self.observed) != observing:

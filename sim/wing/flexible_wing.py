@@ -26,6 +26,7 @@ from wingfit.sim.solver.numerics import Numerics
 from wingfit.sim.solver.settle import Course, Subject
 from wingfit.sim.solver.simulate import Beat, neighbouring_beats, periodic_beats, settled_course
 from wingfit.sim.wing.alignment import REFERENCE_HARMONICS, recorded_crossing, reference_columns, upstroke_crossing
+from wingfit.sim.wing.beat_series import SlowChange, aligned_values, distinct, on_grid, series_of
 from wingfit.sim.wing.division import Division
 from wingfit.sim.wing.genes import AERODYNAMIC, FACTOR, STRUCTURAL, lanes, wing_genes
 from wingfit.sim.wing.structure import Structure, build
@@ -33,7 +34,6 @@ from wingfit.sim.wing.structure import Structure, build
 Key = TypeVar("Key")
 Value = TypeVar("Value")
 
-MAX_SHIFT = 0.05  # rad, about 3 degrees of the beat
 _DEFINITION = ("wing", "division", "bounds_factor", "numerics", "effects", "probe", "near", "differentiates")
 _OWN_GENES = len(STRUCTURAL + AERODYNAMIC)  # the other genes are those of effects
 _MAX_STARTS = 256
@@ -42,8 +42,6 @@ _STARTS: OrderedDict[tuple[bytes, Condition], Course | None] = OrderedDict()
 _MAX_BEATS = 64
 # Beats of wings without effects on the wing, which are reused when only effects of the cameras differ.
 _BEATS: OrderedDict[tuple[bytes, Condition, bytes], Beat] = OrderedDict()
-_GRID = 96  # instants of a beat at which effects of the observation act
-_HARMONICS = 30  # of the periodic tracks; higher ones are below the integrator's error
 
 
 @dataclass(frozen=True)
@@ -145,7 +143,12 @@ class FlexibleWing:
 
         return Subject(structure, condition, scene)
 
-    def switched_on(self, genome: Array) -> tuple[Effect, ...]:
+    def scene(self, genome: ArrayLike, condition: Condition) -> WingScene:
+        """Return the scene of ``genome`` [G] under ``condition``, as in the middle of a recording."""
+        now = self._at(0.0, np.asarray(genome, float)[None])
+        return self.subject(self._switched_on(now[0]), condition).scene(now)
+
+    def _switched_on(self, genome: Array) -> tuple[Effect, ...]:
         """The effects that are on in ``genome`` [G] and act on the wing itself, not on its observation by cameras."""
         return tuple(e for e in self.chosen if e.wing and e.on(self.genes, genome[None])[0])
 
@@ -157,15 +160,18 @@ class FlexibleWing:
         together; effects that are off are omitted. Individuals that differ only in effects of the observation share one
         beat.
         """
-        beats, wing = self._beats(genome_batch(self.genes, genomes), recording, with_motion)
+        beats, wing = self._beats(genome_batch(self.genes, genomes), recording, with_motion=with_motion)
         return tuple(beats[k] for k in wing)
 
-    def _beats(self, batch: Array, recording: Recording, with_motion: bool) -> tuple[list[Beat], Index]:
-        """Simulate a beat of each distinct wing in ``batch`` [B, G].
+    def _beats(
+        self, batch: Array, recording: Recording, moment: float = 0.0, *, with_motion: bool = False
+    ) -> tuple[list[Beat], Index]:
+        """Simulate a beat of each distinct wing in ``batch`` [B, G] at a ``moment`` of the recording, -1/2 to 1/2.
 
         Returns the beats, and the index [B] of each individual's beat among them.
         """
-        first, wing = _distinct(self._acting(batch, [effect for effect in self.chosen if effect.wing]))
+        batch = self._at(moment, batch)
+        first, wing = distinct(self._acting(batch, [effect for effect in self.chosen if effect.wing]))
         wings, found = batch[first], dict[int, Beat]()
         if self.differentiates:
             return list(self._neighbours(wings, recording.condition)), wing
@@ -189,7 +195,7 @@ class FlexibleWing:
         """
         on = np.array([effect.on(self.genes, wings) for effect in self.chosen if effect.wing], bool)
         alike = (on == on[:, :1]).all(axis=0) if len(on) else np.ones(len(wings), bool)
-        acting, near = self.switched_on(wings[0]), self._start_near(condition)
+        acting, near = self._switched_on(wings[0]), self._start_near(condition)
         subject, same = self.subject(acting, condition), not acting and tuple(wings[0, :_OWN_GENES]) == self.near
         if near is None:
             return periodic_beats(subject, wings, self.numerics)
@@ -199,6 +205,15 @@ class FlexibleWing:
         first = next(found)
         kinked = replace(first, reason="an effect that is off has no derivative")
         return (first, *(next(found) if smooth else kinked for smooth in alike[1:]))
+
+    def _at(self, moment: float, batch: Array) -> Array:
+        """``batch`` [B, G] with the wings as they are at a ``moment`` of the recording, from -1/2 to 1/2."""
+        names = {f"{one.name}.{p.name}" for one in self.chosen if one.during for p in one.size}
+        if not names:
+            return batch
+        now = batch.copy()
+        now[:, [gene.name in names for gene in self.genes]] *= moment
+        return now
 
     def _key(self, genome: Array, condition: Condition) -> tuple[bytes, Condition, bytes]:
         return self._plain_key, condition, genome[:_OWN_GENES].tobytes()
@@ -247,23 +262,49 @@ class FlexibleWing:
         unknown (docs/decisions/0001).
         """
         whole = genome_batch(self.genes, genomes)
-        first, same = _distinct(self._acting(whole, self.chosen))
+        first, same = distinct(self._acting(whole, self.chosen))
         batch = whole[first]
-        beats, wing = self._beats(batch, recording, with_motion=False)
+        beats, wing = self._beats(batch, recording)
         series, times, added = self._observed(batch, recording, beats, wing)
+        changes, failed = self._changes(batch, recording, series)
         height = np.mean([series[:, :, 3 * c + 2] for c in reference_columns(self.wing, recording)], axis=0)
         own = upstroke_crossing(height[:, : REFERENCE_HARMONICS + 1], self.wing.hinge.z)
         shift = (times - recording.times).mean(axis=1, keepdims=True)  # mean clock error, which alignment removes
         angles = 2 * np.pi * recording.condition.flap_frequency * (times - shift)
         since = angles - recorded_crossing(self.wing, recording)
         reasons = [
-            beats[k].reason or (None if np.isfinite(phase) else "the reference markers never cross the hinge height")
-            for k, phase in zip(wing, own, strict=True)
+            beats[k].reason
+            or failed.get(b)
+            or (None if np.isfinite(phase) else "the reference markers never cross the hinge height")
+            for b, (k, phase) in enumerate(zip(wing, own, strict=True))
         ]
-        channels = _aligned_values(series, since, own, recording.values)
+        channels = aligned_values(series, since, own, recording.values, changes)
         channels += added
         solutions = [Solution(len(beats[k].tracks), beats[k].beats, beats[k].error) for k in wing]
         return Observation(channels[same], tuple(reasons[k] for k in same), tuple(solutions[k] for k in same))
+
+    def _changes(
+        self, batch: Array, recording: Recording, middle: Complex
+    ) -> tuple[dict[int, SlowChange], dict[int, str]]:
+        """Slow changes of individuals in ``batch`` [B, G] during a recording, and why they could not be simulated.
+
+        Both by individual. ``middle`` [B, K + 1, C]: series of the beat in the middle of the recording.
+        """
+        on = [effect.on(self.genes, batch) for effect in self.chosen if effect.during]
+        changing = np.flatnonzero(np.any(on, axis=0)) if on else np.empty(0, np.intp)
+        if not len(changing):
+            return {}, {}
+        part, ends, failed = batch[changing], list[Complex](), dict[int, str]()
+        for moment in (-0.5, 0.5):
+            beats, wing = self._beats(part, recording, moment)
+            ends.append(self._observed(part, recording, beats, wing)[0])
+            failed |= {int(b): why for b, k in zip(changing, wing, strict=True) if (why := beats[k].reason)}
+        times = recording.times
+        found = {
+            int(b): SlowChange.through(early, middle[b], late, times)
+            for b, early, late in zip(changing, *ends, strict=True)
+        }
+        return found, failed
 
     def _observed(
         self, batch: Array, recording: Recording, beats: Sequence[Beat], wing: Index
@@ -276,26 +317,19 @@ class FlexibleWing:
         """
         names = [marker.name for marker in self.wing.markers]
         columns = [names.index(name) for name in recording.markers]
-        series = np.stack([_series(beat.tracks[:, columns].reshape(len(beat.tracks), -1)) for beat in beats])[wing]
+        series = np.stack([series_of(beat.tracks[:, columns].reshape(len(beat.tracks), -1)) for beat in beats])[wing]
         times, added = np.tile(recording.times, (len(batch), 1)), np.zeros((len(batch), *recording.values.shape))
         changed = affected(self.chosen, self.genes, batch)
-        grids = {k: _on_grid(beats[k].tracks) for k in dict.fromkeys(wing[changed].tolist())}
+        grids = {k: on_grid(beats[k].tracks) for k in dict.fromkeys(wing[changed].tolist())}
         for start in range(0, len(changed), LANES):  # blocks that stay in the cache
             block = changed[start : start + LANES]
             beat = np.stack([grids[k] for k in wing[block].tolist()])
             sampling = Sampling(self.wing, recording, beat, times[block], added[block])
             apply(self.chosen, self.genes, batch[block], sampling)
             shown = sampling.beat[:, :, columns].reshape(*sampling.beat.shape[:2], -1)
-            series[block] = [_series(one) for one in shown]
+            series[block] = [series_of(one) for one in shown]
             times[block], added[block] = sampling.times, sampling.added
         return series, times, added
-
-
-def _distinct(rows: Array) -> tuple[Index, Index]:
-    """Indices of the distinct ``rows``, and for every row the position of its equal among these (bit for bit)."""
-    first = dict[bytes, int]()
-    kinds = [first.setdefault(row.tobytes(), len(first)) for row in rows]
-    return np.unique(kinds, return_index=True)[1], np.array(kinds, np.intp)
 
 
 def _remember(known: OrderedDict[Key, Value], key: Key, value: Value, most: int) -> None:
@@ -303,71 +337,3 @@ def _remember(known: OrderedDict[Key, Value], key: Key, value: Value, most: int)
     known[key] = value
     while len(known) > most:
         known.popitem(last=False)
-
-
-def _on_grid(tracks: Array) -> Array:
-    """Resample periodic ``tracks`` [n, M, 3] at _GRID equal steps, from their first _HARMONICS harmonics."""
-    series = _series(tracks.reshape(len(tracks), -1))
-    series[1:] *= 0.5
-    return np.asarray(np.fft.irfft(series * _GRID, _GRID, axis=0)).reshape(_GRID, *tracks.shape[1:])
-
-
-def _aligned_values(series: Complex, since: Array, own: Array, recorded: Array) -> Array:
-    """Values [B, T, C] of the Fourier ``series`` [B, K + 1, C] of B individuals at the frames of a recording.
-
-    The phase (rad) at a frame is ``since`` [B, T], since the recorded crossing, plus ``own`` [B], the simulated
-    crossing, plus a common shift of each individual. Two Gauss-Newton steps fit the shift to ``recorded`` [T, C]; noise
-    makes a shift of about a thousandth of a radian. Each step is limited to MAX_SHIFT, so that a larger shift remains
-    visible as misfit. The series is shifted, not the frames, so that individuals can share the sines and cosines of the
-    frames.
-    """
-    weight = np.isfinite(recorded).astype(float)
-    target = np.where(np.isfinite(recorded), recorded, 0.0)
-    first, which = _distinct(since)
-    angles = since[first, :, None] * np.arange(series.shape[1])
-    waves = np.concatenate([np.cos(angles), np.sin(angles)], axis=2)
-    found = np.empty((len(series), *recorded.shape))
-    for values, one, place, k in zip(found, series, own, which, strict=True):
-        values[:] = _fitted(waves[k], _turned(one, place), target, weight)
-    return found
-
-
-def _fitted(waves: Array, series: Complex, target: Array, weight: Array) -> Array:
-    """Values [T, C] of one ``series`` [K + 1, C], shifted in phase to fit ``target`` [T, C] by weighted least squares.
-
-    ``weight`` [T, C]: 1 where recorded, 0 elsewhere. ``waves`` [T, 2 (K + 1)]: cosines, then sines, of k times the
-    phase of each frame, k = 0 .. K.
-    """
-    order = 1j * np.arange(len(series))[:, None]
-    for _ in range(2):
-        slope = weight * (waves @ _parts(order * series))
-        power = float((slope * slope).sum())
-        shift = -float((slope * (waves @ _parts(series) - target)).sum()) / power if power > 0 else 0.0
-        series = _turned(series, np.clip(shift, -MAX_SHIFT, MAX_SHIFT))
-    return waves @ _parts(series)
-
-
-def _turned(series: Complex, phase: float) -> Complex:
-    """Fourier ``series`` [K + 1, C] of the same functions, advanced in phase by ``phase`` (rad)."""
-    return np.asarray(series * np.exp(1j * np.arange(len(series)) * phase)[:, None])
-
-
-def _parts(series: Complex) -> Array:
-    """Real coefficients [2 (K + 1), C] of ``series`` [K + 1, C]: of cosines, then of sines.
-
-    Re s exp(i x) = Re s cos x - Im s sin x.
-    """
-    return np.concatenate([series.real, -series.imag])
-
-
-def _series(samples: Array) -> Complex:
-    """Fourier series [_HARMONICS + 1, C] of periodic ``samples`` [n, C] over a beat.
-
-    value(psi) = Re sum_k series_k exp(i k psi) at the drive phase psi.
-    """
-    n = len(samples)
-    used = min(_HARMONICS, (n - 1) // 2) + 1
-    series = np.zeros((_HARMONICS + 1, samples.shape[1]), np.complex128)
-    series[:used] = np.fft.rfft(samples, axis=0)[:used] / n
-    series[1:] *= 2
-    return series

@@ -50,8 +50,7 @@ def simulate_outputs(model: FlexibleWing, genome: Sequence[float], recording: Re
 def _outputs(model: FlexibleWing, genome: Sequence[float], recording: Recording, beat: Beat) -> Outputs:
     if beat.motion is None:
         raise AssertionError("a beat without its motion")
-    genomes = np.asarray(genome, float)[None]
-    scene = model.subject(model.switched_on(genomes[0]), recording.condition).scene(genomes)
+    scene = model.scene(genome, recording.condition)
     found = from_motion(scene, beat.motion, crossing(model, recording, beat.tracks))
     return replace(found, solution=Solution(len(beat.tracks), beat.beats, beat.error))
 

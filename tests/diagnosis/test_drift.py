@@ -141,9 +141,12 @@ def test_the_sentence_fits_the_verdict(size: float, says: str) -> None:
     recordings = [SimpleNamespace(name=name) for name in ("a", "b")]
     every = np.array([size, 0.0])
     data = SimpleNamespace(recordings=recordings, beat_fits=fits, tolerance=1e-4, drift=every, policy=POLICY)
-    sentence = drift_sentence(cast("WhitenedData", data))
+    sentence = drift_sentence(cast("WhitenedData", data), explained=False)
     assert says in sentence
     assert bool(sentence) == bool(size)
+    explained = drift_sentence(cast("WhitenedData", data), explained=True)
+    assert ("as the added effects explain" in explained) == bool(size)
+    assert "cause" not in explained
 
 
 @pytest.mark.parametrize("others", [(1.7,), (1.2, 1.7, 2.0, 2.7)])

@@ -16,9 +16,9 @@ from typing import Generic, NamedTuple, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from benchmarks.concealed.benches.drifting import STIFFNESS_DRIFT, drifting
+from benchmarks.concealed.benches import drifting
 from benchmarks.concealed.plant.law import Concealed, Law, Parameters
-from benchmarks.concealed.trials import DRIFT, Build, name_of
+from benchmarks.concealed.trials import DRIFTS, Build, name_of
 from wingfit.calibration.spec import CalibrationSpec, model_for
 from wingfit.records import Condition, Dataset, Recording, Vehicle, Wing
 from wingfit.sim.model import Model
@@ -104,7 +104,7 @@ class Bench(ABC, Generic[Motion, Quality]):
     @cached_property
     def laws(self) -> dict[str, Law]:
         """All effects that can be hidden, physics and faults of the measurement, by name."""
-        return {**self.physics, **self.faults, DRIFT: STIFFNESS_DRIFT}
+        return {**self.physics, **self.faults, **drifting.LAWS}
 
     @cached_property
     def model(self) -> Model:
@@ -166,14 +166,14 @@ class Bench(ABC, Generic[Motion, Quality]):
         """Simulate and record one condition, with all physics and measurement faults in ``hidden``."""
         wrong = {name: values for name, values in hidden.items() if name in self.faults}
 
-        def made(genes: Mapping[str, float], dice: np.random.Generator) -> Made:
-            return self.shown(self.beat(condition, genes, hidden), condition, wrong, quality, dice)
+        def made(genes: Mapping[str, float], inside: Concealed, dice: np.random.Generator) -> Made:
+            return self.shown(self.beat(condition, genes, inside), condition, wrong, quality, dice)
 
-        found = made(genome, copy.deepcopy(rng))
-        if DRIFT not in hidden:
+        found = made(genome, hidden, copy.deepcopy(rng))
+        if not set(DRIFTS) & set(hidden):
             return found
-        part = hidden[DRIFT]["strength"]
-        return found._replace(recording=drifting(lambda *of: made(*of).recording, genome, part, rng))
+        changing = drifting.drifting(lambda *of: made(*of).recording, genome, hidden, rng)
+        return found._replace(recording=changing)
 
 
 def record_all(

@@ -26,7 +26,7 @@ from benchmarks.concealed.suite import make as make_all
 from benchmarks.concealed.table import Advised, Rate, Table, at
 from benchmarks.concealed.trials import (
     COUNTS,
-    DRIFT,
+    DRIFTS,
     EQUAL,
     LATTICE,
     ROD,
@@ -313,7 +313,7 @@ def test_a_plant_of_another_kind_is_in_every_group_of_wings() -> None:
     trials = plan(3, lattice=True)
     assert {trial.group for trial in trials if trial.build.plant == ROD} >= set(GROUPS) - {"every"}
     rods = {name for trial in trials if trial.build.plant == ROD for name in trial.hidden}
-    assert rods <= {*ROD_EFFECTS, *film.FAULTS, DRIFT}
+    assert rods <= {*ROD_EFFECTS, *film.FAULTS, *DRIFTS}
     of_lattice = [trial for trial in trials if trial.build.plant == LATTICE]
     assert {trial.group for trial in of_lattice} == {"null", "listed", "measurement"}
     assert not any(trial.build.plant == LATTICE for trial in plan(3))

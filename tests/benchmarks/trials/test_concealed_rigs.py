@@ -19,12 +19,12 @@ from benchmarks.concealed.benches.vehicle import VehicleBench
 from benchmarks.concealed.benches.vortex_lattice import VortexLatticeBench
 from benchmarks.concealed.benches.wing import WingBench
 from benchmarks.concealed.calibration import bins_of, verdict_is_right
-from benchmarks.concealed.plant.law import Concealed
+from benchmarks.concealed.plant.law import Concealed, strength
 from benchmarks.concealed.plant.vortex_lattice.simulate import VARIABLE
 from benchmarks.concealed.rigs import BY_HAND, VEHICLES, WINGS, as_described, size_of
 from benchmarks.concealed.score import Mark
 from benchmarks.concealed.table import Table, figures_of
-from benchmarks.concealed.trials import FOUR_ROD, VORTICES, Build, chamber, flight, tunnel
+from benchmarks.concealed.trials import DRIFTS, FOUR_ROD, VORTICES, Build, chamber, flight, tunnel
 from docs.generate.reliability_figure import panel
 from wingfit.records import Recording
 from wingfit.sim.model import Array
@@ -111,15 +111,20 @@ def test_a_description_has_the_errors_of_a_laboratory_in_proportion_to_the_wing(
 
 
 def test_a_wing_drifts_between_its_stiffest_and_its_softest_motion() -> None:
+    """And one whose motor drifts between its largest and its smallest stroke; what else is hidden stays."""
     blank = Recording("a", "vacuum_chamber", chamber(1e3, 0.0, 3.0), np.arange(41) / 30.0, ("m",), np.zeros((41, 3)))
 
-    def record(genome: Mapping[str, float], rng: np.random.Generator) -> Recording:
+    def record(genome: Mapping[str, float], hidden: Concealed, rng: np.random.Generator) -> Recording:
+        assert set(hidden) <= {"backlash", "stroke_amplitude"}
         noise = 1e-3 * rng.standard_normal((41, 3))
-        return Recording("a", blank.rig, blank.condition, blank.times, ("m",), np.full((41, 3), genome["E_f"]) + noise)
+        value = genome["E_f"] * (1.0 + strength(hidden, "stroke_amplitude"))
+        return Recording("a", blank.rig, blank.condition, blank.times, ("m",), np.full((41, 3), value) + noise)
 
-    found = drifting(record, {"E_f": 10.0, "L_a": 3.0}, 0.2, np.random.default_rng(5)).values
-    noise = 1e-3 * np.random.default_rng(5).standard_normal((41, 3))
-    np.testing.assert_allclose(found - noise, np.tile(np.linspace(11.0, 9.0, 41)[:, None], (1, 3)), atol=1e-12)
+    for name in DRIFTS:
+        hidden = {name: {"strength": 0.2}, "backlash": {"strength": 1.0}}
+        found = drifting(record, {"E_f": 10.0, "L_a": 3.0}, hidden, np.random.default_rng(5)).values
+        noise = 1e-3 * np.random.default_rng(5).standard_normal((41, 3))
+        np.testing.assert_allclose(found - noise, np.tile(np.linspace(11.0, 9.0, 41)[:, None], (1, 3)), atol=1e-12)
 
 
 def test_a_verdict_is_right_if_all_that_it_names_is_hidden() -> None:
@@ -139,6 +144,9 @@ def test_a_verdict_is_right_if_all_that_it_names_is_hidden() -> None:
         scored("listed", "adequate", ("a",)),
     )
     assert [verdict_is_right(one) for one in marks] == [True, True, False, True, True, False, False]
+    drifts = [scored("drift", "named", ("stiffness_drift",), (name,)) for name in ("stiffness_drift", "strobe_rate")]
+    drifts.append(scored("drift", "unnamed", ("stiffness_drift",)))
+    assert [verdict_is_right(one) for one in drifts] == [True, False, True]
     table = Table(marks, (), 0, 1.0).as_json()
     together = {"n": 7, "said_percent": 97.0, "right_percent": 57.1}
     assert table["calibration"] == {"said_95": 7, "right_percent": 57.1, "bins": [together]}

@@ -23,6 +23,7 @@ from wingfit.sim.virtual_rigs.campaign import (
 )
 from wingfit.sim.wing import flexible_wing
 from wingfit.sim.wing.alignment import recorded_crossing, upstroke_crossing
+from wingfit.sim.wing.beat_series import MAX_SHIFT, aligned_values
 from wingfit.sim.wing.flexible_wing import FlexibleWing
 from wingfit.sim.wing.genes import AERODYNAMIC, STRUCTURAL
 
@@ -252,13 +253,13 @@ def test_the_common_phase_is_the_one_that_fits_best() -> None:
 
     recorded = wave(phases + 0.02) + 1e-3 * rng.standard_normal((90, 6))
     recorded[rng.uniform(size=recorded.shape) < 0.2] = np.nan
-    found = flexible_wing._aligned_values(series[None], phases[None] - 0.7, np.array([0.7]), recorded)[0]
+    found = aligned_values(series[None], phases[None] - 0.7, np.array([0.7]), recorded, {})[0]
     best = minimize_scalar(
         lambda shift: np.nansum((wave(phases + shift) - recorded) ** 2), bounds=(-0.05, 0.05), options={"xatol": 1e-12}
     )
     np.testing.assert_allclose(found, wave(phases + best.x), atol=2e-7)
-    far = flexible_wing._aligned_values(series[None], phases[None] - 0.5, np.array([0.0]), recorded)[0]
-    np.testing.assert_allclose(far, wave(phases - 0.5 + 2 * flexible_wing.MAX_SHIFT), atol=1e-12)
+    far = aligned_values(series[None], phases[None] - 0.5, np.array([0.0]), recorded, {})[0]
+    np.testing.assert_allclose(far, wave(phases - 0.5 + 2 * MAX_SHIFT), atol=1e-12)
 
 
 def test_a_recording_without_data_begins_at_the_crossing(model: FlexibleWing) -> None:

@@ -57,8 +57,7 @@ def of_genome(model: FlexibleWing, genome: list[float], condition: Condition) ->
 
 
 def scene_of(model: FlexibleWing, genome: list[float], condition: Condition) -> WingScene:
-    values = np.array([genome])
-    return model.subject(model.switched_on(values[0]), condition).scene(values)
+    return model.scene(genome, condition)
 
 
 @pytest.fixture(scope="module")
