@@ -42,7 +42,9 @@ class Policy:
         "a hypothesis that leaves more does not explain a drift of the rig, nor, if hardly worth its genes, a misfit",
     )
     shared: float = _threshold(
-        0.35, "power of the noise", "one pattern of the markers with more is no noise: something changes between beats"
+        0.12,
+        "power of the noise",
+        "a motion that markers share with more is no noise: something changes between beats",
     )
     doubted_noise: float = _threshold(
         0.6, "probability", "most that a model is adequate where missing physics may hide in the assumed noise"

@@ -151,15 +151,20 @@ class WhitenedData:
         return squares or [(1.0, np.zeros(1))]
 
     @cached_property
+    def noise_of_recordings(self) -> Float[Array, " R"]:
+        """Noise of each recording with a beat [R]: root mean square of a sample over its used channels, m or N."""
+        return np.array([float(np.sqrt(np.mean(fit.noise[fit.used] ** 2))) for fit in self.beat_fits])
+
+    @cached_property
     def drift(self) -> Float[Array, " R"]:
         """Slow change of each recording [R] that noise does not explain, divided by its noise of a sample.
 
         Both are root mean squares over the recording's used channels; zero where noise explains the change. Where the
-        noise is for the most part one pattern that the markers share, that part counts as a change too.
+        markers share a part of the noise that is not small, that part counts as a change too.
         """
         if self.kind == "series":
             return np.zeros(len(self.recordings))
-        noise = [float(np.sqrt(np.mean(fit.noise[fit.used] ** 2))) for fit in self.beat_fits]
+        noise = self.noise_of_recordings
         slow = [fit.drift.size if fit.drift else 0.0 for fit in self.beat_fits]
         found = np.maximum(
             slow,

@@ -1,4 +1,4 @@
-"""Whether the noise of series is known well enough for a model to be called adequate."""
+"""Whether the noise is known well enough for a model to be called adequate."""
 
 from __future__ import annotations
 
@@ -12,14 +12,31 @@ from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.inference.noise.series import EXCEEDS, MEASURED_ERROR
 from wingfit.inference.noise.steadiness import steady_probability
 
+UNEVEN = 3.0  # times the noise of quieter recordings
+QUIET = 0.25  # quantile of the recordings' noise that counts as quiet
 LOUD = 3.0  # times the visible noise; first-order noise with a correlation of 0.8 has as much
 EXCEEDING = 1.5  # times the assumed noise: power of an octave that is compared between recordings and times
 BY_CHANCE = 1e-3  # probability that noise as assumed is so much smaller than its standard deviation
 
 
 def noise_may_hide(data: WhitenedData, nominal: Fit) -> bool:
-    """Return whether missing physics may hide in the noise of series; ``nominal``: fit of the nominal model."""
-    return data.kind == "series" and (overstated(data, nominal) or uncertain(data, nominal) or loud(data))
+    """Return whether missing physics may hide in the noise; ``nominal``: fit of the nominal model."""
+    if data.kind != "series":
+        return bool(noisier(data))
+    return overstated(data, nominal) or uncertain(data, nominal) or loud(data)
+
+
+def noisier(data: WhitenedData) -> list[int]:
+    """Return the indices of recordings with a beat that have several times the noise of quieter ones.
+
+    Noise below the tolerance of any model hides nothing.
+    """
+    return np.flatnonzero(data.noise_of_recordings > max(UNEVEN * quiet_noise(data), data.tolerance)).tolist()
+
+
+def quiet_noise(data: WhitenedData) -> float:
+    """Return the noise of the quieter recordings with a beat (RMS of a sample, m or N)."""
+    return float(np.quantile(data.noise_of_recordings, QUIET, method="lower"))
 
 
 def loud(data: WhitenedData) -> bool:

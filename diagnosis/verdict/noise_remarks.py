@@ -8,12 +8,10 @@ from wingfit.diagnosis.evidence.fit import Fit
 from wingfit.diagnosis.evidence.marker_errors import MarkerErrors, too_many
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.finding import amount
+from wingfit.diagnosis.verdict.noise_doubt import UNEVEN, noisier, quiet_noise
 from wingfit.diagnosis.verdict.weigh_hypotheses import drifts
 from wingfit.inference.noise.drift import Drift
 from wingfit.inference.noise.harmonic import still_markers
-
-UNEVEN = 3.0  # times the noise of quieter recordings: those with more get a remark
-QUIET = 0.25  # of the recordings, or the quietest one: their noise is that of quieter recordings
 
 
 def noise_remarks(data: WhitenedData, unit: str) -> tuple[str, ...]:
@@ -44,40 +42,33 @@ def _drift_remarks(data: WhitenedData, unit: str) -> tuple[str, ...]:
 
 
 def _shared_remarks(data: WhitenedData) -> tuple[str, ...]:
-    """Return a remark on recordings whose noise is for the most part one pattern of the markers; empty without any."""
+    """Return a remark on recordings whose noise is in part a motion that the markers share; empty without any."""
     found = [f"{name} ({100 * share:.0f} %)" for name, share in _shared(data)]
     remark = (
-        f"what differs between the beats of {', '.join(found)} is for the most part one pattern that all markers "
-        "share: not the noise of single markers, but a motion that changes (a stiffness or motor that drifts, or beats "
-        "of different size), in which missing physics may hide; record more beats"
+        f"part of what differs between the beats of {', '.join(found)} is a motion that the markers share, not the "
+        "noise of single markers: a motion that changes (a stiffness or motor that drifts, beats of different size), "
+        "or cameras that turn; missing physics may hide in it; record more beats"
     )
     return (remark,) if found else ()
 
 
 def _shared(data: WhitenedData) -> list[tuple[str, float]]:
-    """Name and shared part of the noise of recordings in which most of it is one pattern, and no drift was found."""
+    """Name and shared part of the noise of recordings in which that is not small, and no drift was found."""
     fits = zip(data.recordings, data.beat_fits, strict=True)
     known = {name for name, _ in _drifts(data)}
     return [(one.name, fit.shared) for one, fit in fits if fit.shared > data.policy.shared and one.name not in known]
 
 
 def _uneven_noise_remarks(data: WhitenedData, unit: str) -> tuple[str, ...]:
-    """Return a remark on recordings with several times the noise of quieter ones; empty if there are none.
-
-    Noise below the tolerance of any model hides nothing, and gets no remark.
-    """
-    levels = np.array([float(np.sqrt(np.mean(fit.noise[fit.used] ** 2))) for fit in data.beat_fits])
-    quiet = float(np.quantile(levels, QUIET, method="lower"))
-    loud = [
-        f"{one.name} ({amount(level, unit)})"
-        for one, level in zip(data.recordings, levels, strict=True)
-        if level > max(UNEVEN * quiet, data.tolerance)
-    ]
+    """Return a remark on recordings with several times the noise of quieter ones; empty if there are none."""
+    names, levels = [one.name for one in data.recordings], data.noise_of_recordings.tolist()
+    found = [f"{names[k]} ({amount(levels[k], unit)})" for k in noisier(data)]
     remark = (
-        f"the noise of {', '.join(loud)} is more than {UNEVEN:g} times the {amount(quiet, unit)} of quieter "
-        "recordings: what happens there but not in every beat is taken for noise, and missing physics may hide in it"
+        f"the noise of {', '.join(found)} is more than {UNEVEN:g} times the {amount(quiet_noise(data), unit)} of "
+        "quieter recordings: what happens there but not in every beat is taken for noise, and missing physics may hide "
+        "in it"
     )
-    return (remark,) if loud else ()
+    return (remark,) if found else ()
 
 
 def marker_remarks(data: WhitenedData, errors: MarkerErrors | None, best: Fit) -> tuple[str, ...]:
@@ -107,7 +98,7 @@ def drift_sentence(data: WhitenedData, *, explained: bool) -> str:
     cause = "which may be the cause" if drifts(data) else "by too little to matter"
     seen = f" The beat changes slowly during {drifting} of {every} recordings"
     found = f"{seen}, as the added effects explain." if explained else f"{seen}: something drifts, {cause}."
-    more = f" The beats of {shared} of {every} recordings differ by a motion that all markers share."
+    more = f" The beats of {shared} of {every} recordings differ by a motion that the markers share."
     return (found if drifting else "") + (more if shared else "")
 
 

@@ -56,7 +56,7 @@ class HarmonicFit:
         two beats, if it was estimated from the part of the spectrum above the fitted harmonics.
         coefficients: [C, P] of the recording itself.
         drift: slow change of the beat during the recording; None for too few beats.
-        shared: part of the power of the noise that is one pattern of the markers of tracks (:func:`shared_part`).
+        shared: part of the power of the noise that is a motion that markers of tracks share (:func:`shared_part`).
     """
 
     order: Int[Index, " P"]
@@ -108,7 +108,7 @@ def harmonic_fit(recording: Recording, compared: Mask | None = None) -> Harmonic
         scatter.beats >= 2,
         np.einsum("cpt,tc->cp", inverse, np.where(valid, recording.values, 0.0)),
         scatter.drift,
-        shared_part(scatter.values, valid) if recording.kind == "tracks" else 0.0,
+        shared_part(scatter.values, valid, recording.values) if recording.kind == "tracks" else 0.0,
     )
 
 

@@ -157,6 +157,17 @@ def test_a_recording_with_several_times_the_noise_of_others_is_remarked(others: 
     assert "of quieter recordings" in remark
 
 
+def test_an_adequate_model_is_not_certain_where_one_recording_is_noisier() -> None:
+    """What is missing may hide in its noise; the fit of the others is as good as ever."""
+    fitted = (*recorded({}, seed=1, frequencies=FREQUENCIES[:3]), *recorded({}, noise=1e-3, seed=2, frequencies=(3.4,)))
+    held_out = recorded({}, seed=3, frequencies=(1.5,))
+    *_, last = diagnose_subject(PendulumRig(), "loud", fitted, held_out, DiagnosisSpec(), InProcessEvaluator())
+    assert last.finding is not None
+    assert last.finding.verdict == "adequate"
+    assert last.finding.probabilities["adequate"] == pytest.approx(POLICY.doubted_noise)
+    assert "see the remarks" in last.finding.summary
+
+
 def test_recordings_without_noise_get_no_remark_on_it() -> None:
     """Theirs is round-off, which differs by any factor."""
     assert noise_remarks(WhitenedData.of(recorded({}, noise=0.0, frequencies=(1.2, 2.0, 3.4))), "m") == ()
