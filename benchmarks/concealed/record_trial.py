@@ -27,7 +27,7 @@ from wingfit.records import Condition, Dataset, Recording, Vehicle, load_dataset
 
 Array = npt.NDArray[np.float64]
 
-ATTEMPTS = 4  # draws of a trial, if the plant cannot be simulated with the first ones
+ATTEMPTS = 12  # draws of a trial, if the plant cannot be simulated with the first ones, or no dataset takes them
 ROUNDS = 8  # limit of a refit's iterations; genes that can imitate a mass almost completely converge slowly
 CORRECTIONS = 1  # full refits to correct a strength; the remaining error is corrected by lowering the noise
 LITTLE = 0.85  # fraction of the target d below which the noise is lowered, as far as real equipment allows
@@ -128,10 +128,10 @@ def make(order: Order) -> str:
     for attempt in range(ATTEMPTS):
         try:
             dataset, answer = _made(order.trial, attempt)
+            save_dataset(dataset, order.dataset)  # refuses some wrong units
         except (RuntimeError, ArithmeticError, ValueError) as error:
             reasons.append(f"{type(error).__name__}: {error}")
             continue
-        save_dataset(dataset, order.dataset)
         return seal(answer, order.sealed)
     raise RuntimeError(f"{order.trial} cannot be recorded: {'; '.join(reasons)}")
 
