@@ -55,7 +55,8 @@ ROD = "rod"  # as a plant: a continuous wing, in finite elements
 STRIPS_ROD, FOUR_ROD = Build("wing", "8x1", ROD), Build("wing", "4", ROD)
 BIRD_ROD, INSECT_ROD = replace(FOUR_ROD, body="bird"), replace(FOUR_ROD, body="insect")
 BODIES_ONLY = (
-    "backlash", "mass_offset", "tether", "rotational_circulation", "plate_drag", "viscous_drag", "compliant_drive",
+    "backlash", "mass_offset", "tether", "cable", "rotational_circulation", "plate_drag", "viscous_drag",
+    "compliant_drive",
 )  # fmt: skip  # effects that only the multi-body plant has
 FLING = "clap_and_peel"
 VEHICLE, BARE = Build("vehicle", body="delfly"), Build("vehicle", without=(FLING,), body="delfly")
@@ -151,8 +152,8 @@ PARTLY_VEHICLE = (
 # All others of the library, each once.
 EVERY_WING = (
     "cubic_stiffness", "rod_slip", "hysteresis", "viscoelastic", "dynamic_stall", "plate_drag", "viscous_drag",
-    "rotational_circulation", "residual_air", "stroke_bias", "mass_offset", "tether", "compliant_drive", "marker_swap",
-    "exponential_smoothing", "strobe_rate",
+    "rotational_circulation", "residual_air", "stroke_bias", "mass_offset", "tether", "cable", "compliant_drive",
+    "marker_swap", "exponential_smoothing", "strobe_rate",
 )  # fmt: skip
 EVERY_VEHICLE = (
     "airspeed_error", "body_pitch_error", "body_pitch_convention", "body_drag", "tail_lift", "residual_air",
@@ -185,8 +186,8 @@ OPEN_VEHICLE = (
 )  # fmt: skip
 
 COUNTS: dict[str, int] = {
-    "null": 150, "listed": 12, "unlisted": 12, "smooth": 8, "measurement": 60, "pairs": 21, "partly": 21, "every": 50,
-    "drift": 20, "advice": 204,
+    "null": 150, "listed": 12, "unlisted": 12, "smooth": 8, "measurement": 60, "pairs": 21, "partly": 21, "every": 51,
+    "drift": 20, "advice": 203,
 }  # fmt: skip
 QUICK: dict[str, int] = {
     "null": 6, "listed": 1, "unlisted": 1, "smooth": 1, "measurement": 4, "pairs": 2, "partly": 2, "every": 2,

@@ -22,7 +22,7 @@ _MEASURES: dict[Measure, str] = {"span": "spans", "chord": "mean chords", "mass"
 _PORTS: dict[Port, str] = {
     "inertia": "the inertia of the wing",
     "connector": "the connectors, which join the bodies of the wing",
-    "point": "a force on one point of the wing",
+    "point": "a force or a moment at one place of the wing",
     "drive": "the motion of the drive",
     "air": "the air around the wing",
 }

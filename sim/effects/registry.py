@@ -11,7 +11,7 @@ from wingfit.sim.effects.contract import Effect
 # Files of the library, each of which declares EFFECT, by folder.
 _FILES = (
     # changes of the springs before effects in proportion to their stiffness
-    ("structure", "stiffness_drift damage cubic_stiffness rod_slip hysteresis viscoelastic tether"),
+    ("structure", "stiffness_drift damage cubic_stiffness rod_slip hysteresis viscoelastic tether cable"),
     ("inertia", "lumped_mass mass_offset"),
     ("terms", "inertial wing_acceleration"),
     ("actuation", "stroke_amplitude stroke_bias drive_harmonics phase_lag_error"),

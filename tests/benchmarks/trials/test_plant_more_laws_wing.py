@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from scipy.signal import resample
+from scipy.spatial.transform import Rotation
 
 from benchmarks.concealed.plant.wing.air_loads import air_loads
 from benchmarks.concealed.plant.wing.build import Draft, rig_of
@@ -36,13 +37,15 @@ NEAREST: dict[str, Callable[[float, Mapping[str, float]], dict[str, float]]] = {
     "rotational_circulation": lambda s, _: {"coefficient": s * NOMINAL["L_a"]},
     "viscous_drag": lambda s, _: {"part": 1.7 * s},  # turbulent over laminar friction at a Reynolds number of 1e5
     "tether": lambda s, at: {"k": 0.75 * s, "c": s * at["time"]},  # the cord softens
+    "cable": lambda s, at: {"k": s, "c": s * at["time"]},
     "compliant_drive": lambda s, _: {"d": s},
 }
 # The least change in mm that a typical strength must cause: friction and pitch rates hardly move a wing of this size.
 LEAST = {"rotational_circulation": 0.05, "viscous_drag": 0.003}
 NEW = (
     ("residual_air", STREAM), ("stroke_bias", THIN), ("mass_offset", THIN), ("rotational_circulation", STREAM),
-    ("plate_drag", STREAM), ("viscous_drag", STREAM), ("tether", THIN), ("compliant_drive", STREAM),
+    ("plate_drag", STREAM), ("viscous_drag", STREAM), ("tether", THIN), ("cable", THIN),
+    ("compliant_drive", STREAM),
 )  # fmt: skip
 
 
@@ -139,6 +142,47 @@ def test_a_cord_pulls_back_and_softens() -> None:
     motion.v[:, 1] = 3.0
     point_loads(one, motion, z.copy(), 1e-9, z, 0, load)
     assert load[one.point_body[0], 1] == pytest.approx(-2.0 * 0.01 * 3.0)
+
+
+def clamped(one: Rig, turn: Rotation, turning: Array | None = None) -> Array:
+    """Moment [3] on the wing of all cables, where all bodies are turned alike and turn with an angular velocity."""
+    motion, load, z = still(one), np.zeros((6, 6)), np.zeros(2 * len(one.points))
+    motion.R[:] = turn.as_matrix()
+    motion.w[:] = 0.0 if turning is None else turning
+    point_loads(one, motion, z.copy(), 1e-9, z, 0, load)
+    assert not load[:, :3].any(), "a moment alone"
+    return np.asarray(load[:, 3:].sum(axis=0))
+
+
+def test_a_cable_resists_bending_in_proportion_to_the_angle_and_torsion_less() -> None:
+    one = rig(Hidden.one("cable", 2.0, time=0.01, span=0.45))
+    assert one.points[:, 4].sum() == pytest.approx(2.0)
+    centre = (one.rest[one.point_body, 1] - WING.stations[0].y) / WING.span
+    assert abs(centre @ one.points[:, 4] / 2.0 - 0.45) < 0.02  # centres of mass are near the middles of strips
+    for angle in (1e-3, -0.8, 1.4):
+        assert clamped(one, Rotation.from_rotvec([angle, 0, 0])) == pytest.approx([-2.0 * angle, 0, 0], abs=1e-12)
+        assert clamped(one, Rotation.from_rotvec([0, 0, angle])) == pytest.approx([0, 0, -2.0 * angle], abs=1e-12)
+        torsion = -2.0 / 5.6 * angle  # G J / L over 4 E I / L of a round cable with Poisson's ratio 0.4
+        assert clamped(one, Rotation.from_rotvec([0, angle, 0])) == pytest.approx([0, torsion, 0], abs=1e-12)
+    nothing = Rotation.identity()
+    assert clamped(one, nothing, np.array([1.0, -2.0, 3.0])) == pytest.approx([-0.02, 0.04, -0.06])
+
+
+def test_a_cable_gives_back_the_energy_of_its_bending_and_torsion() -> None:
+    """Its moment is minus the derivative of (k b^2 + K c^2) / 2 by a rotation, and no energy is won on a round trip."""
+    one, rng = rig(Hidden.one("cable", 2.0)), np.random.default_rng(4)
+
+    def energy(turn: Rotation) -> float:
+        x, y, z, s = (float(one) for one in turn.as_quat())  # the last is the scalar part
+        bent = 2 * math.atan2(math.hypot(x, z), math.hypot(y, s))
+        return bent**2 + (2 * math.atan(y / s)) ** 2 / 5.6
+
+    for turn in Rotation.from_rotvec(rng.uniform(-1.0, 1.0, (8, 3))):
+        slopes = [
+            (energy(Rotation.from_rotvec(unit) * turn) - energy(Rotation.from_rotvec(-unit) * turn)) / 2e-5
+            for unit in 1e-5 * np.eye(3)
+        ]
+        assert clamped(one, turn) == pytest.approx(-np.array(slopes), abs=1e-7)
 
 
 def test_mass_moves_aft_with_the_chord_and_air_is_added() -> None:

@@ -59,7 +59,11 @@ def by_differences(model: FlexibleWing, genome: Array, condition: Condition, ste
 
 
 @pytest.mark.parametrize("condition", CONDITIONS, ids=["vacuum", "tunnel"])
-@pytest.mark.parametrize("effects", [(), ("added_mass", "tether"), ("viscoelastic",)], ids=["plain", "point", "memory"])
+@pytest.mark.parametrize(
+    "effects",
+    [(), ("added_mass", "tether"), ("cable",), ("viscoelastic",)],
+    ids=["plain", "point", "rotation", "memory"],
+)
 def test_they_are_those_of_a_converged_motion(effects: tuple[str, ...], condition: Condition) -> None:
     model = FlexibleWing(WING, "4", effects=effects)
     genome = genome_of(model, *effects)

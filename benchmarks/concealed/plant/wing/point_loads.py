@@ -1,6 +1,6 @@
-"""Hidden loads at one point of the wing: elastic band, stop, brake, tether, appendage (mass on a spring).
+"""Hidden loads at one point of the wing: elastic band, stop, brake, tether, clamped cable, appendage.
 
-Of these kinds the diagnosis has only the tether in its library.
+An appendage is a mass on a spring. Of these kinds the diagnosis has the tether and the cable in its library.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from benchmarks.concealed.plant.compiled import compiled
-from benchmarks.concealed.plant.wing.rig import BAND, BRAKE, STOP, TETHER, Motion, Rig
+from benchmarks.concealed.plant.wing.rig import APPENDAGE, BAND, BRAKE, CABLE, STOP, TETHER, Motion, Rig
 from benchmarks.concealed.plant.wing.vectors import V3, ZERO, act, axis, cross, dot, plus, row, turned
 
 Array = npt.NDArray[np.float64]
@@ -22,7 +22,7 @@ _NOTHING = 1e-9  # m
 
 @compiled
 def _held(q: Array, place: V3, velocity: V3) -> V3:
-    """Force (N) on the wing at ``place`` (m), for a row ``q`` of Rig.points; zero for an appendage.
+    """Force (N) on the wing at ``place`` (m), for a row ``q`` of Rig.points; zero for an appendage and a cable.
 
     ``velocity``: of that point, m/s.
     """
@@ -49,6 +49,27 @@ def _held(q: Array, place: V3, velocity: V3) -> V3:
 
 
 @compiled
+def _clamp(q: Array, m: Motion, n: int) -> V3:
+    """Moment (N m) on body ``n`` of a cable along the span that is clamped to it, for a row ``q`` of Rig.points.
+
+    The rotation of the body is one about the axis t of the cable at rest, by an angle c, and then one that turns t into
+    its present axis a, by an angle b. The energy is (k b^2 + K c^2) / 2, with k = q4 in bending and K = q5 in torsion
+    (N m/rad; Timoshenko, Strength of Materials (1955)). A damper q6 (N m s/rad) acts on the angular velocity.
+    """
+    R, t, a = m.R, (0.0, 1.0, 0.0), axis(m.R, n, 1)
+    across = cross(t, a)
+    sine = math.sqrt(dot(across, across))
+    bent = math.atan2(sine, a[1]) / sine if sine > _NOTHING else 1.0
+    s = 0.5 * math.sqrt(1.0 + R[n, 0, 0] + R[n, 1, 1] + R[n, 2, 2])  # (s, v): the rotation as a quaternion
+    f = 0.25 / s
+    v = (f * (R[n, 2, 1] - R[n, 1, 2]), f * (R[n, 0, 2] - R[n, 2, 0]), f * (R[n, 1, 0] - R[n, 0, 1]))
+    twist = 2.0 * math.atan2(v[1], s)
+    slope = plus(plus(plus(ZERO, s * s, t), s, cross(v, t)), v[1], v)  # of the twist by the rotation, times s^2 + v_y^2
+    moment = plus(plus(ZERO, -q[4] * bent, across), -q[5] * twist / (s * s + v[1] * v[1]), slope)
+    return plus(moment, -q[6], row(m.w, n))
+
+
+@compiled
 def point_loads(rig: Rig, m: Motion, old: Array, hg: float, z: Array, first: int, load: Array) -> None:
     """Add the loads of all rows of Rig.points to ``load`` [N + 2, 6].
 
@@ -63,7 +84,10 @@ def point_loads(rig: Rig, m: Motion, old: Array, hg: float, z: Array, first: int
         place = plus(row(m.p, n), 1.0, arm)
         velocity = plus(row(m.v, n), 1.0, cross(row(m.w, n), arm))
         force = _held(q, place, velocity)
-        if q[0] > TETHER + 0.5:
+        moment = ZERO
+        if q[0] == CABLE:
+            moment = _clamp(q, m, n)
+        elif q[0] == APPENDAGE:
             normal, i = axis(m.R, n, 2), first + 2 * k
             square, loss, base = q[5] * q[5], 2.0 * q[6] * q[5], dot(normal, velocity)
             pull = dot(cross(row(m.w, n), normal), velocity) - rig.gravity * normal[2]
@@ -73,4 +97,4 @@ def point_loads(rig: Rig, m: Motion, old: Array, hg: float, z: Array, first: int
             z[i + 1] = u
             z[i] = old[i] + hg * (u - base)
             force = plus(ZERO, q[4] * (square * z[i] + loss * (u - base)), normal)
-        act(load, n, force, cross(arm, force))
+        act(load, n, force, plus(moment, 1.0, cross(arm, force)))

@@ -21,7 +21,7 @@ AIR_STATES = 4  # per strip: two lagged downwashes, lagged angle of attack, atta
 JETS = 6
 # Columns of Rig.points: kind, place from the body's centre, parameters of the law; and its kinds
 POINTS = 11
-BAND, STOP, BRAKE, TETHER, APPENDAGE = range(5)
+BAND, STOP, BRAKE, TETHER, APPENDAGE, CABLE = range(6)
 
 
 class Rig(NamedTuple):

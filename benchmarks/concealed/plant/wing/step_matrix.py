@@ -16,6 +16,7 @@ from benchmarks.concealed.plant.wing.joint_loads import angle_between, dead_zone
 from benchmarks.concealed.plant.wing.rig import (
     BAND,
     BRAKE,
+    CABLE,
     CARRIED,
     KEEPS,
     MAXWELL,
@@ -164,7 +165,7 @@ def _air(rig: Rig, m: Motion, hg: float, band: Array) -> None:
 
 @compiled
 def _point(rig: Rig, m: Motion, k: int, hg: float, band: Array) -> None:
-    """Add stiffness or damping of the point load ``k`` (row of Rig.points) to ``band``, equal in all directions."""
+    """Add stiffness or damping of the load ``k`` (row of Rig.points) to ``band``, equal in all directions or axes."""
     q, n = rig.points[k], rig.point_body[k]
     arm = turned(m.R, n, (q[1], q[2], q[3]))
     v = plus(row(m.v, n), 1.0, cross(row(m.w, n), arm))
@@ -176,12 +177,15 @@ def _point(rig: Rig, m: Motion, k: int, hg: float, band: Array) -> None:
         size = 1.5 * hg * hg * q[6] * math.sqrt(depth)
     elif q[0] == BRAKE:
         size = 2.0 * hg * q[4] * dot(v, v)
-    elif q[0] == TETHER:
+    elif q[0] == TETHER or q[0] == CABLE:
         size = hg * hg * q[4] + hg * q[6]
     x = np.zeros(6)
     for i in range(3):
         unit = (1.0 if i == 0 else 0.0, 1.0 if i == 1 else 0.0, 1.0 if i == 2 else 0.0)
-        _fill(x, unit, cross(arm, unit))
+        if q[0] == CABLE:
+            _fill(x, ZERO, unit)
+        else:
+            _fill(x, unit, cross(arm, unit))
         _square(n, x, size, band)
 
 

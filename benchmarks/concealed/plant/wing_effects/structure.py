@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 
 from benchmarks.concealed.plant.wing.build import Draft
 from benchmarks.concealed.plant.wing.geometry import Cut, Lump
-from benchmarks.concealed.plant.wing.rig import DAHL, MAXWELL, POINTS, SLIDER, TETHER
+from benchmarks.concealed.plant.wing.rig import CABLE, DAHL, MAXWELL, POINTS, SLIDER, TETHER
 from benchmarks.concealed.plant.wing_effects.kind import Kind, Values
 from wingfit.records import Wing
 
@@ -21,6 +21,7 @@ _SPECTRUM = (
     (0.5, 6.0),
 )  # fractions of the stiffness that relaxes, and relaxation times relative to the first
 _YIELDS = (0.4, 1.0, 2.5)  # of Dahl's elements, relative to the middle one
+_TORSION = 1 / (4 * 1.4)  # of a round cable over bending: G J / L over 4 E I / L, with Poisson's ratio 0.4
 _STEEPEST = 12.0  # largest argument of sinh at one radian over the span
 
 
@@ -63,6 +64,26 @@ def _tethered(draft: Draft, strength: float, at: Values) -> None:
 
 def _tether_genes(_: Wing, __: float, at: Values) -> dict[str, float]:
     return {"tether.station": at["span"], "tether.chord": at["chord"]}
+
+
+def _cabled(draft: Draft, strength: float, at: Values) -> None:
+    """Clamp a cable along the span of ``strength`` N m/rad in bending to one station of the wing.
+
+    Bodies have one rotation each: the two strips whose middles are next to the station share the cable. It has a damper
+    of ``strength`` times ``at["time"]`` (s).
+    """
+    edges = draft.cut.edges
+    middles, y = 0.5 * (edges[1:] + edges[:-1]), draft.cut.place(at["span"], 0.5)[1]
+    for middle, one in zip(middles, np.eye(len(middles)), strict=True):
+        share = strength * float(np.interp(y, middles, one))
+        if share > 0.0:
+            body, arm, _ = draft.at(float((middle - edges[0]) / draft.span), 0.5)
+            row = [float(CABLE), *arm.tolist(), share, _TORSION * share, at["time"] * share]
+            draft.points.append((body, row + [0.0] * (POINTS - len(row))))
+
+
+def _cable_genes(_: Wing, __: float, at: Values) -> dict[str, float]:
+    return {"cable.station": at["span"]}
 
 
 def _damage(draft: Draft, strength: float, at: Values) -> None:
@@ -141,6 +162,12 @@ LISTED_STRUCTURE = (
         "rubber cord with damper in parallel: Treloar, The Physics of Rubber Elasticity (1975), ch. 4; the library "
         "has a linear spring", _tethered,
         shape={"span": (0.8, 0.4, 0.95), "chord": (0.5, 0.2, 0.8), "time": (0.01, 0.004, 0.02)}, genes=_tether_genes,
+    ),
+    Kind(
+        "cable", "structure", True, "N m/rad", 0.4, 2.0,
+        "round cable that bends and twists (Timoshenko, Strength of Materials (1955)), with moments in proportion to "
+        "its angles; the library has one stiffness for all axes, and the sine of the angle", _cabled,
+        shape={"span": (0.45, 0.25, 0.7), "time": (0.01, 0.004, 0.02)}, genes=_cable_genes,
     ),
     Kind(
         "damage", "structure", True, "1", 0.6, 0.9,

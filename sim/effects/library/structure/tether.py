@@ -55,6 +55,6 @@ EFFECT = Effect(
     "Blevins (1979), Formulas for Natural Frequency and Mode Shape, ch. 8: beams on springs",
     signature="near one place the wing is held back towards its rest position, in vacuum as in air, and less so at "
     "higher flap frequencies, where the inertia grows and the spring does not",
-    confused_with=("lumped_mass", "cubic_stiffness", "damage"),
+    confused_with=("cable", "lumped_mass", "cubic_stiffness", "damage"),
     wing=_wing,
 )
