@@ -43,7 +43,8 @@ def low_passed(recording: Recording, low_pass: LowPass) -> Recording:
 
     ValueError if values are missing, if sampling intervals are not equal, or if the recording is filtered already. Near
     both ends the filtered values have large errors. They are replaced by NaN, for END_PERIODS periods of the cut-off
-    frequency but at most one beat, unless the recording has fewer than MIN_BEATS_TO_TRIM beats.
+    frequency but at most one beat, unless the recording has fewer than MIN_BEATS_TO_TRIM beats. The standard deviation
+    of the noise, where it is stated, becomes that of white noise after the filter.
     """
     if recording.low_pass is not None:
         raise ValueError(
@@ -64,7 +65,10 @@ def low_passed(recording: Recording, low_pass: LowPass) -> Recording:
     if len(values) * frequency >= MIN_BEATS_TO_TRIM * rate:
         lost = round(min(END_PERIODS / low_pass.cutoff, 1.0 / frequency) * rate)
         values[:lost] = values[len(values) - lost :] = np.nan
-    return replace(recording, values=values, low_pass=low_pass)
+    noise = recording.standard_deviation
+    if noise is not None:
+        noise = noise * np.sqrt(np.mean(gain(low_pass, rate, np.linspace(0.0, 0.5, 4096, endpoint=False) * rate) ** 2))
+    return replace(recording, values=values, low_pass=low_pass, standard_deviation=noise)
 
 
 def gain(low_pass: LowPass, rate: float, frequency: ArrayLike) -> Array:

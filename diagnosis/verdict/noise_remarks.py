@@ -16,7 +16,8 @@ from wingfit.inference.noise.harmonic import still_markers
 
 def noise_remarks(data: WhitenedData, unit: str) -> tuple[str, ...]:
     """Return remarks on the noise of the recordings, and on what may be mistaken for it; ``unit``: "m" or "N"."""
-    within_beats = [r.name for r, v in zip(data.recordings, data.beat_fits, strict=True) if not v.between_beats]
+    each = list(zip(data.recordings, data.beat_fits, strict=True))
+    within_beats = [r.name for r, v in each if not v.between_beats and not (v.stated and v.stated.used)]
     remarks = [
         f"{one.name}: the recorded position of {', '.join(markers)} never changes; ignored: check the export of tracks"
         for one in data.beat_recordings
@@ -27,7 +28,27 @@ def noise_remarks(data: WhitenedData, unit: str) -> tuple[str, ...]:
             f"{', '.join(within_beats)}: fewer than two beats in the order of the frames; noise is estimated only "
             "from the residual of the beat's harmonics, and slow noise may look like misfit: record longer"
         )
-    return (*remarks, *_drift_remarks(data, unit), *_shared_remarks(data), *_uneven_noise_remarks(data, unit))
+    on_changes = (*_drift_remarks(data, unit), *_shared_remarks(data))
+    return (*remarks, *_stated_remarks(data), *on_changes, *_uneven_noise_remarks(data, unit))
+
+
+def _stated_remarks(data: WhitenedData) -> tuple[str, ...]:
+    """Return remarks on recordings whose stated noise is not used, because it does not agree with what is seen."""
+    each = zip(data.recordings, data.beat_fits, strict=True)
+    wrong = [(one.name, fit.stated.ratio) for one, fit in each if fit.stated and not fit.stated.used]
+    kinds = (
+        ([one for one in wrong if one[1] > 1.0], "check the unit and that it is of single samples"),
+        (
+            [one for one in wrong if one[1] <= 1.0],
+            "something else changes from beat to beat, or it is too small",
+        ),
+    )
+    return tuple(
+        "the stated standard deviation of the noise is not used where it is far from the noise that is seen: "
+        f"{', '.join(f'{ratio:.2g} times in {name}' for name, ratio in found)}; {cause}"
+        for found, cause in kinds
+        if found
+    )
 
 
 def _drift_remarks(data: WhitenedData, unit: str) -> tuple[str, ...]:

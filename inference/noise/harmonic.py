@@ -22,6 +22,7 @@ from wingfit.inference.noise.drift import Drift, drift_of, slow_basis
 from wingfit.inference.noise.mean_beat import fourier_basis, masks_of, scatter_about
 from wingfit.inference.noise.shared_pattern import shared_part
 from wingfit.inference.noise.spectrum import density_at_harmonics, lag1_autocorrelation
+from wingfit.inference.noise.stated import Stated, stated_noise
 from wingfit.records import Recording
 from wingfit.records.array_types import Array, Bool, Float, Index, Int, Mask
 from wingfit.records.blas_threads import one_blas_thread
@@ -57,6 +58,7 @@ class HarmonicFit:
         coefficients: [C, P] of the recording itself.
         drift: slow change of the beat during the recording; None for too few beats.
         shared: part of the power of the noise that is a motion that markers of tracks share (:func:`shared_part`).
+        stated: the stated noise compared with what was seen; None if none is stated.
     """
 
     order: Int[Index, " P"]
@@ -71,6 +73,7 @@ class HarmonicFit:
     coefficients: Float[Array, "C P"]
     drift: Drift | None = None
     shared: float = 0.0
+    stated: Stated | None = None
 
     def of(self, residuals: Float[Array, "*B T C"]) -> Float[Array, "*B C P"]:
         """Fourier coefficients [..., C, P] of ``residuals`` [..., T, C] (NaN: not recorded); zero if not used."""
@@ -109,6 +112,7 @@ def harmonic_fit(recording: Recording, compared: Mask | None = None) -> Harmonic
         np.einsum("cpt,tc->cp", inverse, np.where(valid, recording.values, 0.0)),
         scatter.drift,
         shared_part(scatter.values, valid, recording.values) if recording.kind == "tracks" else 0.0,
+        scatter.stated,
     )
 
 
@@ -164,6 +168,7 @@ class _Scatter:
         (a variance) by which it is multiplied.
         variance: [C] of the noise of one sample.
         drift: slow change of the beat; None for too few beats.
+        stated: the stated noise compared with what was seen; None if none is stated.
     """
 
     values: Array
@@ -176,6 +181,7 @@ class _Scatter:
     density: tuple[Array, Array]
     variance: Array
     drift: Drift | None
+    stated: Stated | None
 
     @classmethod
     def of(cls, recording: Recording, compared: Mask | None) -> _Scatter:
@@ -210,7 +216,11 @@ class _Scatter:
         density *= widened
         taken = scale * density[fitted].sum()  # power of the noise that the fit of the mean beat absorbs
         variance = ((values**2).sum(axis=0) + taken) / np.maximum(valid.sum(axis=0), 1)
-        return cls(values, valid, basis, order, trend, beats, inner, (density, scale), variance, drift)
+        stated = stated_noise(recording, variance, used, between_beats=beats >= 2)
+        if stated and stated.used and recording.standard_deviation is not None:
+            factor = recording.standard_deviation**2 / np.maximum(variance, np.finfo(float).tiny)
+            scale, variance = scale * factor, recording.standard_deviation**2
+        return cls(values, valid, basis, order, trend, beats, inner, (density, scale), variance, drift, stated)
 
 
 def _check_moves(recording: Recording, seen: Mask) -> None:
