@@ -61,6 +61,25 @@ class Strict(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
+_Instant = Annotated[Decimal, limits("[-1000000, 1000000] s", "start or end of the part that is used")]
+_Beats = Annotated[Decimal, limits("[-1000000, 1000000] beats", "start or end of the part that is used, from time 0")]
+
+
+class WindowFile(Strict):
+    """The part of a recording that is used, in seconds or in beats; all of it without either key."""
+
+    window_s: list[_Instant] | None = Field(None, min_length=2, max_length=2, description="start and end of the part")
+    window_beats: list[_Beats] | None = Field(
+        None, min_length=2, max_length=2, description="start and end of the part, in beats from time 0"
+    )
+
+    @model_validator(mode="after")
+    def _one_window(self) -> WindowFile:
+        if self.window_s and self.window_beats:
+            raise fault("window_s and window_beats are both given; keep one of them")
+        return self
+
+
 class FourierFile(Strict):
     """An angle as a Fourier series over the beat; the k-th entry of each list belongs to the k-th harmonic."""
 

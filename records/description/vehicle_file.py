@@ -111,7 +111,7 @@ Noise = Annotated[
 ]
 
 
-class VehicleRecordingFile(Strict):
+class VehicleRecordingFile(fields.WindowFile):
     """One recording of a vehicle; its forces are in ``recordings/<name>.csv``."""
 
     name: fields.Name

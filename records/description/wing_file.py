@@ -114,7 +114,7 @@ Noise = Annotated[
 ]
 
 
-class WingRecordingFile(Strict):
+class WingRecordingFile(fields.WindowFile):
     """One recording of a wing; its tracks (positions of markers over time) are in ``recordings/<name>.csv``."""
 
     name: fields.Name

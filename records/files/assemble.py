@@ -29,6 +29,7 @@ from wingfit.records.files.series_dataset import (
     to_series_dataset,
 )
 from wingfit.records.files.table import Samples, too_much
+from wingfit.records.files.window import in_window
 from wingfit.records.limits import FORMAT_VERSION, MAX_VALUES
 from wingfit.records.series import Series, SeriesDataset
 from wingfit.records.vehicle import Vehicle
@@ -58,7 +59,8 @@ def assemble(
         return to_series_dataset(checked, series)
     rig, recordings = to_rig(checked), list[Recording]()
     entries: Sequence[RecordingFile] = checked.recordings
-    for index, entry, samples in _read_all(entries, read, room, faults):
+    for index, entry, whole in _read_all(entries, read, room, faults):
+        samples = in_window(entry, whole, document, ("recordings", index), faults)
         recording = to_recording(entry, samples, document, ("recordings", index), faults)
         check_numbers(recording, rig, where(entry.name), partial(at, entry.name, samples), faults)
         recordings.append(recording)
