@@ -33,6 +33,7 @@ def main() -> None:
     parser.add_argument(
         "--only", action="append", choices=GROUPS, default=[], help="run only this group of trials; may be repeated"
     )
+    parser.add_argument("--first", type=int, help="run only the first trials, so many; all are in random order")
     parser.add_argument("--jobs", type=int, default=2, help="number of processes")
     parser.add_argument("--seed", type=int, default=8, help=f"below {DEVELOPMENT}; the same seed gives the same table")
     parser.add_argument(
@@ -55,7 +56,7 @@ def main() -> None:
     lattice = bool(os.environ.get(VARIABLE))
     if not lattice:
         print(f"without the trials in a vortex lattice: {VARIABLE} is not set", file=sys.stderr)
-    trials = plan(arguments.seed, quick=arguments.quick, only=arguments.only, lattice=lattice)
+    trials = plan(arguments.seed, quick=arguments.quick, only=arguments.only, lattice=lattice)[: arguments.first]
     with tempfile.TemporaryDirectory() as scratch:
         tables = conduct(trials, arguments.keep or Path(scratch), arguments.jobs, peers=arguments.peers)
     print(side_by_side(tables))
