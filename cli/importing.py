@@ -1,0 +1,176 @@
+"""``wingfit import``: reads the files of motion-capture systems and digitisers, without a server."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+from wingfit.cli.base.files import write_text
+from wingfit.cli.base.output import note, number, percent, print_json, remarks, say, table
+from wingfit.client.transport import WingfitError
+
+if TYPE_CHECKING:
+    from wingfit.importers import Given, ImportedTracks
+
+NOT_GIVEN = "of the file; how they lie in the wing is not stated"
+
+
+def import_(
+    files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Files of tracked markers.")],
+    unit: Annotated[
+        Literal["m", "cm", "mm", "um", "in", "ft"] | None,
+        typer.Option(help="Unit of positions, if the file does not state it."),
+    ] = None,
+    rate_hz: Annotated[
+        float | None, typer.Option(help="Frames per second, if the file states neither rate nor times.")
+    ] = None,
+    axes: Annotated[
+        str | None,
+        typer.Option(
+            help="Direction of each axis of the file in the wing: 'x aft, y out, z up'; also fore, in, down. "
+            "Default: positions stay in the axes of the file."
+        ),
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Write tracks: FILE.csv for one file, or a folder.")
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Overwrite tracks that were written before.")] = False,
+    format_: Annotated[
+        str | None, typer.Option("--format", help="Format, if the content fits several; a wrong name lists all.")
+    ] = None,
+    time_unit: Annotated[
+        Literal["s", "ms", "us"] | None, typer.Option(help="Unit of a column of times that does not state it.")
+    ] = None,
+    decimal: Annotated[Literal["point", "comma"], typer.Option(help="Decimal separator of text files.")] = "point",
+    columns: Annotated[
+        str | None, typer.Option(help="Columns of a plain table: 'time=t; tip=a,b,c; root=d,e,f'.")
+    ] = None,
+    rows: Annotated[
+        str | None, typer.Option(help="Read only these rows of a plain table: 'sequence=3,side=left'.")
+    ] = None,
+    keep_zeros: Annotated[
+        bool, typer.Option("--keep-zeros", help="Positions 0,0,0 are seen; default: they are gaps.")
+    ] = False,
+    keep_unlabelled: Annotated[
+        bool, typer.Option("--keep-unlabelled", help="Import markers that were not identified, too.")
+    ] = False,
+    incomplete: Annotated[
+        bool, typer.Option("--incomplete", help="Import a file with other than the count of frames that it states.")
+    ] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print what was read as JSON.")] = False,
+) -> None:
+    """Read tracked markers from the files of other programs; show what was understood; write tracks in s and m.
+
+    Reads C3D, TRC, and the text of Motive (OptiTrack), Qualisys, Vicon Nexus, DLTdv, DeepLabCut (3-D) and Anipose, HDF5
+    of SLEAP (3-D), and plain tables. The content shows the format. What a file does not state must be given; nothing is
+    guessed. Tracks of one camera must be triangulated first.
+
+    Example: wingfit import trial.c3d --axes 'x aft, y out, z up' -o trial.csv
+    """
+    from wingfit.importers import Given  # imported late: other commands start faster
+
+    given = Given(
+        unit=unit,
+        rate_hz=rate_hz,
+        axes=axes,
+        format=format_,
+        time_unit=time_unit,
+        decimal=decimal,
+        columns=columns,
+        rows=rows,
+        keep_zeros=keep_zeros,
+        keep_unlabelled=keep_unlabelled,
+        incomplete=incomplete,
+    )
+    targets = _targets(files, output, force=force)
+    found = _read(files, given)
+    written = _write(found, targets)
+    if as_json:
+        print_json([_json(tracks, path) for tracks, path in zip(found, written, strict=True)])
+        return
+    for tracks in found:
+        _show(tracks)
+    if not targets:
+        note("nothing was written; to write the tracks, add: --output FILE.csv, or a folder")
+
+
+def _targets(files: list[Path], output: Path | None, *, force: bool) -> list[Path]:
+    """Return the files to write, one for each of ``files``; none without ``output``. Usage errors for what is wrong."""
+    if output is None:
+        return []
+    from wingfit.importers.markers import allowed
+
+    if output.suffix.lower() == ".csv" and not output.is_dir():
+        if len(files) > 1:
+            raise typer.BadParameter(f"{output} is one file for {len(files)}; name a folder", param_hint="--output")
+        targets = [output]
+    else:
+        targets = [output / f"{allowed(file.stem) or 'tracks'}.csv" for file in files]
+    for target, file in zip(targets, files, strict=True):
+        if targets.count(target) > 1:
+            message = f"several files would be written to {target}; import them one by one"
+            raise typer.BadParameter(message, param_hint="--output")
+        if target.exists() and file.exists() and target.samefile(file):
+            raise typer.BadParameter(f"{target} is the file that is read; name another", param_hint="--output")
+        if target.exists() and not force:
+            message = f"{target} exists; name another file or folder, or overwrite it with --force"
+            raise typer.BadParameter(message, param_hint="--output")
+    return targets
+
+
+def _read(files: list[Path], given: Given) -> list[ImportedTracks]:
+    """Return the tracks of all ``files``; WingfitError lists the faults of all."""
+    from wingfit.importers import import_tracks
+    from wingfit.records.errors import DatasetError
+
+    found, faults = [], list[dict[str, Any]]()
+    for file in files:
+        try:
+            found.append(import_tracks(file, **vars(given)))
+        except DatasetError as error:
+            faults += [vars(fault) for fault in error.errors if vars(fault) not in faults]
+    if faults:
+        raise WingfitError("no tracks were imported", f"{len(faults)} errors", errors=faults)
+    return found
+
+
+def _write(found: list[ImportedTracks], targets: list[Path]) -> list[Path | None]:
+    if not targets:
+        return [None] * len(found)
+    for tracks, target in zip(found, targets, strict=True):
+        try:
+            target.parent.mkdir(exist_ok=True)
+        except OSError as error:
+            raise WingfitError(f"cannot make the folder {target.parent}", error.strerror or str(error)) from error
+        write_text(target, tracks.csv(), f"tracks of {tracks.file}")
+    return [*targets]
+
+
+def _json(tracks: ImportedTracks, written: Path | None) -> dict[str, Any]:
+    from wingfit.importers.summary import as_json
+
+    return as_json(tracks) | {"written": None if written is None else str(written)}
+
+
+def _show(tracks: ImportedTracks) -> None:
+    from wingfit.importers.summary import MarkerSummary, summaries
+
+    frames = f"{len(tracks.markers)} markers, {len(tracks.times)} frames, {number(tracks.duration_s)} s"
+    say(f"{tracks.file}: {tracks.title}, {frames}, {number(tracks.rate_hz)} frames per second")
+    facts = [[one.fact, one.value, f"{one.by}: {one.where}"] for one in tracks.statements]
+    if tracks.frame == "file":
+        facts.append(["axes", NOT_GIVEN, "nobody"])
+    table(["fact", "value", "stated by"], facts)
+    gaps = ", ".join(f"{count} {cause}" for cause, count in vars(tracks.gaps).items() if count)
+    say(f"missing positions: {tracks.gaps.total}{f' ({gaps})' if gaps else ''}")
+
+    def cells(one: MarkerSummary) -> list[str]:
+        ends = zip(one.low_m, one.high_m, strict=True)
+        spans = [f"{1e3 * low:.1f} to {1e3 * high:.1f}" for low, high in ends]
+        jump = "–" if one.largest_jump_m is None else f"{1e3 * one.largest_jump_m:.2f}"
+        return [one.name, percent(one.seen), *spans, jump]
+
+    table(["marker", ">seen", ">x mm", ">y mm", ">z mm", ">largest jump mm"], [cells(one) for one in summaries(tracks)])
+    remarks(f"{tracks.file}: {one}" for one in tracks.remarks)

@@ -1,0 +1,174 @@
+"""C3D (c3d.org): binary tracks with parameters, written by nearly all motion-capture systems.
+
+A header of 512 bytes, a section of parameters in groups (:mod:`wingfit.importers.readers.c3d_parameters`), then for
+each frame x, y, z and a fourth word for each point, and analogue samples. The numbers are 16-bit integers times
+POINT:SCALE, or 32-bit floats if that scale is negative. A negative fourth word marks a point as invalid. POINT:UNITS,
+POINT:RATE and, for the vertical axis of the screen, POINT:Y_SCREEN are stated in the file.
+
+The reader is our own because a library that reads a file which is cut off as if it were whole cannot be used here
+(docs/decisions/0023-importers.md); it is tested against that library on files that are whole.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from wingfit.importers.numbers import WORD
+from wingfit.importers.options import Given
+from wingfit.importers.raw import Raw, Reader, Stated
+from wingfit.importers.readers.c3d_parameters import Binary, Parameters, read_parameters
+from wingfit.importers.source import Source
+from wingfit.records.array_types import Array, Mask
+from wingfit.records.errors import check_most, fail
+from wingfit.records.limits import MAX_MARKERS, MAX_ROWS, MAX_TRACK_VALUES
+
+BLOCK = 512
+_KEY = 0x50
+# Model outputs that some programs store as points, but that are no positions.
+_OTHER_KINDS = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS")
+
+
+@dataclass(frozen=True)
+class _Data:
+    """Where the data are: ``offset`` in bytes, ``points`` and ``analogue`` samples in a frame, frames, first frame."""
+
+    offset: int
+    points: int
+    analogue: int
+    frames: int
+    first: int
+    floats: bool
+
+
+def recognises(source: Source) -> bool:
+    """Return whether the first two bytes are those of a C3D file."""
+    raw = source.raw
+    return source.encoding is None and len(raw) > 2 and raw[1] == _KEY and 2 <= raw[0] < 128
+
+
+def read(source: Source, given: Given) -> Raw:
+    """Return the points of a C3D file; DatasetError says what is wrong with it."""
+    del given
+    raw, file = source.raw, source.file
+    if len(raw) < 2 * BLOCK or raw[1] != _KEY:
+        raise fail(file, len(raw), f"has {len(raw)} bytes and is no whole C3D file; it may be cut off: export it again")
+    binary, parameters = read_parameters(raw, (raw[0] - 1) * BLOCK, file)
+    scale = parameters.number("POINT", "SCALE", binary.real(raw, 12))
+    if not np.isfinite(scale) or scale == 0:
+        raise fail(f"{file}, POINT:SCALE", scale, f"is {scale:g}; it must be a number other than 0: export it again")
+    data = _data(raw, binary, parameters, scale < 0, file)
+    positions, invalid = _points(raw, binary, data, scale)
+    labels = _labels(parameters, data.points)
+    keep, remarks = _positions_only(parameters, labels)
+    lines = np.arange(1, data.frames + 1)
+    found = Raw([labels[m] for m in keep], positions[:, keep], lines, "frame", remarks=remarks)
+    found.invalid = invalid[:, keep]
+    found.frames, found.first = np.arange(data.first, data.first + data.frames), 1
+    _state(found, parameters, float(binary.real(raw, 20)), data)
+    return found
+
+
+def _data(raw: bytes, binary: Binary, parameters: Parameters, floats: bool, file: str) -> _Data:
+    points, analogue, start, end = (binary.word(raw, at) for at in (2, 4, 6, 8))
+    used = parameters.number("POINT", "USED", points)
+    if used != points:
+        message = f"the header has {points} points, but POINT:USED is {used:g}; the file is damaged: export it again"
+        raise fail(file, points, message)
+    check_most(file, "has", points, MAX_MARKERS, "points", "export fewer markers")
+    if points == 0:
+        raise fail(file, 0, "has no points (markers), perhaps only analogue data; export the markers")
+    block = binary.word(raw, 16) or int(parameters.number("POINT", "DATA_START", 0))
+    offset, size = (block - 1) * BLOCK, (4 * points + analogue) * (4 if floats else 2)
+    if not 0 < offset <= len(raw):
+        raise fail(
+            file, block, f"the data start at block {block}, beyond the end; the file is cut off: export it again"
+        )
+    first, frames = _frames(parameters, start, end, (len(raw) - offset) // size, len(raw) - offset, size, file)
+    check_most(file, "has", frames, MAX_ROWS, "frames", "cut the recording in parts")
+    check_most(file, "has", frames * points * 3, MAX_TRACK_VALUES, "numbers", "export fewer markers")
+    return _Data(offset, points, analogue, frames, first, floats)
+
+
+def _frames(
+    parameters: Parameters, start: int, end: int, there: int, bytes_there: int, size: int, file: str
+) -> tuple[int, int]:
+    """Return the number of the first frame and the count of frames.
+
+    The header holds numbers up to 65535; longer recordings state theirs in TRIAL or POINT:FRAMES. If the places
+    disagree, the one that fits the size of the file (to a block) is right. DatasetError if none fits. ``there`` frames
+    of ``size`` bytes fit into the ``bytes_there`` after the start of the data.
+    """
+    first = start
+    stated = {"the header": end - start + 1}
+    trial = [parameters.words("TRIAL", name) for name in ("ACTUAL_START_FIELD", "ACTUAL_END_FIELD")]
+    if all(len(words) == 2 for words in trial):
+        low, high = (words[0] + 65536 * words[1] for words in trial)
+        stated, first = {"TRIAL": high - low + 1} | stated, low
+    count = parameters.number("POINT", "FRAMES", 0)
+    if count:
+        stated["POINT:FRAMES"] = int(count) % 65536 if count < 0 else int(count)
+    if "LONG_FRAMES" in parameters.groups.get("POINT", {}):
+        stated["POINT:LONG_FRAMES"] = int(parameters.number("POINT", "LONG_FRAMES", 0))
+    counts = {n for n in stated.values() if n > 0}
+    exact = {n for n in counts if 0 <= bytes_there - n * size < BLOCK}
+    listed = ", ".join(f"{place} {n}" for place, n in stated.items())
+    if len(exact) == 1:
+        return first, exact.pop()
+    if counts and min(counts) > there:
+        message = f"states {min(counts)} frames, but only {there} are there; the file is cut off: export it again"
+        raise fail(file, there, message)
+    if len(counts) != 1:
+        raise fail(file, listed, f"states different counts of frames ({listed}); the file is damaged: export it again")
+    return first, counts.pop()
+
+
+def _points(raw: bytes, binary: Binary, data: _Data, scale: float) -> tuple[Array, Mask]:
+    """Return positions [T, M, 3] in the file's unit, and which are invalid [T, M]."""
+    width = 4 * data.points + data.analogue
+    count = data.frames * width
+    values = binary.reals(raw, data.offset, count) if data.floats else binary.integers(raw, data.offset, count)
+    points = values.reshape(data.frames, width)[:, : 4 * data.points].reshape(data.frames, data.points, 4)
+    with np.errstate(invalid="ignore", over="ignore"):
+        positions = points[..., :3].astype(np.float64) * (1.0 if data.floats else scale)
+        positions[np.isnan(positions)] = WORD
+        return positions, points[..., 3] < 0
+
+
+def _labels(parameters: Parameters, points: int) -> list[str]:
+    """Return the names of all points; LABELS holds 255 at most, and LABELS2, LABELS3, ... go on."""
+    labels = list(parameters.texts("POINT", "LABELS"))
+    number = 2
+    while len(labels) < points and (more := parameters.texts("POINT", f"LABELS{number}")):
+        labels += more
+        number += 1
+    return (labels + [""] * points)[:points]
+
+
+def _positions_only(parameters: Parameters, labels: list[str]) -> tuple[list[int], list[str]]:
+    """Return the indices of points that are positions, and remarks about those that are not."""
+    keep, remarks = [*range(len(labels))], []
+    for kind in _OTHER_KINDS:
+        listed = {name for name in parameters.texts("POINT", kind) if name}
+        left = [m for m in keep if labels[m] in listed]
+        if left:
+            remarks.append(f"not imported: {len(left)} points that are {kind.lower()} (POINT:{kind})")
+            keep = [m for m in keep if m not in left]
+    return keep, remarks
+
+
+def _state(found: Raw, parameters: Parameters, header_rate: float, data: _Data) -> None:
+    unit = next(iter(parameters.texts("POINT", "UNITS")), "")
+    if unit:
+        found.unit = Stated(unit, "POINT:UNITS")
+    rates = {"POINT:RATE": parameters.number("POINT", "RATE", 0.0), "the header": header_rate}
+    found.rates = [Stated(rate, where) for where, rate in rates.items() if np.isfinite(rate) and rate > 0]
+    up = next(iter(parameters.texts("POINT", "Y_SCREEN")), "")
+    if len(up) == 2 and up[0] in "+-" and up[1].upper() in "XYZ":
+        found.up = Stated(up.upper(), "POINT:Y_SCREEN")
+    if data.analogue:
+        found.remarks.append(f"not imported: {data.analogue} analogue samples per frame")
+
+
+READER = Reader("c3d", "C3D", recognises, read)
