@@ -17,7 +17,6 @@ from wingfit.cli import (
     diagnose,
     driving,
     effects,
-    importing,
     keys,
     rigs,
     runs,
@@ -27,6 +26,7 @@ from wingfit.cli import (
 from wingfit.cli.base.output import note
 from wingfit.cli.forces import free_flight, kinematics
 from wingfit.cli.forces import runs as force_runs
+from wingfit.cli.importing import command as importing
 from wingfit.client.client import WingfitError
 from wingfit.sim.requested_lanes import requested_lanes
 

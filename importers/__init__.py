@@ -4,7 +4,7 @@ The contract of :func:`import_tracks`:
 
 - **One result** for every format, :class:`ImportedTracks`: names of markers [M], times [T] (s), positions [T, M, 3]
   (m; NaN where a marker was not seen), what is known about them and who stated it (the file, with the place, or the
-  user, with the option), gaps by cause, and remarks about everything that was left out or changed.
+  user, with the option), gaps by cause, and remarks about everything that is not imported or was changed.
 - **Nothing is guessed.** Unit, rate and the unit of times are read where the file states them. Where it does not, the
   error lists all options that are needed, at once. An option that contradicts the file is an error too.
 - **Axes** are those of the file unless the user says how the wing lies in them (:mod:`wingfit.importers.axes`); the

@@ -60,8 +60,9 @@ def import_tracks(
     place = Path(path)
     try:
         size = place.stat().st_size
-        if place.is_dir():
-            raise fail(place.name, None, "is a folder; name the files in it")
+        if not place.is_file():
+            what = "a folder; name the files in it" if place.is_dir() else "no regular file; copy it to one"
+            raise fail(place.name, str(place), f"is {what}")
         check_most(place.name, "has", size / MIB, MAX_TRACK_FILE_BYTES / MIB, "MiB", "cut the recording in parts")
         raw = place.read_bytes()
     except OSError as error:

@@ -107,8 +107,9 @@ def _matrix(
             lines.append(line)
         if faults.full:
             break
-        check_most(source.file, "has more than", len(lines), MAX_ROWS, "frames", "cut the recording in parts")
-        check_most(source.file, "has more than", len(numbers), MAX_TRACK_VALUES, "numbers", "export fewer markers")
+        if len(lines) > MAX_ROWS or len(numbers) > MAX_TRACK_VALUES:
+            check_most(source.file, "has at least", len(lines), MAX_ROWS, "frames", "cut the recording in parts")
+            check_most(source.file, "has at least", len(numbers), MAX_TRACK_VALUES, "numbers", "export fewer markers")
     faults.raise_any()
     if not lines:
         raise fail(source.file, 0, "has no frames: no line of numbers was read; export it again")
@@ -141,9 +142,9 @@ def number_of(cell: str, decimal: Decimal = "point") -> float:
     if not text:
         return EMPTY
     pattern = _NUMBER if decimal == "point" else _WITH_COMMA
-    if len(text) <= _MAX_LENGTH and pattern.fullmatch(text):
-        value = float(text.replace(",", "."))
-        if math.isinf(value):
+    if pattern.fullmatch(text) and len(text) <= _MAX_LENGTH:
+        value = float(text if decimal == "point" else text.replace(",", "."))
+        if value in (math.inf, -math.inf):
             raise ValueError(f"is {shown(text)!r}, which is too large for a number; check the file")
         return value
     if text.lower() in _WORDS or _WORD.fullmatch(text):
@@ -188,10 +189,10 @@ def count_of(text: str, where: str) -> int:
     return int(float(text))
 
 
-def positive_of(text: str, where: str, unit: str) -> float:
+def positive_of(text: str, where: str, unit: str, decimal: Decimal) -> float:
     """Return the positive number that a file states as ``text``; DatasetError if it is none."""
     try:
-        value = number_of(text)
+        value = number_of(text, decimal)
     except ValueError as error:
         raise fail(where, text, str(error)) from None
     if not value > 0:

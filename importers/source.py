@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import csv
 import io
 import re
@@ -12,6 +13,7 @@ from wingfit.records.errors import fail
 
 HEAD_BYTES = 2**18  # of the text from which a format is recognised
 HEAD_LINES = 60
+_BLOCK = 2**20
 SEPARATORS = {"\t": "tabs", ";": "semicolons", ",": "commas"}
 MAX_CELLS = 20_000  # in a line: more than 1000 markers with all that programs write about them
 _CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f]")
@@ -65,14 +67,13 @@ class Source:
         except csv.Error as error:
             message = f"not a table: {error}; remove stray quotes, or export the file again"
             raise fail(self.at(max(line, reader.line_num)), None, message) from None
-        except UnicodeDecodeError as error:
-            byte = f"0x{error.object[error.start]:02x}"
-            message = f"byte {byte} is not {error.encoding} text; save the file as UTF-8"
-            raise fail(self.at(line + 1), byte, message) from None
 
 
 def open_source(raw: bytes, file: str) -> Source:
-    """Return the file with the bytes ``raw``; its encoding is UTF-8 or UTF-16, with or without a byte-order mark."""
+    """Return the file with the bytes ``raw``; a text is UTF-8 or UTF-16, with or without a byte-order mark.
+
+    DatasetError names the line of a text in which a byte does not fit its encoding.
+    """
     encoding = _encoding(raw)
     if encoding is None:
         return Source(raw, file, None, ())
@@ -80,7 +81,21 @@ def open_source(raw: bytes, file: str) -> Source:
     lines = _LINE_END.split(text, HEAD_LINES)
     if _CONTROL.search("".join(lines[:HEAD_LINES])):
         return Source(raw, file, None, ())
+    _check_encoding(raw, encoding, file)
     return Source(raw, file, encoding, tuple(lines[:HEAD_LINES]))
+
+
+def _check_encoding(raw: bytes, encoding: str, file: str) -> None:
+    decoder, lines = codecs.getincrementaldecoder(encoding)(), 0
+    for start in range(0, len(raw), _BLOCK):
+        block = raw[start : start + _BLOCK]
+        try:
+            lines += decoder.decode(block, final=start + _BLOCK >= len(raw)).count("\n")
+        except UnicodeDecodeError as error:
+            byte = f"0x{error.object[error.start]:02x}"
+            lines += bytes(error.object[: error.start]).count(b"\n")
+            message = f"byte {byte} is not {encoding.removesuffix('-sig').upper()} text; save the file as UTF-8"
+            raise fail(f"{file}, line {lines + 1}", byte, message) from None
 
 
 def _encoding(raw: bytes) -> str | None:

@@ -162,7 +162,8 @@ def _from_both(
             )
         return Timing(printed[0] + steps / hertz, [rate, stated], remarks)
     _check_times(printed, raw, file)
-    measured = 1 / float(np.median(np.diff(printed)))
+    passed = raw.frames[-1] - raw.frames[0] if raw.frames is not None else len(printed) - 1
+    measured = float(passed / (printed[-1] - printed[0]))
     agreed = any(_same(one.value, hertz) for one in raw.rates)
     if given.rate_hz is not None and agreed:
         times = _from_rate(raw, rate, given, file, faults)

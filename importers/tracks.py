@@ -65,7 +65,7 @@ class ImportedTracks:
         frame: "wing" if the axes are x aft, y outboard, z up; "file" if they are those of the file.
         statements: the facts, each with who stated it.
         gaps: missing positions by cause.
-        remarks: everything else that the reader should know: what was left out, renamed or reconciled.
+        remarks: what else the reader should know: parts of the file that are not imported, new names, rounding.
     """
 
     file: str

@@ -46,7 +46,8 @@ class Binary:
             return np.frombuffer(raw, self.order + "f4", count, at)
         # The 16-bit halves are swapped, and the exponent is larger by two.
         halves = np.frombuffer(raw, "<u2", 2 * count, at).reshape(-1, 2)[:, ::-1]
-        reals: Reals = np.ascontiguousarray(halves).view("<f4").reshape(-1) * np.float32(0.25)
+        with np.errstate(invalid="ignore"):
+            reals: Reals = np.ascontiguousarray(halves).view("<f4").reshape(-1) * np.float32(0.25)
         return reals
 
     def integers(self, raw: bytes, at: int, count: int) -> np.ndarray[Any, np.dtype[np.int16]]:

@@ -44,7 +44,7 @@ def read(source: Source, given: Given) -> Raw:
         raw.unit = Stated(stated["Length Units"], "line 1, Length Units")
     key = next((key for key in _RATES if stated.get(key)), None)
     if key:
-        raw.rates = [Stated(positive_of(stated[key], source.at(1, key), "Hz"), f"line 1, {key}")]
+        raw.rates = [Stated(positive_of(stated[key], source.at(1, key), "Hz", given.decimal), f"line 1, {key}")]
     if stated.get("Total Exported Frames"):
         place = "line 1, Total Exported Frames"
         raw.frame_count = Stated(count_of(stated["Total Exported Frames"], f"{source.file}, {place}"), place)

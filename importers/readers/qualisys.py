@@ -48,7 +48,7 @@ def read(source: Source, given: Given) -> Raw:
     raw = raw_of(layout, read_samples(source.rows("\t", first), layout, source, given.decimal), first=1)
     raw.time_unit, raw.times_where = Stated("s", "Qualisys format"), "column 'Time'"
     raw.unit_hint = "Qualisys Track Manager writes millimetres unless another unit was chosen"
-    _state(raw, source, stated, places)
+    _state(raw, source, given, stated, places)
     return raw
 
 
@@ -96,14 +96,14 @@ def cells_are_counts(source: Source, start: int) -> bool:
     return len(whole) == len(first) > 0 and all(b == a + 1 for a, b in pairwise(whole))
 
 
-def _state(raw: Raw, source: Source, stated: dict[str, list[str]], places: dict[str, int]) -> None:
+def _state(raw: Raw, source: Source, given: Given, stated: dict[str, list[str]], places: dict[str, int]) -> None:
     def first(key: str) -> Any:
         return (stated.get(key) or [""])[0]
 
     if first("FREQUENCY") == "EXT":
         raw.rate_hint = f"line {places['FREQUENCY']} says that an external clock drove the cameras"
     elif first("FREQUENCY"):
-        rate = positive_of(first("FREQUENCY"), source.at(places["FREQUENCY"]), "Hz")
+        rate = positive_of(first("FREQUENCY"), source.at(places["FREQUENCY"]), "Hz", given.decimal)
         raw.rates = [Stated(rate, f"line {places['FREQUENCY']}, FREQUENCY")]
     if first("NO_OF_FRAMES"):
         count = count_of(first("NO_OF_FRAMES"), source.at(places["NO_OF_FRAMES"]))

@@ -38,14 +38,10 @@ def read(source: Source, given: Given) -> Raw:
         raw.unit = Stated(stated["Units"], "line 3, Units")
     if stated.get("DataRate"):
         where = source.at(3, "DataRate")
-        raw.rates = [Stated(positive_of(_point(stated["DataRate"], given), where, "Hz"), "line 3, DataRate")]
+        raw.rates = [Stated(positive_of(stated["DataRate"], where, "Hz", given.decimal), "line 3, DataRate")]
     if stated.get("NumFrames"):
         raw.frame_count = Stated(count_of(stated["NumFrames"], source.at(3, "NumFrames")), "line 3, NumFrames")
     return raw
-
-
-def _point(text: str, given: Given) -> str:
-    return text.replace(",", ".") if given.decimal == "comma" else text
 
 
 def _values(source: Source, separator: str) -> dict[str, str]:

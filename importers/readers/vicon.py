@@ -53,7 +53,9 @@ def read(source: Source, given: Given) -> Raw:
     samples = read_samples(_section(rows), layout, source, given.decimal)
     remarks = [f"not imported: section {name}" for name in others]
     raw = raw_of(layout, samples, first=1, remarks=remarks)
-    raw.rates = [Stated(positive_of(rate[0] if rate else "", source.at(rate_line), "Hz"), f"line {rate_line}")]
+    raw.rates = [
+        Stated(positive_of(rate[0] if rate else "", source.at(rate_line), "Hz", given.decimal), f"line {rate_line}")
+    ]
     raw.unit = _unit(source, layout, [cell.strip() for cell in units], unit_line)
     return raw
 

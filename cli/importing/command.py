@@ -7,14 +7,11 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from wingfit.cli.base.files import write_text
-from wingfit.cli.base.output import note, number, percent, print_json, remarks, say, table
+from wingfit.cli.base.output import note, print_json
 from wingfit.client.transport import WingfitError
 
 if TYPE_CHECKING:
     from wingfit.importers import Given, ImportedTracks
-
-NOT_GIVEN = "of the file; how they lie in the wing is not stated"
 
 
 def import_(
@@ -69,7 +66,8 @@ def import_(
 
     Example: wingfit import trial.c3d --axes 'x aft, y out, z up' -o trial.csv
     """
-    from wingfit.importers import Given  # imported late: other commands start faster
+    from wingfit.cli.importing import results  # imported late: other commands start faster
+    from wingfit.importers import Given
 
     given = Given(
         unit=unit,
@@ -86,12 +84,12 @@ def import_(
     )
     targets = _targets(files, output, force=force)
     found = _read(files, given)
-    written = _write(found, targets)
+    written = results.write(found, targets)
     if as_json:
-        print_json([_json(tracks, path) for tracks, path in zip(found, written, strict=True)])
+        print_json([results.as_json(tracks, path) for tracks, path in zip(found, written, strict=True)])
         return
     for tracks in found:
-        _show(tracks)
+        results.show(tracks)
     if not targets:
         note("nothing was written; to write the tracks, add: --output FILE.csv, or a folder")
 
@@ -134,43 +132,3 @@ def _read(files: list[Path], given: Given) -> list[ImportedTracks]:
     if faults:
         raise WingfitError("no tracks were imported", f"{len(faults)} errors", errors=faults)
     return found
-
-
-def _write(found: list[ImportedTracks], targets: list[Path]) -> list[Path | None]:
-    if not targets:
-        return [None] * len(found)
-    for tracks, target in zip(found, targets, strict=True):
-        try:
-            target.parent.mkdir(exist_ok=True)
-        except OSError as error:
-            raise WingfitError(f"cannot make the folder {target.parent}", error.strerror or str(error)) from error
-        write_text(target, tracks.csv(), f"tracks of {tracks.file}")
-    return [*targets]
-
-
-def _json(tracks: ImportedTracks, written: Path | None) -> dict[str, Any]:
-    from wingfit.importers.summary import as_json
-
-    return as_json(tracks) | {"written": None if written is None else str(written)}
-
-
-def _show(tracks: ImportedTracks) -> None:
-    from wingfit.importers.summary import MarkerSummary, summaries
-
-    frames = f"{len(tracks.markers)} markers, {len(tracks.times)} frames, {number(tracks.duration_s)} s"
-    say(f"{tracks.file}: {tracks.title}, {frames}, {number(tracks.rate_hz)} frames per second")
-    facts = [[one.fact, one.value, f"{one.by}: {one.where}"] for one in tracks.statements]
-    if tracks.frame == "file":
-        facts.append(["axes", NOT_GIVEN, "nobody"])
-    table(["fact", "value", "stated by"], facts)
-    gaps = ", ".join(f"{count} {cause}" for cause, count in vars(tracks.gaps).items() if count)
-    say(f"missing positions: {tracks.gaps.total}{f' ({gaps})' if gaps else ''}")
-
-    def cells(one: MarkerSummary) -> list[str]:
-        ends = zip(one.low_m, one.high_m, strict=True)
-        spans = [f"{1e3 * low:.1f} to {1e3 * high:.1f}" for low, high in ends]
-        jump = "–" if one.largest_jump_m is None else f"{1e3 * one.largest_jump_m:.2f}"
-        return [one.name, percent(one.seen), *spans, jump]
-
-    table(["marker", ">seen", ">x mm", ">y mm", ">z mm", ">largest jump mm"], [cells(one) for one in summaries(tracks)])
-    remarks(f"{tracks.file}: {one}" for one in tracks.remarks)
