@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from wingfit.records.errors import fail
 
-HEAD_BYTES = 2**18  # of the text from which a format is recognised
+HEAD_BYTES = 2**20  # of the text from which a format is recognised
 HEAD_LINES = 60
 _BLOCK = 2**20
 SEPARATORS = {"\t": "tabs", ";": "semicolons", ",": "commas"}
@@ -79,6 +79,8 @@ def open_source(raw: bytes, file: str) -> Source:
         return Source(raw, file, None, ())
     text = raw[:HEAD_BYTES].decode(encoding, errors="replace")
     lines = _LINE_END.split(text, HEAD_LINES)
+    if 1 < len(lines) <= HEAD_LINES and len(raw) > HEAD_BYTES:
+        lines.pop()  # the head ends within this line
     if _CONTROL.search("".join(lines[:HEAD_LINES])):
         return Source(raw, file, None, ())
     _check_encoding(raw, encoding, file)

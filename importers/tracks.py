@@ -10,6 +10,7 @@ import numpy as np
 from wingfit.records.array_types import Array, Float
 from wingfit.records.files.table import write_table
 
+_DECIMALS = 12  # of metres
 FactName = Literal["unit", "rate", "times", "axes", "up", "first frame"]
 
 
@@ -95,6 +96,9 @@ class ImportedTracks:
         return float(self.times[-1] - self.times[0])
 
     def csv(self) -> str:
-        """Return the tracks as a table of ``recordings/<name>.csv`` (docs/formats.md): seconds, metres, gaps empty."""
+        """Return the tracks as a table of ``recordings/<name>.csv`` (docs/formats.md): seconds, metres, gaps empty.
+
+        Positions are rounded to 1e-12 m, so that 37.2 mm are written as 0.0372.
+        """
         columns = [f"{marker}_{axis}_m" for marker in self.markers for axis in "xyz"]
-        return write_table(columns, self.times, self.positions.reshape(len(self.times), -1))
+        return write_table(columns, self.times, np.round(self.positions, _DECIMALS).reshape(len(self.times), -1))

@@ -76,11 +76,7 @@ def _layout(source: Source, labels: list[str], start: int) -> tuple[Layout, int]
     if named:
         before = [cell.lower() for cell in cells[:2] if cell.lower() in ("frame", "time")]
     else:
-        extra = len(source.cells(start, "\t")) - 3 * len(labels)
-        before = {1: ["frame"], 2: ["frame", "time"]}.get(extra, [])
-        # An exported row may end with a tab; whether the first column counts frames then shows in its values.
-        if extra == 1 and not cells_are_counts(source, start):
-            before = []
+        before = ["frame", "time"][: _columns_before(source, start, 3 * len(labels))]
     skip = len(before)
     columns = [(skip + 3 * m, skip + 3 * m + 1, skip + 3 * m + 2) for m in range(len(labels))]
     names = [*(word.capitalize() for word in before), *(f"{label} {axis}" for label in labels for axis in "XYZ")]
@@ -89,11 +85,25 @@ def _layout(source: Source, labels: list[str], start: int) -> tuple[Layout, int]
     return Layout(labels, columns, names, time=time, frame=frame), start + 1 if named else start
 
 
-def cells_are_counts(source: Source, start: int) -> bool:
-    """Return whether the first cells of the lines from ``start`` on in the head are 1, 2, 3, ... or go on so."""
-    first = [cells[0] for n in range(start, len(source.head) + 1) if (cells := source.cells(n, "\t")) and cells[0]]
-    whole = [int(text) for text in first if re.fullmatch(r"[0-9]{1,9}", text)]
-    return len(whole) == len(first) > 0 and all(b == a + 1 for a, b in pairwise(whole))
+def _columns_before(source: Source, start: int, coordinates: int) -> int:
+    """Return how many columns (frame, time) precede the ``coordinates`` in a file without names of columns.
+
+    A row may end with a tab, so that its count of cells does not decide: numbers of frames go up by one, times go up.
+    """
+    rows = [cells for n in range(start, len(source.head) + 1) if (cells := source.cells(n, "\t"))]
+    if not rows or not _steps(rows, 0, whole=True):
+        return 0
+    extra = len(rows[0]) - coordinates
+    return 2 if extra >= 2 and (extra == 2 or not rows[0][-1]) and _steps(rows, 1, whole=False) else int(extra >= 1)
+
+
+def _steps(rows: list[list[str]], column: int, *, whole: bool) -> bool:
+    """Return whether the numbers in ``column`` go up in all ``rows``, by one if they must be ``whole``."""
+    try:
+        found = [float(cells[column]) for cells in rows]
+    except (ValueError, IndexError):
+        return False
+    return all(b - a == 1 if whole else b > a for a, b in pairwise(found))
 
 
 def _state(raw: Raw, source: Source, given: Given, stated: dict[str, list[str]], places: dict[str, int]) -> None:

@@ -122,3 +122,16 @@ def test_a_marker_that_is_never_seen_is_left_out() -> None:
     assert any("ghost" in remark for remark in found.remarks)
     truth.mm[:] = 0
     assert "--keep-zeros" in refused(text_writers.trc(truth))
+
+
+@pytest.mark.parametrize("times", [False, True])
+@pytest.mark.parametrize("tab", [False, True])
+def test_rows_of_qualisys_may_end_with_a_tab(times: bool, tab: bool) -> None:
+    truth = flapping()
+    truth.mm[:, -1] = np.nan
+    truth.mm[-5:, -1] = 7.0
+    lines = text_writers.qualisys(truth, times=times).splitlines()
+    content = "\n".join(line + "\t" * (tab and not line[0].isalpha()) for line in lines)
+    found = read(content, unit="mm")
+    assert np.allclose(found.positions * 1e3, truth.mm, atol=1e-9, equal_nan=True)
+    assert (found.statement("times") is not None) == times
