@@ -80,4 +80,7 @@ def import_bytes(raw: bytes, file: str, given: Given) -> ImportedTracks:
         option = "--columns" if given.columns else "--rows"
         message = f"is for plain tables, but {file} is {reader.title}; leave it out, or add --format plain"
         raise fail(option, given.columns or given.rows, message)
-    return resolve(reader.read(source, given), reader, given, file)
+    found = reader.read(source, given)
+    if source.encoding and not raw.rstrip(b"\0").endswith((b"\n", b"\r")):
+        found.remarks.append("the last line has no line end; if the file was cut off, its last number is not whole")
+    return resolve(found, reader, given, file)

@@ -49,7 +49,10 @@ def resolve_times(raw: Raw, given: Given, file: str, faults: Faults) -> Timing |
     if faults.faults and raw.rates:
         return None
     _check_times(printed, raw, file)
-    return Timing(printed, [stated])
+    steps = np.diff(printed)
+    uneven = steps.max() - steps.min() > 2 * _resolution(printed) + _DRIFT * float(np.abs(printed).max())
+    spread = f"times are not evenly spaced: {1e3 * steps.min():.4g} to {1e3 * steps.max():.4g} ms apart"
+    return Timing(printed, [stated], [spread] if uneven else [])
 
 
 def _check_frames(raw: Raw, file: str) -> None:

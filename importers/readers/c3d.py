@@ -50,7 +50,6 @@ def recognises(source: Source) -> bool:
 
 def read(source: Source, given: Given) -> Raw:
     """Return the points of a C3D file; DatasetError says what is wrong with it."""
-    del given
     raw, file = source.raw, source.file
     if len(raw) < 2 * BLOCK or raw[1] != _KEY:
         raise fail(file, len(raw), f"has {len(raw)} bytes and is no whole C3D file; it may be cut off: export it again")
@@ -58,7 +57,7 @@ def read(source: Source, given: Given) -> Raw:
     scale = parameters.number("POINT", "SCALE", binary.real(raw, 12))
     if not np.isfinite(scale) or scale == 0:
         raise fail(f"{file}, POINT:SCALE", scale, f"is {scale:g}; it must be a number other than 0: export it again")
-    data = _data(raw, binary, parameters, scale < 0, file)
+    data = _data(raw, binary, parameters, scale < 0, given, file)
     positions, invalid = _points(raw, binary, data, scale)
     labels = _labels(parameters, data.points)
     keep, remarks = _positions_only(parameters, labels)
@@ -70,7 +69,7 @@ def read(source: Source, given: Given) -> Raw:
     return found
 
 
-def _data(raw: bytes, binary: Binary, parameters: Parameters, floats: bool, file: str) -> _Data:
+def _data(raw: bytes, binary: Binary, parameters: Parameters, floats: bool, given: Given, file: str) -> _Data:
     points, analogue, start, end = (binary.word(raw, at) for at in (2, 4, 6, 8))
     used = parameters.number("POINT", "USED", points)
     if used != points:
@@ -85,43 +84,50 @@ def _data(raw: bytes, binary: Binary, parameters: Parameters, floats: bool, file
         raise fail(
             file, block, f"the data start at block {block}, beyond the end; the file is cut off: export it again"
         )
-    first, frames = _frames(parameters, start, end, (len(raw) - offset) // size, len(raw) - offset, size, file)
+    first, stated = _stated_frames(parameters, start, end)
+    frames = _frames(stated, len(raw) - offset, size, given, file)
     check_most(file, "has", frames, MAX_ROWS, "frames", "cut the recording in parts")
     check_most(file, "has", frames * points * 3, MAX_TRACK_VALUES, "numbers", "export fewer markers")
     return _Data(offset, points, analogue, frames, first, floats)
 
 
-def _frames(
-    parameters: Parameters, start: int, end: int, there: int, bytes_there: int, size: int, file: str
-) -> tuple[int, int]:
-    """Return the number of the first frame and the count of frames.
+def _stated_frames(parameters: Parameters, start: int, end: int) -> tuple[int, dict[str, int]]:
+    """Return the number of the first frame, and the count of frames that each place of the file states.
 
-    The header holds numbers up to 65535; longer recordings state theirs in TRIAL or POINT:FRAMES. If the places
-    disagree, the one that fits the size of the file (to a block) is right. DatasetError if none fits. ``there`` frames
-    of ``size`` bytes fit into the ``bytes_there`` after the start of the data.
+    The header holds numbers up to 65535 (``start``, ``end``); longer recordings state theirs in TRIAL or POINT.
     """
-    first = start
-    stated = {"the header": end - start + 1}
-    trial = [parameters.words("TRIAL", name) for name in ("ACTUAL_START_FIELD", "ACTUAL_END_FIELD")]
-    if all(len(words) == 2 for words in trial):
-        low, high = (words[0] + 65536 * words[1] for words in trial)
-        stated, first = {"TRIAL": high - low + 1} | stated, low
+    first, stated = start, {"the header": end - start + 1}
+    low, high = (parameters.words("TRIAL", name) for name in ("ACTUAL_START_FIELD", "ACTUAL_END_FIELD"))
+    if len(low) == len(high) == 2:
+        first = low[0] + 65536 * low[1]
+        stated["TRIAL"] = high[0] + 65536 * high[1] - first + 1
     count = parameters.number("POINT", "FRAMES", 0)
-    if count:
+    if np.isfinite(count) and count:
         stated["POINT:FRAMES"] = int(count) % 65536 if count < 0 else int(count)
-    if "LONG_FRAMES" in parameters.groups.get("POINT", {}):
-        stated["POINT:LONG_FRAMES"] = int(parameters.number("POINT", "LONG_FRAMES", 0))
+    long = parameters.number("POINT", "LONG_FRAMES", 0)
+    if np.isfinite(long) and long:
+        stated["POINT:LONG_FRAMES"] = int(long)
+    return first, stated
+
+
+def _frames(stated: dict[str, int], there: int, size: int, given: Given, file: str) -> int:
+    """Return the count of frames of ``size`` bytes, of which ``there`` bytes are in the file.
+
+    If the places that state the count disagree, the one that fits the size of the file (to a block) is right.
+    DatasetError if none fits, unless the user knows that the file is incomplete.
+    """
     counts = {n for n in stated.values() if n > 0}
-    exact = {n for n in counts if 0 <= bytes_there - n * size < BLOCK}
-    listed = ", ".join(f"{place} {n}" for place, n in stated.items())
+    exact = {n for n in counts if 0 <= there - n * size < BLOCK}
     if len(exact) == 1:
-        return first, exact.pop()
-    if counts and min(counts) > there:
-        message = f"states {min(counts)} frames, but only {there} are there; the file is cut off: export it again"
-        raise fail(file, there, message)
-    if len(counts) != 1:
-        raise fail(file, listed, f"states different counts of frames ({listed}); the file is damaged: export it again")
-    return first, counts.pop()
+        return exact.pop()
+    whole = there // size
+    if given.incomplete and whole and counts:
+        return min(whole, max(counts))
+    listed = ", ".join(f"{place} {n}" for place, n in stated.items())
+    what = f"states {listed} frames, but has data for {whole}"
+    cause = "it is cut off" if not counts or min(counts) > whole else "the counts are wrong, or the file is damaged"
+    remedy = "export it again, or give --incomplete to import the frames that are stated and there"
+    raise fail(file, whole, f"{what}: {cause}; {remedy}")
 
 
 def _points(raw: bytes, binary: Binary, data: _Data, scale: float) -> tuple[Array, Mask]:

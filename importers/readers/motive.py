@@ -63,6 +63,10 @@ def _layout(source: Source, line: int, separator: str) -> tuple[Layout, list[str
         raise fail(source.at(line), len(above), message)
     if "second" not in axes[1].lower():
         raise fail(source.at(line, 2), axes[1], f"is {axes[1]!r}; it must be Time (Seconds): export with times")
+    for n, cells in ((n, source.cells(n, separator)) for n in range(2, line)):
+        if any(cells) and (len(cells) < len(axes) or any(cells[len(axes) :])):
+            message = f"describes {len(cells)} columns, and the axes in line {line} {len(axes)}; export the file again"
+            raise fail(source.at(n), len(cells), message)
     labelled = {cells[1]: cells for cells in above if len(cells) > 1 and cells[1]}
     types, names = labelled.get("Type", above[0]), labelled.get("Name", above[1])
     parts, ids = above[-1], labelled.get("ID", above[2])

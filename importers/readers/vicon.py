@@ -7,6 +7,7 @@ name, then the rate in Hz, a row with the name of each marker ("subject:marker")
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 
 from wingfit.importers.numbers import Layout, positive_of, read_samples
@@ -18,6 +19,7 @@ from wingfit.records.errors import fail
 _SECTION = "Trajectories"
 _OTHERS = ("Devices", "Joints", "Model Outputs", "Segments", "Events")
 _FIXED = 2  # columns before the first marker
+_DERIVATIVE = re.compile(r"[XYZ]['’]{1,2}")  # velocities and accelerations
 
 
 def recognises(source: Source) -> bool:
@@ -52,6 +54,8 @@ def read(source: Source, given: Given) -> Raw:
     layout = _layout(source, names, axes, axes_line)
     samples = read_samples(_section(rows), layout, source, given.decimal)
     remarks = [f"not imported: section {name}" for name in others]
+    if len(layout.names) > _FIXED + 3 * len(layout.labels):
+        remarks.append("not imported: velocities and accelerations")
     raw = raw_of(layout, samples, first=1, remarks=remarks)
     raw.rates = [
         Stated(positive_of(rate[0] if rate else "", source.at(rate_line), "Hz", given.decimal), f"line {rate_line}")
@@ -90,8 +94,12 @@ def _layout(source: Source, names: list[str], axes: list[str], line: int) -> Lay
                 )
             labels.append(label)
             columns.append((index, index + 1, index + 2))
-    if not labels:
-        raise fail(source.at(line), ", ".join(axes), "there is no marker: no X, Y, Z; export the trajectories again")
+        elif not _DERIVATIVE.fullmatch(axes[index]) and axes[index] not in ("Y", "Z"):
+            message = f"is {axes[index][:40]!r}; a column must be X, Y, Z or a derivative, X': export the file again"
+            raise fail(source.at(line, index + 1), axes[index], message)
+    if not labels or 3 * len(labels) != sum(axis in ("X", "Y", "Z") for axis in axes):
+        message = "there must be X, Y and Z of each marker; export the trajectories again"
+        raise fail(source.at(line), ", ".join(axes), message)
     return Layout(labels, columns, named, frame=0)
 
 
