@@ -36,8 +36,8 @@ def import_tracks(
         path: the file.
         unit: of positions: m, cm, mm, um, in or ft; needed if the file does not state it.
         rate_hz: frames per second; needed if the file states neither a rate nor times.
-        axes: how the axes of the file lie in the wing, such as "x aft, y out, z up"; without it, positions stay in
-            the axes of the file.
+        axes: where the axes of the file point: "x aft, y out, z up" for the wing's frame of a dataset,
+            "x nose, y right, z down" for body axes; without it, positions stay in the axes of the file.
         format: name of the format, if the content fits several.
         time_unit: of a column of times that does not state it: s, ms or us.
         decimal: "comma" if a text file has decimal commas.

@@ -32,7 +32,7 @@ class Given:
     Attributes:
         unit: of positions, a key of ``UNITS``.
         rate_hz: frames per second.
-        axes: how the axes of the file lie in the wing, such as "x aft, y out, z up".
+        axes: where the axes of the file point, such as "x aft, y out, z up" (:mod:`wingfit.importers.axes`).
         format: name of the format, where the content does not decide it.
         time_unit: of a column of times, a key of ``TIME_UNITS``.
         decimal: what separates the decimals in a text file.

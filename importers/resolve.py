@@ -18,6 +18,10 @@ from wingfit.records.errors import Faults, fail, shown
 from wingfit.records.limits import MAX_DISTANCE, MIN_FRAMES
 
 _PIXELS = "px"
+_MIRRORS = {
+    "wing": "these axes mirror: right for a left wing in a right-handed frame, wrong for a right wing",
+    "body": "these axes mirror, which is wrong unless the frame of the file is left-handed",
+}
 
 
 def resolve(raw: Raw, reader: Reader, given: Given, file: str) -> ImportedTracks:
@@ -43,9 +47,9 @@ def resolve(raw: Raw, reader: Reader, given: Given, file: str) -> ImportedTracks
     remarks = [*raw.remarks, *timing.remarks, *names.remarks]
     if axes:
         positions = axes.apply(positions)
-        statements.append(Statement("axes", f"of the wing; in the file {given.axes}", "user", "--axes"))
+        statements.append(Statement("axes", f"of the {axes.frame}; in the file {given.axes}", "user", "--axes"))
         if axes.mirrors:
-            remarks.append("these axes mirror: right for a left wing in a right-handed frame, wrong for a right wing")
+            remarks.append(_MIRRORS[axes.frame])
         if raw.up and (direction := axes.direction_of("XYZ".index(raw.up.value[1]))) != _stated_up(raw.up.value):
             remarks.append(f"the file calls {raw.up.value} up ({raw.up.where}), and --axes says it is {direction}")
     else:
@@ -58,7 +62,7 @@ def resolve(raw: Raw, reader: Reader, given: Given, file: str) -> ImportedTracks
         labels=names.labels,
         times=timing.times,
         positions=np.ascontiguousarray(positions),
-        frame="wing" if axes else "file",
+        frame=axes.frame if axes else "file",
         statements=tuple(statements),
         gaps=gaps,
         remarks=tuple(dict.fromkeys(remarks)),

@@ -63,7 +63,8 @@ class ImportedTracks:
         labels: names [M] as they are in the file.
         times: [T], s; they increase.
         positions: [T, M, 3], m; NaN (in all three coordinates) where a marker was not seen.
-        frame: "wing" if the axes are x aft, y outboard, z up; "file" if they are those of the file.
+        frame: "wing" if the axes are x aft, y outboard, z up; "body" if they are x to the nose, y right, z down; "file"
+            if they are those of the file.
         statements: the facts, each with who stated it.
         gaps: missing positions by cause.
         remarks: what else the reader should know: parts of the file that are not imported, new names, rounding.
@@ -76,7 +77,7 @@ class ImportedTracks:
     labels: tuple[str, ...]
     times: Float[Array, " T"]
     positions: Float[Array, "T M 3"]
-    frame: Literal["wing", "file"]
+    frame: Literal["wing", "body", "file"]
     statements: tuple[Statement, ...]
     gaps: Gaps
     remarks: tuple[str, ...]

@@ -26,8 +26,8 @@ def import_(
     axes: Annotated[
         str | None,
         typer.Option(
-            help="Direction of each axis of the file in the wing: 'x aft, y out, z up'; also fore, in, down. "
-            "Default: positions stay in the axes of the file."
+            help="Where each axis of the file points: 'x aft, y out, z up' (also fore, in, down) for a wing, 'x nose, "
+            "y right, z down' for body axes. Default: positions stay in the axes of the file."
         ),
     ] = None,
     output: Annotated[

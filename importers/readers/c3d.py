@@ -40,6 +40,7 @@ class _Data:
     frames: int
     first: int
     floats: bool
+    remarks: tuple[str, ...]
 
 
 def recognises(source: Source) -> bool:
@@ -62,7 +63,7 @@ def read(source: Source, given: Given) -> Raw:
     labels = _labels(parameters, data.points)
     keep, remarks = _positions_only(parameters, labels)
     lines = np.arange(1, data.frames + 1)
-    found = Raw([labels[m] for m in keep], positions[:, keep], lines, "frame", remarks=remarks)
+    found = Raw([labels[m] for m in keep], positions[:, keep], lines, "frame", remarks=[*data.remarks, *remarks])
     found.invalid = invalid[:, keep]
     found.frames, found.first = np.arange(data.first, data.first + data.frames), 1
     _state(found, parameters, float(binary.real(raw, 20)), data)
@@ -85,10 +86,11 @@ def _data(raw: bytes, binary: Binary, parameters: Parameters, floats: bool, give
             file, block, f"the data start at block {block}, beyond the end; the file is cut off: export it again"
         )
     first, stated = _stated_frames(parameters, start, end)
-    frames = _frames(stated, len(raw) - offset, size, given, file)
+    remarks = list[str]()
+    frames = _frames(stated, len(raw) - offset, size, given, file, remarks)
     check_most(file, "has", frames, MAX_ROWS, "frames", "cut the recording in parts")
     check_most(file, "has", frames * points * 3, MAX_TRACK_VALUES, "numbers", "export fewer markers")
-    return _Data(offset, points, analogue, frames, first, floats)
+    return _Data(offset, points, analogue, frames, first, floats, tuple(remarks))
 
 
 def _stated_frames(parameters: Parameters, start: int, end: int) -> tuple[int, dict[str, int]]:
@@ -110,21 +112,22 @@ def _stated_frames(parameters: Parameters, start: int, end: int) -> tuple[int, d
     return first, stated
 
 
-def _frames(stated: dict[str, int], there: int, size: int, given: Given, file: str) -> int:
+def _frames(stated: dict[str, int], there: int, size: int, given: Given, file: str, remarks: list[str]) -> int:
     """Return the count of frames of ``size`` bytes, of which ``there`` bytes are in the file.
 
     If the places that state the count disagree, the one that fits the size of the file (to a block) is right.
-    DatasetError if none fits, unless the user knows that the file is incomplete.
+    DatasetError if none fits, unless the user knows that the file is incomplete, which is added to ``remarks``.
     """
     counts = {n for n in stated.values() if n > 0}
     exact = {n for n in counts if 0 <= there - n * size < BLOCK}
     if len(exact) == 1:
         return exact.pop()
     whole = there // size
-    if given.incomplete and whole and counts:
-        return min(whole, max(counts))
     listed = ", ".join(f"{place} {n}" for place, n in stated.items())
     what = f"states {listed} frames, but has data for {whole}"
+    if given.incomplete and whole and counts:
+        remarks.append(f"the file {what}; {min(whole, max(counts))} are imported")
+        return min(whole, max(counts))
     cause = "it is cut off" if not counts or min(counts) > whole else "the counts are wrong, or the file is damaged"
     remedy = "export it again, or give --incomplete to import the frames that are stated and there"
     raise fail(file, whole, f"{what}: {cause}; {remedy}")

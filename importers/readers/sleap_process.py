@@ -47,8 +47,8 @@ def _tracks(file: Any, label: str, limits: Limits) -> tuple[list[str], Array]:
     if "tracks" not in file:
         members = ", ".join(sorted(str(name)[:40] for name in file)[:8]) or "nothing"
         message = (
-            f"is HDF5 without a variable 'tracks' (it has {members}), so no file of SLEAP; export a text format: "
-            "DeepLabCut, Anipose and DLTdv write CSV too"
+            f"is HDF5 without a variable 'tracks' (it has {members}); of a SLEAP project export the analysis file, and "
+            "from DeepLabCut, Anipose and DLTdv export CSV"
         )
         raise fail(label, members, message)
     tracks = _variable(file, "tracks", label)

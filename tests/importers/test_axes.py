@@ -28,11 +28,36 @@ def test_axes_in_words(text: str, expected: list[float], mirrors: bool) -> None:
 
 @pytest.mark.parametrize(
     "text",
-    ["", "x aft", "x aft, y aft, z up", "x aft, x out, z up", "x aft, y fore, z up", "x left, y out, z up", "a b c"],
+    [
+        "",
+        "x aft",
+        "x aft, y aft, z up",
+        "x aft, x out, z up",
+        "x aft, y fore, z up",
+        "x left, y out, z up",
+        "x near, y out, z up",
+        "a b c",
+    ],
 )
 def test_what_is_no_permutation_is_refused_with_an_example(text: str) -> None:
     with pytest.raises(DatasetError, match="x aft, y out, z up"):
         read_axes(text)
+
+
+@pytest.mark.parametrize(
+    ("text", "expected", "mirrors"),
+    [
+        ("x nose, y right, z down", [1, 2, 3], False),
+        ("x nose, y left, z up", [1, -2, -3], False),
+        ("x right, y fore, z up", [2, 1, -3], False),
+        ("x right, y fore, z down", [2, 1, 3], True),
+    ],
+)
+def test_left_and_right_give_body_axes(text: str, expected: list[float], mirrors: bool) -> None:
+    axes = read_axes(text)
+    assert axes.frame == "body"
+    assert axes.apply(np.array([[[1.0, 2.0, 3.0]]]))[0, 0].tolist() == expected
+    assert axes.mirrors == mirrors
 
 
 def test_every_permutation_keeps_lengths() -> None:

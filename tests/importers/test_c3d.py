@@ -67,3 +67,13 @@ def test_not_a_number_is_a_gap() -> None:
     found = read(patched(start, struct.pack("<f", np.nan)))
     assert (found.gaps.partial, found.gaps.nan) == (1, 0)
     assert found.gaps.residual == read(WHOLE).gaps.residual
+
+
+def test_a_file_that_is_known_to_be_incomplete_is_read_as_far_as_it_goes() -> None:
+    data = 512 * (1 + WHOLE[512 + 2])
+    found = read(WHOLE[: data + 40 * 64 + 7], incomplete=True)
+    assert len(found.times) == 40
+    assert any("states the header 60 frames, but has data for 40" in remark for remark in found.remarks)
+    shorter = patched(8, struct.pack("<H", 45))
+    assert "states the header 45 frames, but has data for 64" in refused(shorter)
+    assert len(read(shorter, incomplete=True).times) == 45

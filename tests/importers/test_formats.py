@@ -135,3 +135,21 @@ def test_rows_of_qualisys_may_end_with_a_tab(times: bool, tab: bool) -> None:
     found = read(content, unit="mm")
     assert np.allclose(found.positions * 1e3, truth.mm, atol=1e-9, equal_nan=True)
     assert (found.statement("times") is not None) == times
+
+
+def test_names_above_the_columns_must_fit_them() -> None:
+    content = text_writers.motive(flapping())
+    assert "describes" in refused(content.replace(",Marker", "", 1))
+    vicon = text_writers.vicon(flapping(), devices=False)
+    assert "is 'Q'; a column must be X, Y, Z" in refused(vicon.replace("Frame,X,Y,Z,X", "Frame,X,Y,Z,Q"))
+    assert "side by side" in refused(vicon.replace("Frame,X,Y,Z", "Frame,X,Z,Y"))
+    assert "the units m, mm differ" in refused(vicon.replace(",,mm", ",,m"))
+
+
+def test_velocities_of_vicon_are_not_imported() -> None:
+    truth = with_names("tip")
+    rows = [f"{t + 1},0,{x:.3f},{y:.3f},{z:.3f},0,0,0\n" for t, (x, y, z) in enumerate(truth.mm[:, 0])]
+    head = "Trajectories\n240\n,,tip,,,,,\nFrame,Sub Frame,X,Y,Z,X',Y',Z'\n,,mm,mm,mm,mm/s,mm/s,mm/s\n"
+    found = read(head + "".join(rows))
+    assert np.allclose(found.positions * 1e3, truth.mm, atol=1e-9)
+    assert "not imported: velocities and accelerations" in found.remarks

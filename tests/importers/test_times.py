@@ -20,6 +20,8 @@ def test_printed_times_that_are_rounded_follow_the_rate() -> None:
 def test_rounded_times_without_a_rate_are_as_printed() -> None:
     found = read(table().replace("0.01,", "0.012,"))
     assert found.times[1] == 0.012
+    assert "times are not evenly spaced: 8 to 12 ms apart" in found.remarks
+    assert not any("evenly" in remark for remark in read(table()).remarks)
 
 
 def test_a_rate_that_contradicts_the_times_of_the_file_is_refused_from_either_side() -> None:
