@@ -11,7 +11,7 @@ The contract of :func:`import_tracks`:
   result says which of the two it has. No format states how a wing lies.
 - **A format is recognised by its content**, never by the file's name. If two formats fit, the user must choose.
 - **Every bad file gives a DatasetError** with place (line and column where there are any), value, limit, unit and
-  remedy, whatever its bytes are. Sizes are checked before memory is allocated (:mod:`wingfit.records.limits`), and
+  remedy, whatever its bytes are. Sizes are checked before memory is allocated (:mod:`wingfit.importers.limits`), and
   HDF5 is read in a separate process, because damaged HDF5 can make its library loop or crash.
 - **Tracks of one camera**, in pixels, are recognised and refused: they must be triangulated first.
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from os import PathLike
 from pathlib import Path
 
+from wingfit.importers.limits import MAX_TRACK_FILE_BYTES
 from wingfit.importers.options import Decimal, Given
 from wingfit.importers.readers import READERS
 from wingfit.importers.recognise import recognise
@@ -12,7 +13,7 @@ from wingfit.importers.resolve import resolve
 from wingfit.importers.source import open_source
 from wingfit.importers.tracks import ImportedTracks
 from wingfit.records.errors import check_most, fail
-from wingfit.records.limits import MAX_TRACK_FILE_BYTES, MIB
+from wingfit.records.limits import MIB
 
 
 def import_tracks(

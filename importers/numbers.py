@@ -14,11 +14,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wingfit.importers.limits import MAX_TRACK_VALUES
 from wingfit.importers.options import Decimal
 from wingfit.importers.source import SEPARATORS, Row, Source
 from wingfit.records.array_types import Array, Float, Index, Int
 from wingfit.records.errors import Faults, check_most, fail, shown
-from wingfit.records.limits import MAX_MARKERS, MAX_ROWS, MAX_TRACK_VALUES
+from wingfit.records.limits import MAX_MARKERS, MAX_ROWS
 
 EMPTY = math.nan
 WORD = math.copysign(math.nan, -1.0)

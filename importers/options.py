@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, get_args
 
+from wingfit.importers.limits import MAX_RATE, MIN_RATE
 from wingfit.records.errors import Faults, fail, nearest, shown
-from wingfit.records.limits import MAX_RATE, MIN_RATE
 
 # Metres are value x numerator / denominator: one rounding, or two for feet and inches.
 UNITS = {"m": (1, 1), "cm": (1, 100), "mm": (1, 1000), "um": (1, 1_000_000), "in": (254, 10_000), "ft": (3048, 10_000)}

@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from wingfit.importers.axes import EXAMPLE, read_axes
+from wingfit.importers.limits import MAX_DISTANCE
 from wingfit.importers.markers import Names, names_of
 from wingfit.importers.options import UNITS, Given, unit_of
 from wingfit.importers.raw import Raw, Reader
@@ -15,7 +16,7 @@ from wingfit.importers.times import resolve_times
 from wingfit.importers.tracks import Gaps, ImportedTracks, Statement
 from wingfit.records.array_types import Array, Mask
 from wingfit.records.errors import Faults, fail, shown
-from wingfit.records.limits import MAX_DISTANCE, MIN_FRAMES
+from wingfit.records.limits import MIN_FRAMES
 
 _PIXELS = "px"
 _MIRRORS = {

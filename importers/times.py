@@ -6,12 +6,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from wingfit.importers.limits import MAX_RATE, MIN_RATE
 from wingfit.importers.options import TIME_UNITS, Given
 from wingfit.importers.raw import Raw, Stated
 from wingfit.importers.tracks import Statement
 from wingfit.records.array_types import Array, Float
 from wingfit.records.errors import DatasetError, Faults, fail
-from wingfit.records.limits import MAX_RATE, MIN_RATE
 
 _SAME_RATE = 1e-4  # relative: "119.88" and 119.8801 are the same rate, 119.88 and 120 are not
 _MOST_DECIMALS = 9

@@ -32,10 +32,6 @@ MAX_UPLOADED_NETCDF_VALUES = 8_000_000
 MAX_NAME_BYTES = 1024  # length of the type of fixed-length texts in NetCDF, which every text occupies in memory
 MAX_CHUNK_BYTES = 64 * MIB  # size of one chunk of a NetCDF variable, unpacked
 MAX_ERRORS = 20  # errors in one report
-MAX_TRACK_FILE_BYTES = 256 * MIB  # size of a file of a motion-capture system or digitiser
-MAX_TRACK_VALUES = 16_000_000  # numbers in such a file that are read, 8 bytes each, about three times in memory
-MAX_DISTANCE = 10_000.0  # of a marker from the origin of its frame, m; beyond, the unit or the file is wrong
-MIN_RATE, MAX_RATE = 1e-3, 1e7  # frames per second of a camera
 PLANFORM_MARGIN = 0.01  # largest distance of a marker at rest from the planform, m
 # Largest plausible median distance of markers from the hinge, in spans; beyond, the unit is not metres.
 IMPLAUSIBLE_SPANS = 1.5

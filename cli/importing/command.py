@@ -130,5 +130,7 @@ def _read(files: list[Path], given: Given) -> list[ImportedTracks]:
         except DatasetError as error:
             faults += [vars(fault) for fault in error.errors if vars(fault) not in faults]
     if faults:
-        raise WingfitError("no tracks were imported", f"{len(faults)} errors", errors=faults)
+        raise WingfitError(
+            "no tracks were imported", f"{len(faults)} error{'s' if len(faults) > 1 else ''}", errors=faults
+        )
     return found

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wingfit.importers.limits import MAX_TRACK_VALUES
 from wingfit.importers.numbers import WORD
 from wingfit.importers.options import Given
 from wingfit.importers.raw import Raw, Reader, Stated
@@ -22,7 +23,7 @@ from wingfit.importers.readers.c3d_parameters import Binary, Parameters, read_pa
 from wingfit.importers.source import Source
 from wingfit.records.array_types import Array, Mask
 from wingfit.records.errors import check_most, fail
-from wingfit.records.limits import MAX_MARKERS, MAX_ROWS, MAX_TRACK_VALUES
+from wingfit.records.limits import MAX_MARKERS, MAX_ROWS
 
 BLOCK = 512
 _KEY = 0x50

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from wingfit.importers.limits import MAX_TRACK_VALUES
 from wingfit.importers.numbers import EMPTY, count_of, number_of
 from wingfit.importers.options import Given
 from wingfit.importers.raw import Raw, Reader
@@ -16,7 +17,7 @@ from wingfit.importers.readers.dltdv import RATE_HINT, UNIT_HINT
 from wingfit.importers.source import Source
 from wingfit.records.array_types import Array, Index
 from wingfit.records.errors import Faults, check_most, fail
-from wingfit.records.limits import MAX_MARKERS, MAX_ROWS, MAX_TRACK_VALUES
+from wingfit.records.limits import MAX_MARKERS, MAX_ROWS
 
 
 def recognises(source: Source) -> bool:

@@ -14,13 +14,14 @@ import json
 
 import numpy as np
 
+from wingfit.importers.limits import MAX_TRACK_VALUES
 from wingfit.importers.numbers import WORD
 from wingfit.importers.options import Given
 from wingfit.importers.raw import Raw, Reader
 from wingfit.importers.source import Source
 from wingfit.records.errors import check_most, fail
 from wingfit.records.files.confined import Limits, ReaderError, read_confined
-from wingfit.records.limits import MAX_MARKERS, MAX_ROWS, MAX_TRACK_VALUES, MIB
+from wingfit.records.limits import MAX_MARKERS, MAX_ROWS, MIB
 
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 _DAMAGED = "the file may be damaged: export it again"
