@@ -8,8 +8,9 @@ import io
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import count
 
-from wingfit.records.errors import fail
+from wingfit.records.errors import check_most, fail
 
 HEAD_BYTES = 2**20  # of the text from which a format is recognised
 HEAD_LINES = 60
@@ -18,7 +19,7 @@ SEPARATORS = {"\t": "tabs", ";": "semicolons", ",": "commas"}
 MAX_CELLS = 20_000  # in a line: more than 1000 markers with all that programs write about them
 _CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f]")
 _LINE_END = re.compile(r"\r\n|\n|\r")
-_MAX_CELL_TEXT = 2**16  # characters; longer ones are no cells of a table of tracks
+_MAX_LINE = 2**20  # characters
 
 Row = tuple[int, list[str]]
 
@@ -51,17 +52,24 @@ class Source:
             row = []
         return [cell.strip() for cell in row]
 
+    def _lines(self) -> Iterator[str]:
+        """Yield the lines of the text with their ends; DatasetError for one that is too long for the memory."""
+        stream = io.TextIOWrapper(io.BytesIO(self.raw), self.encoding or "utf-8", newline="")
+        for line in count(1):
+            text = stream.readline(_MAX_LINE + 1)
+            if not text:
+                return
+            if len(text) > _MAX_LINE:
+                check_most(self.at(line), "has more than", len(text), _MAX_LINE, "characters", "export fewer markers")
+            yield text
+
     def rows(self, separator: str, start: int = 1) -> Iterator[Row]:
         """Yield (line from 1, cells) of each line from ``start`` on; DatasetError for text that is no table."""
-        csv.field_size_limit(_MAX_CELL_TEXT)
-        stream = io.TextIOWrapper(io.BytesIO(self.raw), self.encoding or "utf-8", newline="")
-        reader, line = csv.reader(stream, delimiter=separator, strict=True), 0
+        reader, line = csv.reader(self._lines(), delimiter=separator, strict=True), 0
         try:
             for row in reader:
                 line = reader.line_num
-                if len(row) > MAX_CELLS:
-                    message = f"has {len(row)} cells; at most {MAX_CELLS} are read: export fewer markers"
-                    raise fail(self.at(line), len(row), message)
+                check_most(self.at(line), "has", len(row), MAX_CELLS, "cells", "export fewer markers")
                 if line >= start:
                     yield line, row
         except csv.Error as error:
@@ -84,6 +92,9 @@ def open_source(raw: bytes, file: str) -> Source:
     if _CONTROL.search("".join(lines[:HEAD_LINES])):
         return Source(raw, file, None, ())
     _check_encoding(raw, encoding, file)
+    for number, line in enumerate(lines[:HEAD_LINES], 1):
+        cells = 1 + max(map(line.count, SEPARATORS))
+        check_most(f"{file}, line {number}", "has", cells, MAX_CELLS, "cells", "export fewer markers")
     return Source(raw, file, encoding, tuple(lines[:HEAD_LINES]))
 
 

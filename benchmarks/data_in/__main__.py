@@ -36,7 +36,7 @@ from wingfit.records import DatasetError
 
 MISLEADING = "recording.dat"  # a name from which no format follows
 SEEDS, MUTATIONS = 6, 1500
-SLOW_S = 20.0
+SLOW_S = 60.0
 SLEAP_SHARE = 0.04  # of the changed files: each starts a process
 
 

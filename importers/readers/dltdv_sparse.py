@@ -59,12 +59,13 @@ def _matrix(source: Source, rows: int, width: int, count: int, given: Given) -> 
             matrix[row, column], filled[row, column], found = value, True, found + 1
         except ValueError as error:
             faults.add(source.at(line), None, str(error))
-        if faults.full:
+        if faults.full or found > count:
             break
     faults.raise_any()
     if found != count:
-        message = f"{found} values follow, but line 2 states {count}; the file is cut off: export it again"
-        raise fail(source.file, found, message)
+        cause = "the file is cut off" if found < count else "the file was edited"
+        which = f"{found} values follow" if found < count else f"more than {count} values follow"
+        raise fail(source.file, found, f"{which}, but line 2 states {count}; {cause}: export it again")
     return matrix, np.arange(1, rows + 1)
 
 

@@ -34,6 +34,7 @@ _FRAME = re.compile(r"(?:frame|frames|fnum|frame[\s_]?(?:no|nr|number|index|idx)
 _TIME_UNITS = {"seconds": "s", "sec": "s", "s": "s", "ms": "ms", "us": "us", "µs": "us"}
 _EXAMPLE = "time=t; tip=a,b,c; root=d,e,f"
 _LISTED = 6
+_LONGEST = 200  # characters in the name of a column; matching longer ones takes long
 ONLY_MARKER = "marker"
 
 
@@ -114,7 +115,7 @@ def _by_name(source: Source, header: list[str], line: int) -> _Found:
         if _special(found, name, index, source.at(line, index + 1), faults):
             continue
         for kind, pattern in enumerate(_PATTERNS):
-            match = pattern.fullmatch(name)
+            match = pattern.fullmatch(name) if len(name) <= _LONGEST else None
             if match:
                 axis = match["axis"].lower().translate(str.maketrans("123", "xyz"))
                 key = (kind, match["marker"] or ONLY_MARKER, (match["unit"] or "").lower())

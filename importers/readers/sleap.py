@@ -28,8 +28,8 @@ _DAMAGED = "the file may be damaged: export it again"
 _LIMITS = Limits(
     values=MAX_TRACK_VALUES,
     memory_mib=512,
-    processor_s=30,
-    wall_s=90,
+    processor_s=15,
+    wall_s=60,
     output_mib=16 + MAX_TRACK_VALUES * 8 // MIB,
 )
 

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import time
+from pathlib import Path
+
 import pytest
 
 from tests.importers.reading import read, refused, table
 from tests.oracles.track_files import flapping, text_writers
+from wingfit import DatasetError, import_tracks
 
 
 @pytest.mark.parametrize(
@@ -127,6 +131,27 @@ def test_a_position_that_is_too_far_away_is_refused() -> None:
 def test_options_with_wrong_values_are_listed_at_once() -> None:
     message = refused(table(), unit="furlong", time_unit="h", format="xls", decimal="dot")
     assert all(option in message for option in ("--unit", "--time-unit", "--format", "--decimal"))
+
+
+def test_a_file_that_is_too_large_is_refused_before_it_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "large.csv"
+    with path.open("wb") as file:
+        file.truncate(300 * 2**20)
+    with pytest.raises(DatasetError, match=r"has 300 MiB; at most 256 MiB"):
+        import_tracks(path)
+    with pytest.raises(DatasetError, match="is a folder"):
+        import_tracks(tmp_path)
+    with pytest.raises(DatasetError, match="cannot be read: No such file"):
+        import_tracks(tmp_path / "none.csv")
+
+
+def test_what_a_hostile_text_can_cost_is_limited() -> None:
+    started = time.monotonic()
+    assert "at most 20000 cells" in refused("a," * 400_000)
+    assert "characters" in refused(table() + " " * 2_000_000 + ",1\n")
+    assert "no columns of markers" in refused("_" * 100_000 + "x," + "-" * 100_000 + "\n1,2\n")
+    assert "stray quotes" in refused(table() + '"' + "1\n" * 200_000)
+    assert time.monotonic() - started < 5
 
 
 def test_sizes_are_limited() -> None:
