@@ -30,6 +30,7 @@ _WORDS = {"nan", "na", "n/a", "null", "none", "nil", "-", "--", "missing", "#n/a
 # What C libraries print for "not a number": nan(ind), -nan(snan), 1.#QNAN0, -1.#IND00.
 _WORD = re.compile(r"[-+]?(?:nan(?:\([\w ]*\))?|1[.,]#(?:qnan|snan|ind|nan)[0-9]*)", re.IGNORECASE)
 _INFINITE = re.compile(r"[-+]?(?:inf(?:inity)?|∞|1[.,]#inf[0-9]*)", re.IGNORECASE)
+_OTHER = re.compile(r"[^0-9eE+\-., ]")  # characters with which float accepts what is no number of a table: 1_0, inf
 _MAX_LENGTH = 400
 
 
@@ -126,6 +127,9 @@ def _row(
     decimal: Decimal,
     faults: Faults,
 ) -> list[float]:
+    fast = _fast(cells, wanted) if decimal == "point" else None
+    if fast is not None:
+        return fast
     numbers = []
     for column in wanted:
         try:
@@ -135,6 +139,18 @@ def _row(
             faults.add(source.at(line, name), cells[column], str(error))
             numbers.append(math.nan)
     return numbers
+
+
+def _fast(cells: list[str], wanted: list[int]) -> list[float] | None:
+    """Return the numbers of a row in which ``float`` alone can decide; None for any other row."""
+    texts = [cells[column] for column in wanted]
+    if _OTHER.search(",".join(texts)):
+        return None
+    try:
+        numbers = [float(text) if text else EMPTY for text in texts]
+    except ValueError:
+        return None
+    return None if math.inf in numbers or -math.inf in numbers else numbers
 
 
 def number_of(cell: str, decimal: Decimal = "point") -> float:
