@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, get_args
 
+from wingfit.importers.axes import read_axes
 from wingfit.importers.limits import MAX_RATE, MIN_RATE
-from wingfit.records.errors import Faults, fail, nearest, shown
+from wingfit.records.errors import DatasetError, Faults, fail, nearest, shown
 
 # Metres are value x numerator / denominator: one rounding, or two for feet and inches.
 UNITS = {"m": (1, 1), "cm": (1, 100), "mm": (1, 1000), "um": (1, 1_000_000), "in": (254, 10_000), "ft": (3048, 10_000)}
@@ -65,6 +66,11 @@ class Given:
         if self.rate_hz is not None and not MIN_RATE <= self.rate_hz <= MAX_RATE:
             limits = f"it must lie in [{MIN_RATE:g}, {MAX_RATE:g}] Hz"
             faults.add("--rate-hz", self.rate_hz, f"is {self.rate_hz:g} Hz; {limits}: give frames per second")
+        if self.axes is not None:
+            try:
+                read_axes(self.axes)
+            except DatasetError as error:
+                faults.extend(error)
         faults.raise_any()
 
 

@@ -32,7 +32,7 @@ def resolve(raw: Raw, reader: Reader, given: Given, file: str) -> ImportedTracks
     unit = _unit(raw, given, file, faults)
     timing = resolve_times(raw, given, file, faults)
     faults.raise_any()
-    if unit is None or timing is None:  # pragma: no cover  # both have added a fault
+    if unit is None or timing is None:
         raise fail(file, None, "unit and rate are missing")
     names = names_of(raw.labels, file, keep_unlabelled=given.keep_unlabelled)
     invalid = None if raw.invalid is None else raw.invalid[:, names.keep]
@@ -41,7 +41,7 @@ def resolve(raw: Raw, reader: Reader, given: Given, file: str) -> ImportedTracks
     positions = positions * numerator / denominator
     _check_distance(positions, raw, names, unit, file)
     names, positions = _seen(names, positions, file)
-    axes = read_axes(given.axes) if given.axes else None
+    axes = None if given.axes is None else read_axes(given.axes)
     statements = [unit, *timing.statements]
     if raw.up:
         statements.append(Statement("up", raw.up.value, "file", raw.up.where))

@@ -1,4 +1,4 @@
-"""C3D files that are cut off: how many are read as if they were whole, here and by ezc3d."""
+"""C3D files that are cut off: how many are read without a word about missing frames, here and by ezc3d."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from wingfit.records import DatasetError
 FILES = 100
 
 
-def read_as_whole() -> dict[str, int | None]:
+def read_without_a_word() -> dict[str, int | None]:
     """Return counts of the files that are read; those of ezc3d are None where it is not installed."""
     whole, dice = by_hand(flapping(frames=600)), random.Random(5)  # noqa: S311  # no secret
     # The padding at the end, up to a block of 512 bytes, may be missing.

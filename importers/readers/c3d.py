@@ -5,8 +5,8 @@ each frame x, y, z and a fourth word for each point, and analogue samples. The n
 POINT:SCALE, or 32-bit floats if that scale is negative. A negative fourth word marks a point as invalid. POINT:UNITS,
 POINT:RATE and, for the vertical axis of the screen, POINT:Y_SCREEN are stated in the file.
 
-The reader is our own because a library that reads a file which is cut off as if it were whole cannot be used here
-(docs/decisions/0023-importers.md); it is tested against that library on files that are whole.
+The reader is our own because a file that is cut off must be refused, and untrusted bytes must meet memory-safe code
+(docs/decisions/0023-importers.md). It is tested against another library, ezc3d.
 """
 
 from __future__ import annotations

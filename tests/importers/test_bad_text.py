@@ -129,8 +129,8 @@ def test_a_position_that_is_too_far_away_is_refused() -> None:
 
 
 def test_options_with_wrong_values_are_listed_at_once() -> None:
-    message = refused(table(), unit="furlong", time_unit="h", format="xls", decimal="dot")
-    assert all(option in message for option in ("--unit", "--time-unit", "--format", "--decimal"))
+    message = refused(table(), unit="furlong", time_unit="h", format="xls", decimal="dot", axes="up")
+    assert all(option in message for option in ("--unit", "--time-unit", "--format", "--decimal", "--axes"))
 
 
 def test_a_file_that_is_too_large_is_refused_before_it_is_read(tmp_path: Path) -> None:
