@@ -10,6 +10,7 @@ import pytest
 from tests.importers.reading import read, refused, table
 from tests.oracles.track_files import flapping, text_writers
 from wingfit import DatasetError, import_tracks
+from wingfit.importers import numbers
 
 
 @pytest.mark.parametrize(
@@ -154,8 +155,11 @@ def test_what_a_hostile_text_can_cost_is_limited() -> None:
     assert time.monotonic() - started < 5
 
 
-def test_sizes_are_limited() -> None:
-    assert "200000 frames" in refused("x,y,z\n" + "1,2,3\n" * 200_001, unit="m", rate_hz=1)
+def test_sizes_are_limited(monkeypatch: pytest.MonkeyPatch) -> None:
+    with monkeypatch.context() as lower:
+        lower.setattr(numbers, "MAX_ROWS", 1000)
+        assert "at most 1000 frames" in refused("x,y,z\n" + "1,2,3\n" * 1001, unit="m", rate_hz=1)
+        assert len(read("x,y,z\n" + "1,2,3\n" * 1000, unit="m", rate_hz=1).times) == 1000
     wide = ",".join(f"m{k}_{axis}_m" for k in range(1001) for axis in "xyz")
     assert "at most 1000 markers" in refused(f"{wide}\n1,2,3\n", rate_hz=1)
     assert "at most 20000" in refused(table() + "1," * 20_001 + "\n")

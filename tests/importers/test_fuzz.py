@@ -6,7 +6,7 @@ from tests.oracles.track_files import fuzz
 
 
 def test_damaged_files_never_crash() -> None:
-    outcomes, crashes = fuzz(300, 11, None)
+    outcomes, crashes = fuzz(150, 11, None)
     assert not crashes, crashes[0]
-    assert outcomes["read"] > 20
-    assert outcomes["refused"] > 200
+    assert outcomes["read"] > 10
+    assert outcomes["refused"] > 100
