@@ -24,6 +24,7 @@ RUN python -c "import tomllib; print(*tomllib.load(open('pyproject.toml', 'rb'))
 
 COPY --chown=wingfit:wingfit LICENSE README.md ./
 COPY --chown=wingfit:wingfit records records
+COPY --chown=wingfit:wingfit importers importers
 COPY --chown=wingfit:wingfit tracking tracking
 COPY --chown=wingfit:wingfit sim sim
 COPY --chown=wingfit:wingfit calibration calibration

@@ -23,7 +23,7 @@ from typing import Any, NamedTuple
 
 ROOT = Path(__file__).parents[1]
 PARTS = (
-    "records", "tracking", "sim", "inference", "calibration", "diagnosis", "report", "workers", "service",
+    "records", "importers", "tracking", "sim", "inference", "calibration", "diagnosis", "report", "workers", "service",
     "client", "cli",
 )  # fmt: skip
 PRODUCT = (*PARTS, "wingfit")

@@ -10,10 +10,23 @@ import sys
 
 import typer
 
-from wingfit.cli import backup, campaigns, datasets, diagnose, driving, effects, keys, rigs, runs, serve, simulate
+from wingfit.cli import (
+    backup,
+    campaigns,
+    datasets,
+    diagnose,
+    driving,
+    effects,
+    keys,
+    rigs,
+    runs,
+    serve,
+    simulate,
+)
 from wingfit.cli.base.output import note
 from wingfit.cli.forces import free_flight, kinematics
 from wingfit.cli.forces import runs as force_runs
+from wingfit.cli.importing import command as importing
 from wingfit.client.client import WingfitError
 from wingfit.sim.requested_lanes import requested_lanes
 
@@ -29,6 +42,7 @@ app = typer.Typer(
 app.command()(serve.serve)
 app.command()(campaigns.campaign)
 app.command()(campaigns.balance)
+app.command("import")(importing.import_)
 app.command()(kinematics.kinematics)
 app.command()(free_flight.forces)
 app.add_typer(datasets.app, name="datasets")

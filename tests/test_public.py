@@ -85,6 +85,7 @@ def test_the_wheel_holds_one_package() -> None:
         "cli",
         "client",
         "diagnosis",
+        "importers",
         "records",
         "report",
         "rigs",

@@ -5,6 +5,8 @@ The names below are public and documented; everything else in the package may ch
 - :class:`Client` sends requests to a wingfit server (``wingfit serve``); it raises :class:`WingfitError`.
 - :func:`load_dataset` reads recordings from a folder, a zip file of a folder, or NetCDF. If they are not valid, it
 raises :class:`DatasetError`, which lists what is wrong.
+- :func:`import_tracks` reads marker tracks from the files of motion-capture systems and digitisers, and returns
+:class:`ImportedTracks`.
 - :func:`calibrate` estimates the genes of a model in this process, without a server; :func:`diagnose` reports which
 physics the model is missing.
 - :func:`drive` simulates a rig of the user's own for a job on a server, which knows only its :func:`declaration`.
@@ -30,6 +32,7 @@ if TYPE_CHECKING:
     from wingfit.client.transport import ServerAwayError, WingfitError
     from wingfit.diagnosis.finding import Finding
     from wingfit.diagnosis.spec import DiagnosisSpec
+    from wingfit.importers import ImportedTracks, import_tracks
     from wingfit.records import (
         Channel,
         Condition,
@@ -64,6 +67,7 @@ __all__ = [
     "Gene",
     "GeneResult",
     "Genome",
+    "ImportedTracks",
     "Port",
     "Quantity",
     "Recording",
@@ -84,6 +88,7 @@ __all__ = [
     "drive",
     "finding_json",
     "html",
+    "import_tracks",
     "load_dataset",
     "save_dataset",
 ]
@@ -99,6 +104,7 @@ _MODULES = {
     "wingfit.client.transport": ("ServerAwayError", "WingfitError"),
     "wingfit.diagnosis.finding": ("Finding",),
     "wingfit.diagnosis.spec": ("DiagnosisSpec",),
+    "wingfit.importers": ("ImportedTracks", "import_tracks"),
     "wingfit.records": (
         "Channel",
         "Condition",

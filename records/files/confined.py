@@ -1,4 +1,4 @@
-"""Reads an untrusted NetCDF file in a separate process, with limits of memory, processor time and wall time.
+"""Reads an untrusted NetCDF or other HDF5 file in a separate process, with limits of memory and time.
 
 A damaged file can make the HDF5 library loop, crash or allocate gigabytes; then only the separate process ends. Each
 file is read by a new process, so that a file cannot affect the next one. The process returns the dataset in the
@@ -23,10 +23,10 @@ import subprocess
 import sys
 import tempfile
 import traceback
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import IO, Any, NoReturn
+from typing import IO, Any, BinaryIO, NoReturn
 
 from wingfit.records.errors import DatasetError, Fault, fail
 from wingfit.records.limits import MAX_UPLOADED_NETCDF_VALUES, MAX_VALUES, MIB
@@ -40,8 +40,12 @@ DISK_FULL = (errno.ENOSPC, errno.EDQUOT)
 ENVIRONMENT = ("PATH", "LANG", "LC_ALL", "TMPDIR", "LD_LIBRARY_PATH", "DYLD_LIBRARY_PATH")
 MAX_FAULTS_BYTES, MAX_TRACE_BYTES = 64 * 2**10, 4000
 
-REWRITE = "the file may be damaged: write it again, or upload a zip"
+MODULE = "wingfit.records.files.confined"
+UPLOAD = "the file may be damaged: write it again, or upload a zip"
 LOG = logging.getLogger("wingfit")
+
+
+Convert = Callable[[BinaryIO, BinaryIO, str, "Limits"], None]  # (file, output, label, limits)
 
 
 class ReaderError(RuntimeError):
@@ -96,25 +100,33 @@ def convert_netcdf(data: bytes, label: str, limits: Limits | None = None) -> byt
     the errors of the file. OSError if the temporary folder is full or no process can be started; ReaderError if the
     process failed before it read the file, or was killed by the system.
     """
-    limits = limits or limits_of_upload(len(data))
+    return read_confined(MODULE, data, label, limits or limits_of_upload(len(data)), UPLOAD)
+
+
+def read_confined(module: str, data: bytes, label: str, limits: Limits, rewrite: str) -> bytes:
+    """Return what ``python -m module`` writes for the file ``data``, in a separate process within the ``limits``.
+
+    The module calls :func:`confine`. ``label`` names the file in messages, and ``rewrite`` is their remedy for a
+    damaged file. Errors as in :func:`convert_netcdf`.
+    """
     with tempfile.TemporaryFile() as source, tempfile.TemporaryFile() as output, tempfile.TemporaryFile() as log:
         source.write(data)
         source.seek(0)
-        status = _run((source, output, log), label, limits)
+        status = _run(module, (source, output, log), label, limits)
         output.seek(0)
         if status == FAULTS:
-            raise _faults(output.read(MAX_FAULTS_BYTES), label)
+            raise _faults(output.read(MAX_FAULTS_BYTES), label, rewrite)
         if status:
             log.seek(0)
-            LOG.warning("%r cannot be read as NetCDF (status %d): %r", label, status, log.read(MAX_TRACE_BYTES))
-            raise _failure(status, label, limits)
+            LOG.warning("%r cannot be read as HDF5 (status %d): %r", label, status, log.read(MAX_TRACE_BYTES))
+            raise _failure(status, label, limits, rewrite)
         return output.read(limits.output_mib * MIB)
 
 
-def _run(streams: tuple[IO[bytes], IO[bytes], IO[bytes]], label: str, limits: Limits) -> int:
-    """Run the reading process on ``streams`` (input, output, errors); return its exit status, or minus its signal."""
+def _run(module: str, streams: tuple[IO[bytes], IO[bytes], IO[bytes]], label: str, limits: Limits) -> int:
+    """Run ``module`` on ``streams`` (input, output, errors); return its exit status, or minus its signal."""
     options = json.dumps({"label": label, "limits": asdict(limits)})
-    command = [sys.executable, "-P", "-m", "wingfit.records.files.confined", options]
+    command = [sys.executable, "-P", "-m", module, options]
     # Only the necessary part of the server's environment, which may contain secrets.
     environment = {name: os.environ[name] for name in ENVIRONMENT if name in os.environ} | {
         "PYTHONPATH": os.pathsep.join(filter(None, sys.path)),
@@ -134,32 +146,32 @@ def _run(streams: tuple[IO[bytes], IO[bytes], IO[bytes]], label: str, limits: Li
         child.wait()
 
 
-def _failure(status: int, label: str, limits: Limits) -> Exception:
+def _failure(status: int, label: str, limits: Limits, rewrite: str) -> Exception:
     """Return the error to raise for a reading process that ended with ``status`` and no output."""
     if status in DISK_FULL:
         return OSError(status, os.strerror(status))
     if status == NOT_STARTED:
-        return ReaderError("the process that reads NetCDF files cannot start; see the log of the server")
+        return ReaderError("the process that reads HDF5 files cannot start; see the log of the server")
     if status == -signal.SIGKILL:
         return ReaderError("the system ended the process that read the file, probably for want of memory; try later")
     what = f"signal {-status}" if status < 0 else f"exit status {status}"
     processor = f"takes more than {limits.processor_s} s of processor time to read"
     causes = {
-        -signal.SIGXCPU: f"{processor}; {REWRITE}, or write larger chunks",
-        -signal.SIGALRM: f"was not read within {limits.wall_s} s; {REWRITE}, or try again when the server is less busy",
+        -signal.SIGXCPU: f"{processor}; {rewrite}, or write larger chunks",
+        -signal.SIGALRM: f"was not read within {limits.wall_s} s; {rewrite}, or try again when the server is less busy",
         -signal.SIGXFSZ: f"takes more than {limits.output_mib} MiB unpacked; split the dataset",
     }
-    return fail(label, None, causes.get(status, f"the HDF5 library fails on it ({what}); {REWRITE}"))
+    return fail(label, None, causes.get(status, f"the HDF5 library fails on it ({what}); {rewrite}"))
 
 
-def _faults(answer: bytes, label: str) -> DatasetError:
+def _faults(answer: bytes, label: str, rewrite: str) -> DatasetError:
     """Return the error with the faults that the reading process reported as JSON; not trusted, converted to text."""
     try:
         report = json.loads(answer)
         faults = [Fault(str(where), value and str(value), str(message)) for where, value, message in report["faults"]]
         return DatasetError(faults, int(report["count"]))
     except Exception:  # of any kind: the file may be malicious
-        return fail(label, None, f"the HDF5 library fails on it; {REWRITE}")
+        return fail(label, None, f"the HDF5 library fails on it; {rewrite}")
 
 
 # -- in the child ----------------------------------------------------------------------------------------
@@ -170,6 +182,26 @@ def main(arguments: Sequence[str]) -> None:
 
     ``arguments`` holds one JSON text with the label and the limits.
     """
+    confine(arguments, _netcdf, "write smaller chunks, or split the dataset")
+
+
+def _netcdf() -> Convert:
+    from wingfit.records.files.netcdf import parse_netcdf
+    from wingfit.records.files.parsed import pack
+
+    def convert(source: BinaryIO, output: BinaryIO, label: str, limits: Limits) -> None:
+        _, parsed = parse_netcdf(source, label, limits.values, storage=limits.storage)
+        pack(parsed, output)
+
+    return convert
+
+
+def confine(arguments: Sequence[str], prepare: Callable[[], Convert], smaller: str) -> None:
+    """Convert the file on standard input to standard output within limits; exit statuses as at the top.
+
+    ``arguments`` holds one JSON text with the label and the limits. ``prepare()`` imports what is needed and returns
+    the function that converts; it may raise DatasetError. ``smaller``: the remedy for a file that needs much memory.
+    """
     options = json.loads(arguments[0])
     label, limits = options["label"], Limits(**options["limits"])
     os.nice(NICENESS)
@@ -178,19 +210,15 @@ def main(arguments: Sequence[str]) -> None:
     _limit(resource.RLIMIT_CPU, limits.processor_s, 1)
     _limit(resource.RLIMIT_FSIZE, limits.output_mib * MIB)
     _limit(resource.RLIMIT_NOFILE, FILES_OPEN)
-    from wingfit.records.files.netcdf import parse_netcdf
-    from wingfit.records.files.parsed import pack
-
+    convert = prepare()
     if sys.platform == "linux":  # elsewhere the limit does not exist, or the present size is unknown
         _limit(resource.RLIMIT_AS, _address_space() + limits.memory_mib * MIB)
     try:
-        _, parsed = parse_netcdf(sys.stdin.buffer, label, limits.values, storage=limits.storage)
-        pack(parsed, sys.stdout.buffer)
+        convert(sys.stdin.buffer, sys.stdout.buffer, label, limits)
     except DatasetError as error:
         _refuse([[fault.where, fault.value, fault.message] for fault in error.errors], error.count)
     except MemoryError:
-        remedy = "write smaller chunks, or split the dataset"
-        _refuse([[label, None, f"takes more than {limits.memory_mib} MiB of memory to read; {remedy}"]], 1)
+        _refuse([[label, None, f"takes more than {limits.memory_mib} MiB of memory to read; {smaller}"]], 1)
     except OSError as error:  # of the output: those of the file are faults
         traceback.print_exc()
         sys.exit(error.errno if error.errno in DISK_FULL else READ_FAILED)

@@ -1,0 +1,217 @@
+"""A plain table with any header: comma-, semicolon- or tab-separated, one row per frame.
+
+Columns of markers are found by their names, if these end or start with an axis: tip_x, tip.X, "tip x", x_tip, tip_x_mm,
+"tip_x (mm)", tip_xyz_1. Columns x, y, z alone are one marker. With any other names, the option ``--columns`` says which
+column is what: "time=t; tip=a,b,c; root=d,e,f". A column of times is called time, t or timestamp, with its unit
+(time_s, "t (ms)") or not; a column frame counts frames. All other columns are ignored, and listed.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from wingfit.importers.numbers import Layout, number_of, read_samples, separated_by
+from wingfit.importers.options import Given, pairs_of, unit_of
+from wingfit.importers.raw import Raw, Reader, Stated, raw_of
+from wingfit.importers.source import Source, separator_of
+from wingfit.records.errors import DatasetError, Faults, fail, nearest
+
+_UNIT = r"(?:[\s_.]*[\[(]?(?P<unit>mm|cm|um|µm|m|in|ft|px)[\])]?)?"
+_PATTERNS = tuple(
+    re.compile(pattern, re.IGNORECASE)
+    for pattern in (
+        rf"(?P<marker>.+?)[\s_.:\-]*_xyz_(?P<axis>[123]){_UNIT}",
+        rf"(?P<marker>.*?[^\s_.:\-])?[\s_.:\-]*(?P<axis>[xyz]){_UNIT}",
+        rf"(?P<axis>[xyz])[\s_.:\-]+(?P<marker>.+?){_UNIT}",
+    )
+)
+_TIME = re.compile(
+    r"(?:time|times|timestamp|t|seconds|sec)(?:[\s_.]*[\[(]?(?P<unit>seconds|sec|s|ms|us|µs)[\])]?)?", re.IGNORECASE
+)
+_FRAME = re.compile(r"(?:frame|frames|fnum|frame[\s_]?(?:no|nr|number|index|idx)\.?|frame#)", re.IGNORECASE)
+_TIME_UNITS = {"seconds": "s", "sec": "s", "s": "s", "ms": "ms", "us": "us", "µs": "us"}
+_EXAMPLE = "time=t; tip=a,b,c; root=d,e,f"
+_LISTED = 6
+_LONGEST = 200  # characters in the name of a column; matching longer ones takes long
+ONLY_MARKER = "marker"
+
+
+@dataclass
+class _Found:
+    """Columns by use: ``markers`` {label: the three columns}, ``time``, ``frame``, and what their names state."""
+
+    markers: dict[str, tuple[int, int, int]] = field(default_factory=dict)
+    time: int | None = None
+    frame: int | None = None
+    time_unit: str | None = None
+    units: set[str] = field(default_factory=set)
+
+
+def recognises(source: Source) -> bool:
+    """Return whether the file is a text: a plain table is what no other reader recognises."""
+    return source.encoding is not None
+
+
+def read(source: Source, given: Given) -> Raw:
+    """Return the tracks of a plain table; DatasetError names line, column and remedy."""
+    line = next((n for n in range(1, len(source.head) + 1) if any(source.cells(n))), None)
+    if line is None:
+        raise fail(source.file, None, "the file is empty; it needs a header and rows of numbers")
+    separator = separator_of(source.head[line - 1])
+    header = source.cells(line, separator)
+    _check_header(source, header, line, separator)
+    found = _by_option(source, header, given.columns) if given.columns else _by_name(source, header, line)
+    layout = Layout([*found.markers], [*found.markers.values()], header, time=found.time, frame=found.frame)
+    keep = _row_filter(source, header, line, given.rows) if given.rows else None
+    raw = raw_of(layout, read_samples(source.rows(separator, line + 1), layout, source, given.decimal, keep))
+    if found.time is not None:
+        raw.times_where = f"column {header[found.time]!r}"
+        raw.time_unit = Stated(found.time_unit, f"line {line}, {raw.times_where}") if found.time_unit else None
+    if found.units:
+        raw.unit = Stated(found.units.pop(), f"line {line}, names of the columns")
+    used = {column for place in found.markers.values() for column in place} | {found.time, found.frame}
+    ignored = [name for index, name in enumerate(header) if index not in used and name]
+    if ignored:
+        raw.remarks.append(f"not imported: {_listed(ignored)}")
+    return raw
+
+
+def _listed(names: list[str]) -> str:
+    more = f" and {len(names) - _LISTED} more" if len(names) > _LISTED else ""
+    return f"column{'s' if len(names) > 1 else ''} {', '.join(names[:_LISTED])}{more}"
+
+
+def _check_header(source: Source, header: list[str], line: int, separator: str) -> None:
+    """Raise DatasetError if ``header`` is no row of different names."""
+    numbers = sum(_is_number(cell) for cell in header)
+    if numbers > len(header) / 2:
+        message = "holds numbers instead of names; add a header such as time_s,tip_x_m,tip_y_m,tip_z_m"
+        raise fail(source.at(line), header[0], message)
+    if len(header) == 1:
+        message = f"has one column; separate columns by commas, semicolons or tabs (here: {separated_by(separator)})"
+        raise fail(source.at(line), header[0], message)
+    faults, seen = Faults(), dict[str, int]()
+    for index, name in enumerate(header):
+        if name and name in seen:
+            faults.add(source.at(line, index + 1), name, f"column {name!r} is also column {seen[name] + 1}; rename one")
+        seen.setdefault(name, index)
+    faults.raise_any()
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        return number_of(cell) == number_of(cell)
+    except ValueError:
+        return False
+
+
+def _by_name(source: Source, header: list[str], line: int) -> _Found:
+    """Return the use of each column by its name; DatasetError says why no marker can be recognised."""
+    found, faults = _Found(), Faults()
+    groups: dict[tuple[int, str, str], dict[str, int]] = {}
+    for index, name in enumerate(header):
+        if _special(found, name, index, source.at(line, index + 1), faults):
+            continue
+        for kind, pattern in enumerate(_PATTERNS):
+            match = pattern.fullmatch(name) if len(name) <= _LONGEST else None
+            if match:
+                axis = match["axis"].lower().translate(str.maketrans("123", "xyz"))
+                key = (kind, match["marker"] or ONLY_MARKER, (match["unit"] or "").lower())
+                groups.setdefault(key, {}).setdefault(axis, index)
+    _complete(found, groups, source.at(line), faults)
+    faults.raise_any()
+    if not found.markers:
+        raise _no_marker(source, header, line, groups)
+    if len(found.units) > 1:
+        listed = ", ".join(sorted(unit or "none" for unit in found.units))
+        raise fail(source.at(line), listed, f"the columns of markers state the units {listed}; write all in one unit")
+    found.units.discard("")
+    return found
+
+
+def _special(found: _Found, name: str, index: int, where: str, faults: Faults) -> bool:
+    """Return whether ``name`` is that of a column of times or frames, which is then added to ``found``."""
+    if match := _TIME.fullmatch(name):
+        if found.time is not None:
+            faults.add(where, name, f"{name!r} is a second column of times; choose with --columns {_EXAMPLE!r}")
+        unit = match["unit"] or (name if name.lower() in ("seconds", "sec") else None)
+        found.time, found.time_unit = index, _TIME_UNITS[unit.lower()] if unit else None
+        return True
+    if _FRAME.fullmatch(name):
+        if found.frame is not None:
+            faults.add(where, name, f"{name!r} is a second column of frames; choose with --columns {_EXAMPLE!r}")
+        found.frame = index
+        return True
+    return False
+
+
+def _complete(found: _Found, groups: dict[tuple[int, str, str], dict[str, int]], where: str, faults: Faults) -> None:
+    """Add the groups that have x, y and z to ``found``; a group with two of them is a fault if others have three."""
+    used = set[int]()
+    for (_, label, unit), columns in groups.items():
+        places = set(columns.values())
+        if len(columns) == 3 and not used & places:
+            if label in found.markers:
+                faults.add(where, label, f"two markers are called {label!r}; rename the columns of one")
+            found.markers[label] = (columns["x"], columns["y"], columns["z"])
+            found.units.add(unit_of(unit) or "" if unit else "")
+            used |= places
+    for (_, label, _unit), columns in groups.items():
+        if found.markers and len(columns) == 2 and not used & set(columns.values()):
+            missing = next(axis for axis in "xyz" if axis not in columns)
+            faults.add(where, label, f"marker {label!r} has no column for {missing}; add it, or rename the two others")
+
+
+def _no_marker(
+    source: Source, header: list[str], line: int, groups: dict[tuple[int, str, str], dict[str, int]]
+) -> DatasetError:
+    flat = [label for (_, label, _), columns in groups.items() if set(columns) == {"x", "y"}]
+    if flat:
+        message = f"{flat[0]!r} has x and y but no z: tracks of one camera; triangulate first, and import 3-D tracks"
+        return fail(source.at(line), flat[0], message)
+    message = (
+        f"no columns of markers are recognised in {_listed([name for name in header if name])}; name them like "
+        f"tip_x_m,tip_y_m,tip_z_m, or say which they are: --columns {_EXAMPLE!r}"
+    )
+    return fail(source.at(line), None, message)
+
+
+def _by_option(source: Source, header: list[str], text: str) -> _Found:
+    """Return the use of the columns as the option ``--columns`` states it."""
+    found, faults = _Found(), Faults()
+    for label, value in pairs_of("--columns", text, ";", _EXAMPLE):
+        names = [name.strip() for name in value.split(",")]
+        for name in names:
+            if name not in header:
+                faults.add("--columns", name, f"{source.file} has no column {name!r}; {nearest(name, header)}")
+        if label in ("time", "frame") and len(names) == 1:
+            column = header.index(names[0]) if names[0] in header else None
+            found.time = column if label == "time" else found.time
+            found.frame = column if label == "frame" else found.frame
+            match = _TIME.fullmatch(names[0]) if label == "time" else None
+            found.time_unit = _TIME_UNITS[match["unit"].lower()] if match and match["unit"] else found.time_unit
+        elif len(names) != 3:
+            faults.add("--columns", value, f"{label!r} has {len(names)} columns; give three, those of x, y and z")
+        elif label in found.markers:
+            faults.add("--columns", label, f"names {label!r} twice; keep one")
+        elif all(name in header for name in names):
+            found.markers[label] = (header.index(names[0]), header.index(names[1]), header.index(names[2]))
+    faults.raise_any()
+    if not found.markers:
+        raise fail("--columns", text, f"names no marker; write it like {_EXAMPLE!r}")
+    return found
+
+
+def _row_filter(source: Source, header: list[str], line: int, text: str) -> Callable[[list[str]], bool]:
+    """Return a function of the cells of a row: whether they have the values that the option ``--rows`` states."""
+    wanted = []
+    for name, value in pairs_of("--rows", text, ",", "sequence=3,side=left"):
+        if name not in header:
+            raise fail("--rows", name, f"{source.at(line)} has no column {name!r}; {nearest(name, header)}")
+        wanted.append((header.index(name), value))
+    return lambda cells: all(cells[index].strip() == value for index, value in wanted)
+
+
+READER = Reader("plain", "plain table", recognises, read)

@@ -1,0 +1,95 @@
+"""``wingfit import`` as a user types it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from tests.oracles.track_files import flapping, text_writers
+from wingfit.cli.importing.command import import_
+from wingfit.client.client import WingfitError
+from wingfit.records.files.tracks import read_tracks
+from wingfit.tracking.tables import read_table
+
+Wingfit = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture
+def wingfit() -> Wingfit:
+    app = typer.Typer()
+    app.command()(import_)
+
+    def run(*words: object) -> tuple[int, str, str]:
+        result = CliRunner().invoke(app, [str(word) for word in words])
+        if isinstance(result.exception, WingfitError):
+            return 1, result.stdout, str(result.exception)
+        return result.exit_code, result.stdout, result.stderr
+
+    return run
+
+
+@pytest.fixture
+def trial(tmp_path: Path) -> Path:
+    path = tmp_path / "Flight 1.trc"
+    path.write_text(text_writers.trc(flapping()))
+    return path
+
+
+def test_it_shows_what_was_understood_and_writes_nothing_without_output(wingfit: Wingfit, trial: Path) -> None:
+    code, out, err = wingfit(trial)
+    assert code == 0
+    assert "Flight 1.trc: TRC, 4 markers, 60 frames" in out
+    assert "file: line 3, Units" in out
+    assert "nobody" in out
+    assert "--output" in err
+    assert [path.name for path in trial.parent.iterdir()] == ["Flight 1.trc"]
+
+
+def test_the_tracks_that_it_writes_are_read_by_datasets_and_kinematics(wingfit: Wingfit, trial: Path) -> None:
+    code, _, err = wingfit(trial, "--axes", "x aft, y out, z up", "-o", trial.parent / "tracks")
+    assert code == 0, err
+    raw = (trial.parent / "tracks" / "Flight_1.csv").read_bytes()
+    truth = flapping()
+    samples = read_tracks(raw, "Flight_1.csv", truth.names)
+    assert np.allclose(samples.values.reshape(truth.mm.shape) * 1e3, truth.mm, atol=1e-9, equal_nan=True)
+    kinematics = read_table(raw, "Flight_1.csv")
+    assert np.array_equal(kinematics.track("tip-2"), samples.values[:, 6:9], equal_nan=True)
+    assert np.abs(kinematics.times() - np.arange(60) / 240).max() < 1e-12
+
+
+def test_it_overwrites_only_with_force(wingfit: Wingfit, trial: Path) -> None:
+    target = trial.parent / "out.csv"
+    assert wingfit(trial, "-o", target)[0] == 0
+    code, _, err = wingfit(trial, "-o", target)
+    assert code == 2
+    assert "--force" in err
+    assert wingfit(trial, "-o", target, "--force")[0] == 0
+    assert wingfit(target, "-o", target, "--force")[0] == 2
+    assert wingfit(trial, trial, "-o", target, "--force")[0] == 2
+
+
+def test_json_has_every_marker_and_who_stated_what(wingfit: Wingfit, trial: Path) -> None:
+    code, out, _ = wingfit(trial, "--json", "-o", trial.parent / "out.csv")
+    (found,) = json.loads(out)
+    assert code == 0
+    assert found["written"] == str(trial.parent / "out.csv")
+    assert [marker["name"] for marker in found["markers"]] == list(flapping().names)
+    assert {"fact": "unit", "value": "mm", "by": "file", "where": "line 3, Units"} in found["statements"]
+    assert found["markers"][0]["largest_jump_m"] > 0
+    assert 0 < found["markers"][0]["seen"] <= 1
+
+
+def test_the_faults_of_all_files_are_listed_and_nothing_is_written(wingfit: Wingfit, trial: Path) -> None:
+    points = trial.parent / "a_xyzpts.csv"
+    points.write_text(text_writers.dltdv(flapping()))
+    code, _, message = wingfit(trial, points, trial.parent / "gone.c3d", "-o", trial.parent / "tracks")
+    assert code == 1
+    for words in ("a_xyzpts.csv: states no unit", "--rate-hz", "gone.c3d: cannot be read: No such file"):
+        assert words in message
+    assert not (trial.parent / "tracks").exists()
