@@ -202,6 +202,18 @@ def test_the_workers_do_the_computing(services: dict[str, dict[str, Any]]) -> No
     assert "data:/data" in services["api"]["volumes"]
 
 
+def test_the_image_holds_every_part_of_the_package() -> None:
+    """The folders at the top that wingfit/ links to, and wingfit/ itself; what is not copied is not sent either."""
+    parts = {"wingfit", *(link.name for link in (REPOSITORY / "wingfit").iterdir() if link.is_symlink())}
+    copied = re.findall(
+        r"^COPY --chown=wingfit:wingfit (\w+) \1$", (REPOSITORY / "Dockerfile").read_text(), re.MULTILINE
+    )
+    sent = re.findall(r"^!(\w+)$", (REPOSITORY / ".dockerignore").read_text(), re.MULTILINE)
+    assert "inference" in parts
+    assert set(copied) == parts
+    assert parts <= set(sent)
+
+
 def test_the_image_does_not_run_as_root() -> None:
     lines = (REPOSITORY / "Dockerfile").read_text().splitlines()
     users = [line for line in lines if line.startswith("USER ")]
