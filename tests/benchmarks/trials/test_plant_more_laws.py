@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from benchmarks.concealed.benches.drifting import LAWS as DRIFTS
 from benchmarks.concealed.plant.law import Parameters
 from benchmarks.concealed.plant.measurement.balance import FAULTS as BALANCE_FAULTS
 from benchmarks.concealed.plant.measurement.film import FAULTS as CAMERA_FAULTS
@@ -97,7 +98,7 @@ def alike(ours: Array, theirs: Array) -> tuple[float, float]:
 
 
 def test_every_effect_of_the_library_can_be_hidden() -> None:
-    hidden = {name: law.listed for laws in (LAWS, BALANCE_FAULTS, CAMERA_FAULTS) for name, law in laws.items()}
+    hidden = {name: law.listed for laws in (LAWS, BALANCE_FAULTS, CAMERA_FAULTS, DRIFTS) for name, law in laws.items()}
     hidden |= {name: kind.listed for name, kind in KINDS.items()}
     assert {name for name, listed in hidden.items() if listed} == set(EFFECTS)
 

@@ -51,7 +51,7 @@ def test_a_rig_that_other_processes_cannot_load_is_refused_before_any_work() -> 
 def test_only_the_simulation_that_ends_its_process_fails() -> None:
     simulations = [simulation(f"good {k}", 0.5 + 0.1 * k) for k in range(6)]
     simulations.insert(1, simulation("deadly", 3.0))
-    results, deadline = dict[str, Json](), time.monotonic() + 60.0
+    results, deadline = dict[str, Json](), time.monotonic() + 180.0
     with _Computing(_Simulator(RIG, decay_rig.dataset()), 3) as computing:
         computing.add(simulations)
         while computing.holding:

@@ -98,7 +98,7 @@ def test_a_simulation_says_the_same_of_such_a_gene_and_lists_the_known_ones_once
     assert last["message"] == "unknown gene; see those named above"
     effects = {"dataset_id": body["dataset_id"], "effects": ["one", "two"]}
     one, two = api.client.post("/v1/runs", json=effects).json()["errors"]
-    assert "there are damage" in one["message"]
+    assert "there are stiffness_drift, damage" in one["message"]
     assert two["message"] == "unknown effect 'two'; see those named above"
 
 
