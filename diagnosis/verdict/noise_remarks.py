@@ -38,10 +38,7 @@ def _stated_remarks(data: WhitenedData) -> tuple[str, ...]:
     wrong = [(one.name, fit.stated.ratio) for one, fit in each if fit.stated and not fit.stated.used]
     kinds = (
         ([one for one in wrong if one[1] > 1.0], "check the unit and that it is of single samples"),
-        (
-            [one for one in wrong if one[1] <= 1.0],
-            "something else changes from beat to beat, or it is too small",
-        ),
+        ([one for one in wrong if one[1] <= 1.0], "something else changes from beat to beat, or it is too small"),
     )
     return tuple(
         "the stated standard deviation of the noise is not used where it is far from the noise that is seen: "

@@ -15,7 +15,7 @@ from wingfit.importers.readers import (
     vicon,
 )
 
-# The plain table is what remains if no other fits, and is not asked.
+# A plain table is read if no other format fits, so it does not recognise anything itself.
 SPECIFIC: tuple[Reader, ...] = (
     c3d.READER,
     trc.READER,
