@@ -14,6 +14,7 @@ import sys
 import tempfile
 from pathlib import Path
 
+from benchmarks.concealed import results
 from benchmarks.concealed.answer import GROUPS
 from benchmarks.concealed.plant.vortex_lattice.simulate import VARIABLE
 from benchmarks.concealed.running import Folders
@@ -42,6 +43,11 @@ def main() -> None:
         help="store datasets, answers and findings in this folder, and resume from those already there",
     )
     parser.add_argument(
+        "--results",
+        type=Path,
+        help="add the scores to this file, leave out the trials that it has, and report on all; for a run in parts",
+    )
+    parser.add_argument(
         "--peers", action="store_true", help="also run the two comparison methods; needs the extra [peers]"
     )
     parser.add_argument("--make", type=Path, help="only write datasets for development into this folder")
@@ -57,8 +63,15 @@ def main() -> None:
     if not lattice:
         print(f"without the trials in a vortex lattice: {VARIABLE} is not set", file=sys.stderr)
     trials = plan(arguments.seed, quick=arguments.quick, only=arguments.only, lattice=lattice)[: arguments.first]
+    before = results.read(arguments.results, arguments.seed) if arguments.results else None
+    known = {mark.trial for mark in before.marks} if before else set[str]()
+    new = [trial for trial in trials if trial.name not in known]
     with tempfile.TemporaryDirectory() as scratch:
-        tables = conduct(trials, arguments.keep or Path(scratch), arguments.jobs, peers=arguments.peers)
+        tables = conduct(new, arguments.keep or Path(scratch), arguments.jobs, peers=arguments.peers, before=before)
+    if arguments.results:
+        results.append(arguments.results, arguments.seed, tables["wingfit"])
+    if before:
+        tables["wingfit"] = results.joined([before, tables["wingfit"]])
     print(side_by_side(tables))
     if arguments.json:
         own, *others = ({"method": name, **table.as_json()} for name, table in tables.items())

@@ -41,20 +41,27 @@ class Compared:
 
 
 def compare(
-    tool: Executor, trials: Sequence[Trial], first: Mapping[str, Outcome], folders: Folders
+    tool: Executor,
+    trials: Sequence[Trial],
+    first: Mapping[str, Outcome],
+    folders: Folders,
+    before: Mapping[str, int],
 ) -> tuple[Compared, ...]:
-    """Search with all pairs, and by default, in trials whose ``first`` diagnosis did not find the model adequate."""
-    pairs = [pair for one in _chosen(trials, first) for pair in _tasks(one, first[one.name], folders)]
+    """Search with all pairs, and by default, in trials whose ``first`` diagnosis did not find the model adequate.
+
+    ``before``: number of trials that other parts of the test have compared, by rig.
+    """
+    pairs = [pair for one in _chosen(trials, first, before) for pair in _tasks(one, first[one.name], folders)]
     outcomes = diagnosed(tool, pairs, folders, "comparing with an exhaustive search")
     both = zip(outcomes[::2], outcomes[1::2], strict=True)
     return tuple(_compared(default, every) for default, every in both)
 
 
-def _chosen(trials: Sequence[Trial], first: Mapping[str, Outcome]) -> list[Trial]:
+def _chosen(trials: Sequence[Trial], first: Mapping[str, Outcome], before: Mapping[str, int]) -> list[Trial]:
     found = list[Trial]()
     for rig, count in TRIALS.items():
         fit = (one for one in trials if one.build.rig == rig and one.group in GROUPS and _open(first[one.name]))
-        found += islice(fit, count)
+        found += islice(fit, max(count - before.get(rig, 0), 0))
     return found
 
 

@@ -64,11 +64,15 @@ def _made(trial: Trial, folders: Folders) -> bool:
     return True
 
 
-def conduct(trials: Sequence[Trial], root: Path, jobs: int, *, peers: bool = False) -> dict[str, Table]:
-    """Run the whole test in the folder ``root``, with ``jobs`` processes.
+def conduct(
+    trials: Sequence[Trial], root: Path, jobs: int, *, peers: bool = False, before: Table | None = None
+) -> dict[str, Table]:
+    """Run the test of ``trials`` in the folder ``root``, with ``jobs`` processes.
 
-    Returns the scores by method: "wingfit", the diagnosis, first, then with ``peers`` the comparison methods.
+    Returns the scores by method: "wingfit", the diagnosis, first, then with ``peers`` the comparison methods. Scores
+    ``before``, of other trials, only count towards the largest numbers of trials that are followed up and compared.
     """
+    followed_before, compared_before = (before.advised, before.compared_by_rig) if before else ((), {})
     start, folders = time.perf_counter(), Folders(root)
     folders.findings.mkdir(parents=True, exist_ok=True)
     manifest = make(trials, folders, jobs)
@@ -76,9 +80,10 @@ def conduct(trials: Sequence[Trial], root: Path, jobs: int, *, peers: bool = Fal
     with pool(jobs) as tool:
         outcomes = diagnosed(tool, [task(trial, trial.name, folders) for trial in trials], folders, "diagnosing")
         first = {outcome.trial: outcome for outcome in outcomes}
-        followed = [trial for trial in trials if _open(trial, first[trial.name])][:CASES]
+        followed = [trial for trial in trials if _open(trial, first[trial.name])]
+        followed = followed[: max(CASES - len(followed_before), 0)]
         second = follow_up(tool, followed, first, folders, jobs)
-        compared = exhaustive.compare(tool, trials, first, folders)
+        compared = exhaustive.compare(tool, trials, first, folders, compared_before)
     seconds = time.perf_counter() - start
     others = _peers(trials, folders, jobs) if peers else {}
     answers = {trial.name: seal.open_seal(trial.name, folders.sealed, manifest) for trial in trials}

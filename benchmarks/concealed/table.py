@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -145,6 +146,12 @@ class Table:
                 for group, what, good in BY_RIG
             },
         }
+
+    @property
+    def compared_by_rig(self) -> dict[str, int]:
+        """Number of searches that were compared with an exhaustive one, by rig."""
+        rigs = {one.trial: one.rig for one in self.marks}
+        return dict(Counter(rigs[one.trial] for one in self.compared))
 
     @property
     def hiding(self) -> list[Mark]:

@@ -9,8 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.concealed import results
 from benchmarks.concealed.answer import GROUPS, Answer, Secret
 from benchmarks.concealed.benches.wing import WingBench
+from benchmarks.concealed.exhaustive import Compared
 from benchmarks.concealed.plant.continuum.simulate import EFFECTS as ROD_EFFECTS
 from benchmarks.concealed.plant.measurement import balance, film
 from benchmarks.concealed.plant.wing.build import Draft
@@ -240,6 +242,24 @@ def test_trials_are_binned_by_their_measured_strength() -> None:
     assert rows["wing 4 of 8x1: nulls without false alarm"].startswith("100.0 %  (1 of 1")
     assert rows["wing 4 of 4: unlisted, left unnamed"].startswith(" 50.0 %  (1 of 2")
     json.dumps(figures)
+
+
+def test_scores_of_parts_are_added_up(tmp_path: Path) -> None:
+    path = tmp_path / "results" / "seed_8.jsonl"
+    advised = (Advised("trial-1", ("damage",), "ambiguous", ("damage", "backlash"), None, True, False),)
+    compared = (Compared("trial-1", ("damage",), ("damage", "backlash"), 0.2),)
+    first = Table((trial_mark(0, "null", 0.0), trial_mark(1, "listed", 2.1)), advised, 1, 3.0, compared)
+    second = Table((replace(trial_mark(2, "listed", 3.0), span=math.inf),), (), 0, 2.0)
+    assert results.read(path, 8) is None
+    results.append(path, 8, first)
+    results.append(path, 8, second)
+    assert results.read(path, 8) == Table((*first.marks, *second.marks), advised, 1, 5.0, compared)
+    assert results.joined([first, second]).compared_by_rig == {"wing": 1}
+    with pytest.raises(ValueError, match="seed 8, not 9"):
+        results.read(path, 9)
+    results.append(path, 8, second)
+    with pytest.raises(ValueError, match="twice"):
+        results.read(path, 8)
 
 
 def test_a_failed_diagnosis_gets_the_worst_score() -> None:
