@@ -7,17 +7,17 @@ import numpy.typing as npt
 import pytest
 from scipy.integrate import cumulative_trapezoid
 from scipy.spatial.transform import Rotation
-from scipy.special import ellipj, ellipk
 
 from tests.sim.effects.bench import AIR, beat_of, ledger, scene_of
-from tests.sim.kernels.marching import LENGTH, march, plank, turned, vacuum_here
+from tests.sim.effects.pendulum import Swing, angle
+from tests.sim.kernels.marching import LENGTH, plank
 from tests.sim.kernels.test_step_matrix import assemble_and_differentiate
 from tests.sim.wing.test_rigid import pendulum
 from wingfit.records import Genome
 from wingfit.sim.effects.ports.wing import WingScene
 from wingfit.sim.effects.registry import EFFECTS
 from wingfit.sim.kernels import LANES
-from wingfit.sim.kernels.arrays import DAMPERS, Lanes, Trace, Work, new_work
+from wingfit.sim.kernels.arrays import DAMPERS, Lanes, Work, new_work
 from wingfit.sim.kernels.integrate import forces
 from wingfit.sim.kernels.laws import AFTER
 from wingfit.sim.solver.numerics import Numerics
@@ -29,60 +29,24 @@ from wingfit.sim.wing.structure import Structure, build
 
 Array = npt.NDArray[np.float64]
 
-AT_ROOT = 0.02  # N m/rad, of each of the two pins
 INNER = 0.25  # station of the middle of the inner half of the plank, which is the pendulum
+CABLE = Swing("cable", {"k": 0.0, "c": 0.0, "station": INNER}, lever=1.0)
 _LAW = ctypes.CFUNCTYPE(None, ctypes.POINTER(ctypes.c_int64), ctypes.c_int64)
-
-
-def attach(scene: WingScene, **values: float) -> None:
-    """Clamp a cable to the wing; its spring and damper are zero unless given."""
-    wing = EFFECTS["cable"].wing
-    assert wing is not None
-    given = {"k": 0.0, "c": 0.0, "station": INNER} | values
-    wing(scene, {name: np.full(LANES, value) for name, value in given.items()})
-
-
-def swing(amplitude: float, steps: int, beats: float = 2.0, **values: float) -> tuple[Trace, Array, float]:
-    """A rigid body that turns about the x axis on root springs and a cable: its motion, times, and omega_0.
-
-    Every spring has the potential K (1 - cos theta): the pendulum's.
-    """
-    structure, group, _, inertia = pendulum()
-    group.stiffness[:, 0] = AT_ROOT
-    scene = WingScene.of(structure, vacuum(0.0, 0.0, 3.0), group)
-    attach(scene, **values)
-    pace = float(np.sqrt((2 * AT_ROOT + values.get("k", 0.0)) / inertia))
-    step = beats * 4 * float(ellipk(np.sin(amplitude / 2) ** 2)) / pace / steps
-    state = at_rest(structure)
-    turned(structure, state, amplitude)
-    return march(structure, scene.frozen(), vacuum_here(step), state, steps), step * np.arange(steps, dtype=float), pace
-
-
-def angle(trace: Trace) -> Array:
-    return np.asarray(np.unwrap(np.arctan2(trace.R[:, 0, 7, 0], trace.R[:, 0, 8, 0])))
 
 
 @pytest.mark.parametrize("k", [0.0, 0.05, 1.0])
 @pytest.mark.parametrize("amplitude", [1e-3, 1.5])
 def test_shifts_the_frequency_of_a_rigid_body(k: float, amplitude: float) -> None:
-    """omega_0 = sqrt((K_0 + k) / I), and at a finite amplitude sin(theta / 2) = m cd(omega_0 t; m)."""
-    trace, t, pace = swing(amplitude, 800, k=k)
-    m = np.sin(amplitude / 2)
-    _, cn, dn, _ = ellipj(pace * t, m**2)
-    np.testing.assert_allclose(angle(trace), 2 * np.arcsin(m * cn / dn), atol=2e-4 * amplitude)
+    CABLE.swings_as_in_print(k, amplitude)
 
 
 def test_a_spring_conserves_energy() -> None:
-    trace, _, _ = swing(1.5, 1600, k=1.0)
-    total = trace.energy[:, :, 0].sum(axis=1)
-    assert not trace.power[:, DAMPERS].any()
-    assert np.ptp(trace.energy[:, 1, 0]) > 0.9 * total[0], "the spring takes all of it and gives it back"
-    np.testing.assert_allclose(total, total[0], rtol=1e-5)
+    CABLE.conserves_energy(1.0)
 
 
 def test_a_damper_dissipates_the_power_of_the_rotation() -> None:
     """P = c |omega|^2 at every instant, and the swing loses energy to it alone."""
-    trace, t, _ = swing(1.0, 1600, k=0.1, c=3e-4)
+    trace, t, _ = CABLE.march(1.0, 1600, k=0.1, c=3e-4)
     power = trace.power[:, DAMPERS, 0]
     np.testing.assert_allclose(power, -3e-4 * (trace.V[:, 0, :3, 0] ** 2).sum(axis=1), rtol=1e-9)
     total = trace.energy[:, :, 0].sum(axis=1)
@@ -93,7 +57,7 @@ def test_a_damper_dissipates_the_power_of_the_rotation() -> None:
 def test_small_swings_decay_like_those_of_a_damped_oscillator() -> None:
     """theta = theta_0 exp(-d t) (cos w t + d / w sin w t), d = c / (2 I), w^2 = (K_0 + k) / I - d^2."""
     c = 5e-4
-    trace, t, pace = swing(1e-3, 1600, k=0.1, c=c)
+    trace, t, pace = CABLE.march(1e-3, 1600, k=0.1, c=c)
     d = c / (2 * pendulum()[3])
     w = np.sqrt(pace**2 - d**2)
     expected = 1e-3 * np.exp(-d * t) * (np.cos(w * t) + d / w * np.sin(w * t))
@@ -191,18 +155,12 @@ def test_stiffness_is_the_derivative_at_any_rotation() -> None:
 
 
 def test_however_stiff_it_holds_the_wing_still() -> None:
-    """The limit k to infinity: nothing turns, though a step is a thousand periods, as the integrator is implicit."""
-    structure, group, _, _ = pendulum()
-    scene = WingScene.of(structure, vacuum(0.0, 0.0, 3.0), group)
-    attach(scene, k=1e9)
-    state = at_rest(structure)
-    trace = march(structure, scene.frozen(), vacuum_here(1e-3, 9.81), state, 200)
-    assert np.abs(trace.R[:, 0] - trace.R[0, 0]).max() < 1e-8
+    CABLE.holds_still_however_stiff()
 
 
 def test_its_part_of_the_step_is_the_exact_derivative() -> None:
     """Against central differences, on a bent wing in full motion."""
-    assemble_and_differentiate(lambda scene, _: attach(scene, k=20.0, c=0.05, station=0.55))
+    assemble_and_differentiate(lambda scene, _: CABLE.attach(scene, k=20.0, c=0.05, station=0.55))
 
 
 def test_every_individual_has_its_own_place() -> None:

@@ -3,17 +3,16 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 import pytest
-from scipy.special import ellipj, ellipk
 
 from tests.sim.effects.bench import beat_of, ledger, scene_of
-from tests.sim.kernels.marching import CHORD, LENGTH, march, plank, turned, vacuum_here
+from tests.sim.effects.pendulum import Swing
+from tests.sim.kernels.marching import CHORD, LENGTH, plank
 from tests.sim.kernels.test_step_matrix import assemble_and_differentiate
-from tests.sim.wing.test_rigid import pendulum
 from wingfit.records import Genome
 from wingfit.sim.effects.ports.wing import WingScene
 from wingfit.sim.effects.registry import EFFECTS
 from wingfit.sim.kernels import LANES
-from wingfit.sim.kernels.arrays import DAMPERS, Trace, new_work
+from wingfit.sim.kernels.arrays import DAMPERS, new_work
 from wingfit.sim.kernels.integrate import forces
 from wingfit.sim.solver.numerics import Numerics
 from wingfit.sim.solver.scene import at_rest
@@ -26,58 +25,22 @@ Array = npt.NDArray[np.float64]
 
 STATION = 0.4  # of the span: on the half of the plank that swings
 LEVER = STATION * LENGTH
-AT_ROOT = 0.02  # N m/rad, of each of the two pins
-
-
-def attach(scene: WingScene, **values: float) -> None:
-    """Put a tether on the wing; its spring and damper are zero unless given."""
-    wing = EFFECTS["tether"].wing
-    assert wing is not None
-    given = {"k": 0.0, "c": 0.0, "station": STATION, "chord": 0.5} | values
-    wing(scene, {name: np.full(LANES, value) for name, value in given.items()})
-
-
-def swing(amplitude: float, steps: int, beats: float = 2.0, **values: float) -> tuple[Trace, Array, float]:
-    """A rigid body that turns about the x axis on root springs and a tether: its motion, times, and omega_0.
-
-    Either spring has the potential K (1 - cos theta), the tether with K = k r^2: the pendulum's.
-    """
-    structure, group, _, inertia = pendulum()
-    group.stiffness[:, 0] = AT_ROOT
-    scene = WingScene.of(structure, vacuum(0.0, 0.0, 3.0), group)
-    attach(scene, **values)
-    pace = float(np.sqrt((2 * AT_ROOT + values.get("k", 0.0) * LEVER**2) / inertia))
-    step = beats * 4 * float(ellipk(np.sin(amplitude / 2) ** 2)) / pace / steps
-    state = at_rest(structure)
-    turned(structure, state, amplitude)
-    return march(structure, scene.frozen(), vacuum_here(step), state, steps), step * np.arange(steps, dtype=float), pace
-
-
-def angle(trace: Trace) -> Array:
-    return np.asarray(np.unwrap(np.arctan2(trace.R[:, 0, 7, 0], trace.R[:, 0, 8, 0])))
+TETHER = Swing("tether", {"k": 0.0, "c": 0.0, "station": STATION, "chord": 0.5}, LEVER)
 
 
 @pytest.mark.parametrize("k", [0.0, 1.0, 10.0])
 @pytest.mark.parametrize("amplitude", [1e-3, 1.5])
 def test_shifts_the_frequency_of_a_rigid_body(k: float, amplitude: float) -> None:
-    """omega_0 = sqrt((K_0 + k r^2) / I), and at a finite amplitude sin(theta / 2) = m cd(omega_0 t; m)."""
-    trace, t, pace = swing(amplitude, 800, k=k)
-    m = np.sin(amplitude / 2)
-    _, cn, dn, _ = ellipj(pace * t, m**2)
-    np.testing.assert_allclose(angle(trace), 2 * np.arcsin(m * cn / dn), atol=2e-4 * amplitude)
+    TETHER.swings_as_in_print(k, amplitude)
 
 
-def test_a_spring_keeps_energy() -> None:
-    trace, _, _ = swing(1.5, 1600, k=10.0)
-    total = trace.energy[:, :, 0].sum(axis=1)
-    assert not trace.power[:, DAMPERS].any()
-    assert np.ptp(trace.energy[:, 1, 0]) > 0.9 * total[0], "the spring takes all of it and gives it back"
-    np.testing.assert_allclose(total, total[0], rtol=1e-5)
+def test_a_spring_conserves_energy() -> None:
+    TETHER.conserves_energy(10.0)
 
 
 def test_a_damper_takes_the_power_of_its_speed() -> None:
     """P = c v^2 at every instant, and nothing else leaves: the swing loses energy to it alone."""
-    trace, t, _ = swing(1.0, 1600, k=5.0, c=0.02)
+    trace, t, _ = TETHER.march(1.0, 1600, k=5.0, c=0.02)
     arm = np.array([0.5 * CHORD, LEVER, 0.0]) - build(plank(), Division.parse("2x1")).bodies[0].centre
     velocity = trace.V[:, 0, 3:, 0] + np.cross(trace.V[:, 0, :3, 0], arm)
     power = trace.power[:, DAMPERS, 0]
@@ -129,18 +92,12 @@ def test_pulls_back_to_where_the_wing_rests() -> None:
 
 
 def test_however_stiff_it_holds_the_wing_still() -> None:
-    """The limit k to infinity: nothing moves, though a step is a thousand periods, as the integrator is implicit."""
-    structure, group, _, _ = pendulum()
-    scene = WingScene.of(structure, vacuum(0.0, 0.0, 3.0), group)
-    attach(scene, k=1e9)
-    state = at_rest(structure)
-    trace = march(structure, scene.frozen(), vacuum_here(1e-3, 9.81), state, 200)
-    assert np.abs(trace.p[:, 0] - trace.p[0, 0]).max() < 1e-8
+    TETHER.holds_still_however_stiff()
 
 
 def test_its_part_of_the_step_is_the_exact_derivative() -> None:
     """Against central differences, on a bent wing in full motion."""
-    assemble_and_differentiate(lambda scene, _: attach(scene, k=2e3, c=5.0, station=0.8, chord=0.9))
+    assemble_and_differentiate(lambda scene, _: TETHER.attach(scene, k=2e3, c=5.0, station=0.8, chord=0.9))
 
 
 def test_every_individual_has_its_own_place() -> None:
