@@ -122,7 +122,7 @@ class Transport:
     def _call(self, method: str, path: str, *, key: str | None = None, **options: Any) -> httpx.Response:
         headers = {"Idempotency-Key": key} if key else {}
         if "json" in options:
-            _refuse_not_finite(options["json"])
+            _refuse_what_json_lacks(options["json"])
         safe = key is not None or method in SENT_TWICE_IS_HARMLESS
         return self._repeat(lambda: self._http.request(method, path, headers=headers, **options), safe=safe)
 
@@ -196,13 +196,21 @@ class Transport:
             yield from parse_events(response.iter_lines())
 
 
-def _refuse_not_finite(body: Any, where: str = "") -> None:
-    """Raise WingfitError if ``body``, the value at ``where`` in the JSON of a request, is or holds infinity or NaN."""
+def _refuse_what_json_lacks(body: Any, where: str = "") -> None:
+    """Raise WingfitError if ``body``, the value at ``where`` in a request, is or holds what JSON has no form for."""
     if isinstance(body, dict):
         for name, value in body.items():
-            _refuse_not_finite(value, f"{where}.{name}" if where else str(name))
+            _refuse_what_json_lacks(value, f"{where}.{name}" if where else str(name))
+    elif isinstance(body, list | tuple):
+        for place, value in enumerate(body):
+            _refuse_what_json_lacks(value, f"{where}[{place}]")
     elif isinstance(body, float) and not math.isfinite(body):
         raise WingfitError("not sent", f"{where} is {body}; it must be a finite number")
+    elif not isinstance(body, str | int | float | None):
+        declared = "; give wingfit.declaration(rig), or its name on the server" if where == "rig" else ""
+        raise WingfitError(
+            "not sent", f"{where} is of type {type(body).__name__}; it must be a number, text, list or dict{declared}"
+        )
 
 
 def _attachment_name(response: httpx.Response, fallback: str) -> str:

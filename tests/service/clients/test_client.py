@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 import zipfile
@@ -11,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import httpx
+import numpy as np
 import pytest
 
 from tests.service import toy
@@ -205,6 +207,20 @@ def test_an_id_cannot_reach_another_path(client: Client) -> None:
         with pytest.raises(WingfitError) as error:
             client.run(bad)
         assert error.value.status in (404, 405)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        ({"tolerance": math.nan}, "tolerance is nan; it must be a finite number"),
+        ({"bounds_factor": [1.0, math.inf]}, r"bounds_factor\[1\] is inf"),
+        ({"rig": object()}, r"rig is of type object; .* give wingfit.declaration\(rig\)"),
+        ({"genes": {"E_f": np.arange(2)}}, "genes.E_f is of type ndarray; it must be a number, text, list or dict"),
+    ],
+)
+def test_what_json_has_no_form_for_is_not_sent(wrong: dict[str, Any], words: str) -> None:
+    with Client("http://127.0.0.1:9") as client, pytest.raises(WingfitError, match=words):
+        client.submit_run("anything", **wrong)
 
 
 def test_no_server_says_how_to_start_one() -> None:
