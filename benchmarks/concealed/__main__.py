@@ -34,6 +34,7 @@ def main() -> None:
     parser.add_argument(
         "--only", action="append", choices=GROUPS, default=[], help="run only this group of trials; may be repeated"
     )
+    parser.add_argument("--rig", choices=("wing", "vehicle"), help="run only the trials of this rig")
     parser.add_argument("--first", type=int, help="run only the first trials, so many; all are in random order")
     parser.add_argument("--jobs", type=int, default=2, help="number of processes")
     parser.add_argument("--seed", type=int, default=8, help=f"below {DEVELOPMENT}; the same seed gives the same table")
@@ -62,7 +63,8 @@ def main() -> None:
     lattice = bool(os.environ.get(VARIABLE))
     if not lattice:
         print(f"without the trials in a vortex lattice: {VARIABLE} is not set", file=sys.stderr)
-    trials = plan(arguments.seed, quick=arguments.quick, only=arguments.only, lattice=lattice)[: arguments.first]
+    trials = plan(arguments.seed, quick=arguments.quick, only=arguments.only, lattice=lattice)
+    trials = [one for one in trials if arguments.rig in (None, one.build.rig)][: arguments.first]
     before = results.read(arguments.results, arguments.seed) if arguments.results else None
     known = {mark.trial for mark in before.marks} if before else set[str]()
     new = [trial for trial in trials if trial.name not in known]
