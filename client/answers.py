@@ -44,11 +44,25 @@ class ErrorItem(TypedDict):
     message: str
 
 
+class ImportQuestion(TypedDict):
+    """An option that the file does not state, and that must be given.
+
+    ``option``: name of the form field; ``message``: why it is needed; ``choices``: the values it may have, none for any
+    number or text; ``hint``: a fact that helps to choose.
+    """
+
+    option: str
+    message: str
+    choices: list[str]
+    hint: str
+
+
 class Problem(TypedDict):
     """Answer to a failed request, as problem details by RFC 9457.
 
     ``status`` is the HTTP status, ``title`` a short name of the problem, ``detail`` an explanation. ``errors`` lists
     the faults of an invalid request. ``state`` is the job's state, if it does not allow the request (status 409).
+    ``questions`` lists options that a file of a tracking system does not state.
     """
 
     type: str
@@ -57,6 +71,7 @@ class Problem(TypedDict):
     detail: str
     state: NotRequired[State]
     errors: NotRequired[list[ErrorItem]]
+    questions: NotRequired[list[ImportQuestion]]
 
 
 class Health(TypedDict):

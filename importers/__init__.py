@@ -20,8 +20,8 @@ in the file, and the file's statements. It decides nothing. :mod:`wingfit.import
 statements and options meet. See ``docs/importing.md`` and ``docs/decisions/0023-importers.md``.
 """
 
-from wingfit.importers.import_file import import_bytes, import_tracks
+from wingfit.importers.import_file import import_bytes, import_tracks, inspect_bytes
 from wingfit.importers.options import Given
 from wingfit.importers.tracks import FactName, Gaps, ImportedTracks, Statement
 
-__all__ = ["FactName", "Gaps", "Given", "ImportedTracks", "Statement", "import_bytes", "import_tracks"]
+__all__ = ["FactName", "Gaps", "Given", "ImportedTracks", "Statement", "import_bytes", "import_tracks", "inspect_bytes"]

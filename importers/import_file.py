@@ -5,14 +5,16 @@ from __future__ import annotations
 from os import PathLike
 from pathlib import Path
 
+from wingfit.importers.inspection import Inspection
 from wingfit.importers.limits import MAX_TRACK_FILE_BYTES
 from wingfit.importers.options import Decimal, Given
+from wingfit.importers.raw import Raw, Reader
 from wingfit.importers.readers import READERS
 from wingfit.importers.recognise import recognise
 from wingfit.importers.resolve import resolve
 from wingfit.importers.source import open_source
 from wingfit.importers.tracks import ImportedTracks
-from wingfit.records.errors import check_most, fail
+from wingfit.records.errors import DatasetError, check_most, fail
 from wingfit.records.limits import MIB
 
 
@@ -73,15 +75,34 @@ def import_tracks(
 
 def import_bytes(raw: bytes, file: str, given: Given) -> ImportedTracks:
     """Return the tracks in the file with the bytes ``raw``, called ``file`` in messages; errors as in import_tracks."""
-    given.check([*READERS])
-    check_most(file, "has", len(raw) / MIB, MAX_TRACK_FILE_BYTES / MIB, "MiB", "cut the recording in parts")
+    found = inspect_bytes(raw, file, given)
+    if found.error:
+        raise found.error
+    assert found.tracks is not None  # noqa: S101  # for the type checker
+    return found.tracks
+
+
+def inspect_bytes(raw: bytes, file: str, given: Given) -> Inspection:
+    """Return what is understood of the file, and what is missing or wrong; arguments as in import_bytes."""
+    found = Inspection(file)
+    try:
+        given.check([*READERS])
+        check_most(file, "has", len(raw) / MIB, MAX_TRACK_FILE_BYTES / MIB, "MiB", "cut the recording in parts")
+        found.reader, found.raw = _read(raw, file, given)
+        found.tracks = resolve(found.raw, found.reader, given, file)
+    except DatasetError as error:
+        found.error = error
+    return found
+
+
+def _read(raw: bytes, file: str, given: Given) -> tuple[Reader, Raw]:
     source = open_source(raw, file)
     reader = recognise(source, given.format)
     if reader.name != "plain" and (given.columns or given.rows):
         option = "--columns" if given.columns else "--rows"
         message = f"is for plain tables, but {file} is {reader.title}; leave it out, or add --format plain"
         raise fail(option, given.columns or given.rows, message)
-    found = reader.read(source, given)
+    contents = reader.read(source, given)
     if source.encoding and not raw.rstrip(b"\0").endswith((b"\n", b"\r")):
-        found.remarks.append("the last line has no line end; if the file was cut off, its last number is not whole")
-    return resolve(found, reader, given, file)
+        contents.remarks.append("the last line has no line end; if the file was cut off, its last number is not whole")
+    return reader, contents

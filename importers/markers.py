@@ -8,8 +8,9 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from wingfit.importers.options import ask
 from wingfit.records.array_types import Mask
-from wingfit.records.errors import Faults, fail, shown
+from wingfit.records.errors import Faults, shown
 
 _UNLABELLED = re.compile(
     r"|\*\d*|(?:unlabell?ed|unidentified|uname)[\s_*\-]*\d*|new[\s_]\d{3,}|(?:.*:)?\*\d+", re.IGNORECASE
@@ -57,7 +58,7 @@ def names_of(labels: Sequence[str], file: str, *, keep_unlabelled: bool) -> Name
             remarks.append(f"not imported: {left} unlabelled markers; --keep-unlabelled imports them")
     if not keep:
         message = f"all {len(labels)} markers are unlabelled; label them, or give --keep-unlabelled"
-        raise fail(file, len(labels), message)
+        raise ask("keep_unlabelled", file, len(labels), message)
     chosen = [labels[m].strip() for m in keep]
     _check_repeated([label for label in chosen if not _UNLABELLED.fullmatch(label)], file)
     short, prefix = _without_prefix(chosen)

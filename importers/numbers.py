@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wingfit.importers.limits import MAX_TRACK_VALUES
-from wingfit.importers.options import Decimal
+from wingfit.importers.options import Decimal, question
 from wingfit.importers.source import SEPARATORS, Row, Source
 from wingfit.records.array_types import Array, Float, Index, Int
 from wingfit.records.errors import Faults, check_most, fail, shown
@@ -32,6 +32,10 @@ _WORD = re.compile(r"[-+]?(?:nan(?:\([\w ]*\))?|1[.,]#(?:qnan|snan|ind|nan)[0-9]
 _INFINITE = re.compile(r"[-+]?(?:inf(?:inity)?|∞|1[.,]#inf[0-9]*)", re.IGNORECASE)
 _OTHER = re.compile(r"[^0-9eE+\-., ]")  # characters with which float accepts what is no number of a table: 1_0, inf
 _MAX_LENGTH = 400
+
+
+class DecimalCommaError(ValueError):
+    """Raised for a cell that is a number if its comma separates decimals."""
 
 
 @dataclass(frozen=True)
@@ -136,7 +140,11 @@ def _row(
             numbers.append(number_of(cells[column], decimal))
         except ValueError as error:
             name = names[column] or column + 1
-            faults.add(source.at(line, name), cells[column], str(error))
+            where, value = source.at(line, name), cells[column]
+            if isinstance(error, DecimalCommaError):
+                faults.put(question("decimal", where, value, str(error), ["comma"]))
+            else:
+                faults.add(where, value, str(error))
             numbers.append(math.nan)
     return numbers
 
@@ -166,6 +174,10 @@ def number_of(cell: str, decimal: Decimal = "point") -> float:
         return value
     if text.lower() in _WORDS or _WORD.fullmatch(text):
         return WORD
+    if decimal == "point" and _WITH_COMMA.fullmatch(text):
+        thousands = "; if it separates thousands, export the numbers without it" if _THOUSANDS.fullmatch(text) else ""
+        message = f"is {shown(text)!r}; if this is a decimal comma, give --decimal comma{thousands}"
+        raise DecimalCommaError(message)
     raise ValueError(_not_a_number(text, decimal))
 
 
@@ -173,9 +185,6 @@ def _not_a_number(text: str, decimal: Decimal) -> str:
     """Return what is wrong with the cell ``text``, which is no number, with the remedy."""
     if _INFINITE.fullmatch(text):
         return f"is {text!r}; it must be a finite number, or an empty cell where the marker was not seen"
-    if decimal == "point" and _WITH_COMMA.fullmatch(text):
-        thousands = "; if it separates thousands, export the numbers without it" if _THOUSANDS.fullmatch(text) else ""
-        return f"is {shown(text)!r}; if this is a decimal comma, give --decimal comma{thousands}"
     if decimal == "comma" and _NUMBER.fullmatch(text):
         return f"is {shown(text)!r}, with a decimal point; leave --decimal comma out, or export the file again"
     if _THOUSANDS.fullmatch(text):

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Literal, get_args
 
 from wingfit.importers.axes import read_axes
 from wingfit.importers.limits import MAX_RATE, MIN_RATE
-from wingfit.records.errors import DatasetError, Faults, fail, nearest, shown
+from wingfit.records.errors import DatasetError, Fault, Faults, fail, nearest, shown
 
 # Metres are value x numerator / denominator: one rounding, or two for feet and inches.
 UNITS = {"m": (1, 1), "cm": (1, 100), "mm": (1, 1000), "um": (1, 1_000_000), "in": (254, 10_000), "ft": (3048, 10_000)}
@@ -56,6 +56,11 @@ class Given:
     keep_unlabelled: bool = False
     incomplete: bool = False
 
+    @staticmethod
+    def names() -> tuple[str, ...]:
+        """Return the names of all options."""
+        return tuple(field.name for field in fields(Given))
+
     def check(self, formats: Sequence[str]) -> None:
         """Raise DatasetError, which names all options with a wrong value; ``formats``: the known names of formats."""
         faults = Faults()
@@ -72,6 +77,35 @@ class Given:
             except DatasetError as error:
                 faults.extend(error)
         faults.raise_any()
+
+
+@dataclass(frozen=True)
+class OptionFault(Fault):
+    """A fault that an option of the user removes, so that a form can ask for it.
+
+    Attributes:
+        option: name of the option, an attribute of Given.
+        choices: the values that the option may have; none if it is any number or text.
+        hint: a fact that helps to choose, "" for none.
+    """
+
+    option: str = ""
+    choices: tuple[str, ...] = ()
+    hint: str = ""
+
+
+def question(
+    option: str, where: str, value: object, message: str, choices: Sequence[str] = (), hint: str = ""
+) -> OptionFault:
+    """Return the fault that ``option`` is missing; the other arguments are those of OptionFault."""
+    return OptionFault(where, shown(value), message, option, tuple(choices), hint)
+
+
+def ask(
+    option: str, where: str, value: object, message: str, choices: Sequence[str] = (), hint: str = ""
+) -> DatasetError:
+    """Return a DatasetError with one OptionFault, which the caller raises."""
+    return DatasetError([question(option, where, value, message, choices, hint)])
 
 
 def _choice(option: str, value: str | None, known: Sequence[str] | dict[str, tuple[int, int]], faults: Faults) -> None:

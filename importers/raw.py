@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Generic, TypeVar
 
@@ -43,6 +43,8 @@ class Raw:
         frame_count: count of frames that the file states.
         invalid: [T, M], points that the file marks as invalid; None if the format has no such mark.
         remarks: what the user should know.
+        row_choices: takes times or numbers of frames [T] that do not increase; returns the values of the option
+            ``rows``, each of which selects frames for which they do; none if there is no such option.
         unit_hint, rate_hint: facts about the format that help to choose a missing option.
     """
 
@@ -61,6 +63,7 @@ class Raw:
     frame_count: Stated[int] | None = None
     invalid: Mask | None = None
     remarks: list[str] = field(default_factory=list)
+    row_choices: Callable[[Array | Index], Sequence[str]] = lambda _: ()
     unit_hint: str = ""
     rate_hint: str = ""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from wingfit.importers.options import ask
 from wingfit.importers.raw import Reader
 from wingfit.importers.readers import READERS, SPECIFIC, plain
 from wingfit.importers.source import Source
@@ -34,15 +35,17 @@ def recognise(source: Source, name: str | None) -> Reader:
         return reader
     fitting = [reader for reader in SPECIFIC if reader.recognises(source)]
     if len(fitting) > 1:
-        listed = " or ".join(reader.name for reader in fitting)
-        raise fail(source.file, listed, f"fits several formats; choose one: --format {listed}")
+        names = [reader.name for reader in fitting]
+        listed = " or ".join(names)
+        raise ask("format", source.file, listed, f"fits several formats; choose one: --format {listed}", names)
     if not fitting:
         if source.encoding is None:
             raise _unknown(source)
         return plain.READER
     if fitting[0].needs_name:
         reader = fitting[0]
-        raise fail(source.file, reader.name, f"{reader.needs_name}, give --format {reader.name}")
+        message = f"{reader.needs_name}, give --format {reader.name}"
+        raise ask("format", source.file, reader.name, message, [reader.name])
     return fitting[0]
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from wingfit.importers.axes import EXAMPLE, read_axes
 from wingfit.importers.limits import MAX_DISTANCE
 from wingfit.importers.markers import Names, names_of
-from wingfit.importers.options import UNITS, Given, unit_of
+from wingfit.importers.options import UNITS, Given, ask, question, unit_of
 from wingfit.importers.raw import Raw, Reader
 from wingfit.importers.times import resolve_times
 from wingfit.importers.tracks import Gaps, ImportedTracks, Statement
@@ -82,7 +82,7 @@ def _check_counts(raw: Raw, given: Given, file: str) -> None:
         if not given.incomplete:
             cause = "it is cut off" if frames < raw.frame_count.value else "it was edited"
             remedy = f"export it again, or give --incomplete to import the {frames} frames that are there"
-            raise fail(file, frames, f"{difference}, so {cause}; {remedy}")
+            raise ask("incomplete", file, frames, f"{difference}, so {cause}; {remedy}")
         raw.remarks.append(f"the file {difference}; these are imported")
     if frames < MIN_FRAMES:
         raise fail(file, frames, f"has {frames} frames; at least {MIN_FRAMES} are needed: export a longer part")
@@ -108,7 +108,8 @@ def _unit(raw: Raw, given: Given, file: str, faults: Faults) -> Statement | None
     known = ", ".join(UNITS)
     why = f"states the unit {shown(raw.unit.value)!r}, which is unknown" if raw.unit else "states no unit of positions"
     hint = f" ({raw.unit_hint})" if raw.unit_hint else ""
-    faults.add(file, raw.unit.value if raw.unit else None, f"{why}{hint}; add it: --unit mm (one of {known})")
+    message = f"{why}{hint}; add it: --unit mm (one of {known})"
+    faults.put(question("unit", file, raw.unit.value if raw.unit else None, message, [*UNITS], raw.unit_hint))
     return None
 
 

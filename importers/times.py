@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from wingfit.importers.limits import MAX_RATE, MIN_RATE
-from wingfit.importers.options import TIME_UNITS, Given
+from wingfit.importers.options import TIME_UNITS, Given, ask, question
 from wingfit.importers.raw import Raw, Stated
 from wingfit.importers.tracks import Statement
 from wingfit.records.array_types import Array, Float
@@ -63,6 +63,10 @@ def _check_frames(raw: Raw, file: str) -> None:
         at = int(np.flatnonzero(steps <= 0)[0]) + 1
         what = "repeats the number of the line above" if steps[at - 1] == 0 else f"follows {raw.frames[at - 1]}"
         message = f"frame {raw.frames[at]} {what}; numbers of frames must increase: sort the rows, remove repeats"
+        if choices := raw.row_choices(raw.frames):
+            message += ", or choose those of one recording (--rows)"
+            where = f"{file}, {raw.line_word} {raw.lines[at]}"
+            raise ask("rows", where, int(raw.frames[at]), message, choices)
         raise fail(f"{file}, {raw.line_word} {raw.lines[at]}", int(raw.frames[at]), message)
 
 
@@ -85,7 +89,8 @@ def _rate(raw: Raw, given: Given, file: str, faults: Faults) -> Statement | None
         return None
     if not all(_same(one.value, raw.rates[0].value) for one in raw.rates):
         listed = ", ".join(f"{one.where}: {one.value:g} Hz" for one in raw.rates)
-        faults.add(file, listed, f"states different rates ({listed}); say which is right: --rate-hz")
+        message = f"states different rates ({listed}); say which is right: --rate-hz"
+        faults.put(question("rate_hz", file, listed, message, [f"{one.value:.9g}" for one in raw.rates]))
         return None
     return Statement("rate", f"{raw.rates[0].value:.9g} Hz", "file", raw.rates[0].where)
 
@@ -111,7 +116,7 @@ def _from_rate(raw: Raw, rate: Statement | None, given: Given, file: str, faults
         if not raw.rates:
             hint = f" ({raw.rate_hint})" if raw.rate_hint else ""
             message = f"states neither a rate nor times{hint}; add the frames per second: --rate-hz 500"
-            faults.add(file, None, message)
+            faults.put(question("rate_hz", file, None, message, hint=raw.rate_hint))
         return None
     hertz = _value(rate, raw, given)
     numbers = np.arange(len(raw.positions))
@@ -137,7 +142,8 @@ def _time_unit(raw: Raw, given: Given, file: str, faults: Faults) -> Statement |
     if given.time_unit:
         return Statement("times", given.time_unit, "user", "--time-unit")
     known = ", ".join(TIME_UNITS)
-    faults.add(file, None, f"states no unit for the times in {raw.times_where}; add it: --time-unit s (one of {known})")
+    message = f"states no unit for the times in {raw.times_where}; add it: --time-unit s (one of {known})"
+    faults.put(question("time_unit", file, None, message, [*TIME_UNITS], raw.times_where))
     return None
 
 
@@ -178,7 +184,8 @@ def _from_both(
         faults.add("--rate-hz", given.rate_hz, _contradicts(given.rate_hz, file, rates))
         return None
     differ = f"states {hertz:g} Hz ({rate.where}), but {raw.times_where} has {measured:.6g} Hz"
-    faults.add(file, f"{measured:.6g}", f"{differ}; say which is right: --rate-hz")
+    message = f"{differ}; say which is right: --rate-hz"
+    faults.put(question("rate_hz", file, f"{measured:.6g}", message, [f"{hertz:.9g}", f"{measured:.6g}"]))
     return None
 
 
@@ -222,8 +229,14 @@ def _check_times(times: Array, raw: Raw, file: str) -> None:
         message = (
             f"{times[at]:g} s {what}; times must increase: sort the rows, or choose those of one recording (--rows)"
         )
+        if choices := raw.row_choices(times):
+            raise ask("rows", _place(raw, at, file), float(times[at]), message, choices)
         raise _time_fault(raw, at, file, float(times[at]), message)
 
 
 def _time_fault(raw: Raw, at: int, file: str, value: float | None, message: str) -> DatasetError:
-    return fail(f"{file}, {raw.line_word} {raw.lines[at]}, {raw.times_where}", value, message)
+    return fail(_place(raw, at, file), value, message)
+
+
+def _place(raw: Raw, at: int, file: str) -> str:
+    return f"{file}, {raw.line_word} {raw.lines[at]}, {raw.times_where}"

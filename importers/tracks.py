@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from typing import Literal
 
@@ -11,6 +12,7 @@ from wingfit.records.array_types import Array, Float
 from wingfit.records.files.table import write_table
 
 _DECIMALS = 12  # of metres
+_FRAMES_OF_PART = 1000
 FactName = Literal["unit", "rate", "times", "axes", "up", "first frame"]
 
 
@@ -101,5 +103,13 @@ class ImportedTracks:
 
         Positions are rounded to 1e-12 m, so that 37.2 mm are written as 0.0372.
         """
+        return "".join(self.csv_parts())
+
+    def csv_parts(self) -> Iterator[str]:
+        """Yield the table of :meth:`csv` in parts of some frames, so that it need not be in memory as a whole."""
         columns = [f"{marker}_{axis}_m" for marker in self.markers for axis in "xyz"]
-        return write_table(columns, self.times, np.round(self.positions, _DECIMALS).reshape(len(self.times), -1))
+        for start in range(0, len(self.times), _FRAMES_OF_PART):
+            part = slice(start, start + _FRAMES_OF_PART)
+            values = np.round(self.positions[part], _DECIMALS).reshape(-1, len(columns))
+            text = write_table(columns, self.times[part], values)
+            yield text if start == 0 else text[text.index("\n") + 1 :]

@@ -56,9 +56,13 @@ class Faults:
 
     def add(self, where: str, value: object, message: str) -> None:
         """Add one fault: the ``message`` about a ``value`` at ``where`` (file with line or key)."""
+        self.put(Fault(where, shown(value), message))
+
+    def put(self, fault: Fault) -> None:
+        """Add one ``fault``."""
         self.count += 1
         if len(self.faults) < MAX_ERRORS:
-            self.faults.append(Fault(where, shown(value), message))
+            self.faults.append(fault)
 
     def extend(self, error: DatasetError) -> None:
         """Add the faults that ``error`` lists, and count all that it counts."""

@@ -13,8 +13,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from wingfit.importers.numbers import Layout, number_of, read_samples, separated_by
-from wingfit.importers.options import Given, pairs_of, unit_of
+from wingfit.importers.options import Given, ask, pairs_of, unit_of
 from wingfit.importers.raw import Raw, Reader, Stated, raw_of
+from wingfit.importers.rows import row_choices
 from wingfit.importers.source import Source, separator_of
 from wingfit.records.errors import DatasetError, Faults, fail, nearest
 
@@ -58,7 +59,8 @@ def read(source: Source, given: Given) -> Raw:
     """Return the tracks of a plain table; DatasetError names line, column and remedy."""
     line = next((n for n in range(1, len(source.head) + 1) if any(source.cells(n))), None)
     if line is None:
-        raise fail(source.file, None, "the file is empty; it needs a header and rows of numbers")
+        none = f"none of the first {len(source.head)} lines is a row of a table" if any(source.head) else "is empty"
+        raise fail(source.file, None, f"{none}; the file needs a header and rows of numbers")
     separator = separator_of(source.head[line - 1])
     header = source.cells(line, separator)
     _check_header(source, header, line, separator)
@@ -75,6 +77,7 @@ def read(source: Source, given: Given) -> Raw:
     ignored = [name for index, name in enumerate(header) if index not in used and name]
     if ignored:
         raw.remarks.append(f"not imported: {_listed(ignored)}")
+        raw.row_choices = lambda order: row_choices(source.rows(separator, line + 1), raw.lines, header, ignored, order)
     return raw
 
 
@@ -175,7 +178,7 @@ def _no_marker(
         f"no columns of markers are recognised in {_listed([name for name in header if name])}; name them like "
         f"tip_x_m,tip_y_m,tip_z_m, or say which they are: --columns {_EXAMPLE!r}"
     )
-    return fail(source.at(line), None, message)
+    return ask("columns", source.at(line), None, message, [name for name in header if name])
 
 
 def _by_option(source: Source, header: list[str], text: str) -> _Found:

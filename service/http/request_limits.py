@@ -14,7 +14,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from wingfit.service.auth.authentication import API
 from wingfit.service.http.problems import ProblemError, response
 
-UPLOAD_PATH = "/v1/datasets"
+UPLOAD_PATHS = frozenset({"/v1/datasets", "/v1/imports", "/v1/imports/table"})
 UPLOAD_LIMIT = 64 * 2**20
 # Boundaries and headers of the multipart form around the file.
 FORM_OVERHEAD = 64 * 2**10
@@ -105,7 +105,7 @@ def _is_foreign(headers: Headers, host: str) -> bool:
 def _limit(scope: Scope) -> int:
     if scope["path"].startswith(DRIVE_PATH) and scope["path"].endswith(RESULTS):
         return RESULTS_LIMIT
-    return UPLOAD_LIMIT + FORM_OVERHEAD if scope["path"] == UPLOAD_PATH else BODY_LIMIT
+    return UPLOAD_LIMIT + FORM_OVERHEAD if scope["path"] in UPLOAD_PATHS else BODY_LIMIT
 
 
 def _too_large(limit: int) -> ProblemError:

@@ -7,6 +7,7 @@ import { redrawDataset, selectDataset, setUpDataset, simulate } from "./pages/da
 import { diagnose, selectDiagnosis, setUpDiagnosis } from "./pages/diagnosis.js";
 import { showEffects } from "./pages/effects.js";
 import { $, plural, toast } from "./base/format.js";
+import { setUpImport, showImport } from "./importing/page.js";
 import { isSeries } from "./base/labels.js";
 import { refreshListing, setUpListing, showListing } from "./pages/table_page.js";
 import { drawDatasets, drawDiagnoses, drawRuns } from "./parts/sidebar.js";
@@ -17,8 +18,8 @@ const POLL_MS = 2500;
 const SHOWN = 50;
 const AGAIN_MS = 3000;
 const LISTINGS = ["runs", "diagnoses", "datasets"];
-const PAGES = ["run", "diagnosis", "dataset", "compare", "effects", ...LISTINGS];
-const SECTIONS = { run: "runs", compare: "runs", diagnosis: "diagnoses", dataset: "datasets" }; // menu entry of each page
+const PAGES = ["run", "diagnosis", "dataset", "compare", "effects", "import", ...LISTINGS];
+const SECTIONS = { run: "runs", compare: "runs", diagnosis: "diagnoses", dataset: "datasets", import: "datasets" }; // menu entry of each page
 
 let lists = { runs: [], diagnoses: [], datasets: [] };
 let polling = null;
@@ -77,11 +78,11 @@ async function route() {
   drawLists();
   const params = parameters();
   // Pages of one job or dataset need its id.
-  const page = PAGES.find((name) => params.get(name) || (params.has(name) && (name === "effects" || LISTINGS.includes(name)))) ?? null;
+  const page = PAGES.find((name) => params.get(name) || (params.has(name) && (name === "effects" || name === "import" || LISTINGS.includes(name)))) ?? null;
   const value = (name) => (page === name ? params.get(name) : null);
   $("empty").hidden = page !== null;
   document.body.classList.toggle("home", page === null);
-  document.body.classList.toggle("broad", page === "compare" || LISTINGS.includes(page)); // these pages have the lists of the sidebar themselves
+  document.body.classList.toggle("broad", page === "compare" || page === "import" || LISTINGS.includes(page)); // these pages have the lists of the sidebar themselves
   if (!page) nothing("Nothing selected");
   for (const link of document.querySelectorAll(".menu a")) {
     if (link.hash === `#${SECTIONS[page] ?? page}`) link.setAttribute("aria-current", "page");
@@ -89,7 +90,7 @@ async function route() {
   }
   await Promise.all([
     selectRun(value("run")), selectDiagnosis(value("diagnosis")), selectDataset(value("dataset")), showEffects(value("effects")),
-    showComparison(value("compare"), { onMissing }), showListing(LISTINGS.includes(page) ? page : null, params),
+    showComparison(value("compare"), { onMissing }), showListing(LISTINGS.includes(page) ? page : null, params), showImport(page === "import"),
   ]);
 }
 
@@ -100,7 +101,7 @@ function nothing(why) {
 
 // The job or dataset shown may have been deleted by another user; the lists do not cover older ones.
 async function missed() {
-  const page = Object.keys(SECTIONS).find((name) => name !== "compare" && current(name));
+  const page = Object.keys(SECTIONS).find((name) => !["compare", "import"].includes(name) && current(name));
   if (!page || lists[SECTIONS[page]].some((one) => one.id === current(page))) return;
   await get(`${SECTIONS[page]}/${encodeURIComponent(current(page))}`).catch((error) => error.status === 404 && $("empty").hidden && route());
 }
@@ -148,6 +149,13 @@ setUpDataset({
   ...common("dataset"), ...starting,
   onStarted(kind, job) {
     go(job.id, kind === "runs" ? "run" : "diagnosis");
+    poll();
+  },
+});
+setUpImport({
+  onStored(dataset) {
+    toast(`Stored ${dataset.name}`);
+    go(dataset.id, "dataset");
     poll();
   },
 });

@@ -3,10 +3,11 @@
 const FINAL = new Set(["SUCCEEDED", "FAILED", "CANCELLED"]);
 
 export class ApiError extends Error {
-  constructor(message, { status = null, errors = [] } = {}) {
+  constructor(message, { status = null, errors = [], questions = [] } = {}) {
     super(message);
     this.status = status;
     this.errors = errors;
+    this.questions = questions;
   }
 
   // The message, followed by those about single fields.
@@ -35,7 +36,7 @@ export async function call(method, path, { body, headers = {}, as = "json" } = {
     problem = await response.json();
   } catch { /* no problem document: the status line is shown */ }
   const message = problem.detail || problem.title || `${response.status} ${response.statusText}`;
-  throw new ApiError(message, { status: response.status, errors: problem.errors || [] });
+  throw new ApiError(message, { status: response.status, errors: problem.errors || [], questions: problem.questions || [] });
 }
 
 export const get = (path) => call("GET", path);

@@ -212,7 +212,7 @@ async function upload(file, onUploaded) {
 }
 
 // XMLHttpRequest, because fetch does not report the progress of an upload.
-function send(file, onFraction) {
+export function send(file, onFraction) {
   return new Promise((resolve, reject) => {
     const request = new XMLHttpRequest();
     const form = new FormData();

@@ -59,6 +59,7 @@ export async function showListing(next, parameters) {
   $("listing-title").textContent = title;
   $("listing-filters").hidden = !states;
   $("compare").hidden = kind !== "runs";
+  $("listing-import").hidden = kind !== "datasets";
   $("listing-table").tHead.replaceChildren(el("tr", {}, ...heads.map((head) =>
     el("th", { scope: "col" }, head || el("span", { className: "hidden" }, "Compare")))));
   draw();

@@ -1,0 +1,1 @@
+"""Import of tracks from files of tracking systems, over HTTP."""
