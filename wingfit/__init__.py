@@ -7,6 +7,8 @@ The names below are public and documented; everything else in the package may ch
 raises :class:`DatasetError`, which lists what is wrong.
 - :func:`import_tracks` reads marker tracks from the files of motion-capture systems and digitisers, and returns
 :class:`ImportedTracks`.
+- :func:`wing_template` describes a wing by an outline of its planform, and returns :class:`WingTemplate`;
+:func:`wing_drawing` draws a described wing as SVG.
 - :func:`calibrate` estimates the genes of a model in this process, without a server; :func:`diagnose` reports which
 physics the model is missing.
 - :func:`drive` simulates a rig of the user's own for a job on a server, which knows only its :func:`declaration`.
@@ -33,6 +35,7 @@ if TYPE_CHECKING:
     from wingfit.diagnosis.finding import Finding
     from wingfit.diagnosis.spec import DiagnosisSpec
     from wingfit.importers import ImportedTracks, import_tracks
+    from wingfit.importers.planform import WingTemplate, wing_template
     from wingfit.records import (
         Channel,
         Condition,
@@ -48,6 +51,7 @@ if TYPE_CHECKING:
         save_dataset,
     )
     from wingfit.report import finding_json, html
+    from wingfit.report.wing_drawing import wing_drawing
     from wingfit.rigs.declaration import declaration
     from wingfit.rigs.ports import Port
     from wingfit.rigs.rig import Rig
@@ -81,6 +85,7 @@ __all__ = [
     "ServerAwayError",
     "SimulationError",
     "Suspect",
+    "WingTemplate",
     "WingfitError",
     "calibrate",
     "declaration",
@@ -91,6 +96,8 @@ __all__ = [
     "import_tracks",
     "load_dataset",
     "save_dataset",
+    "wing_drawing",
+    "wing_template",
 ]
 
 _MODULES = {
@@ -105,6 +112,7 @@ _MODULES = {
     "wingfit.diagnosis.finding": ("Finding",),
     "wingfit.diagnosis.spec": ("DiagnosisSpec",),
     "wingfit.importers": ("ImportedTracks", "import_tracks"),
+    "wingfit.importers.planform": ("WingTemplate", "wing_template"),
     "wingfit.records": (
         "Channel",
         "Condition",
@@ -120,6 +128,7 @@ _MODULES = {
         "save_dataset",
     ),
     "wingfit.report": ("finding_json", "html"),
+    "wingfit.report.wing_drawing": ("wing_drawing",),
     "wingfit.rigs.declaration": ("declaration",),
     "wingfit.rigs.ports": ("Port",),
     "wingfit.rigs.rig": ("Rig",),

@@ -18,6 +18,7 @@ from wingfit.records.description.dataset_file import (
     model_of,
 )
 from wingfit.records.description.fields import models_in, tag_of
+from wingfit.records.description.placeholder import missing
 from wingfit.records.description.quantity import FAULT, kind
 from wingfit.records.description.yaml_text import Document, Path
 from wingfit.records.errors import Faults, fail, nearest
@@ -87,6 +88,8 @@ class _Explainer:
 
     def _message(self, error: ErrorDetails) -> str:
         what, location = error["type"], error["loc"]
+        if (wanted := missing(error["input"])) is not None:
+            return f"is not filled in yet; replace the placeholder by the {wanted}"
         if what == "missing":
             if location in {("wing",), ("vehicle",)}:
                 return f"there is neither {' nor '.join(map(repr, _RIGS))}; describe {_either(_RIGS.values())}"

@@ -1,0 +1,1 @@
+"""Wings described by outlines."""
