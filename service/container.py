@@ -221,7 +221,14 @@ async def _simulate(service: ServiceDep, held: HeldSlots) -> AsyncIterator[None]
         await held.enter_async_context(service.answers.slot())
 
 
+async def _read(service: ServiceDep, held: HeldSlots) -> AsyncIterator[None]:
+    async with service.uploads.slot():
+        yield
+        await held.enter_async_context(service.answers.slot())  # as for simulations
+
+
 # Dependencies of routes that wait for a slot before they begin.
 SIMULATION_SLOT = Depends(_simulate, scope="function")
+READ_SLOT = Depends(_read, scope="function")
 DOWNLOAD_SLOT = _slot(lambda service: service.downloads)
 UPLOAD_SLOT = _slot(lambda service: service.uploads)

@@ -13,7 +13,7 @@ from wingfit.client.importing.answers import TrackImport
 from wingfit.importers import Given, inspect_bytes
 from wingfit.importers.inspection import Inspection
 from wingfit.importers.markers import allowed
-from wingfit.service.container import UPLOAD_SLOT
+from wingfit.service.container import READ_SLOT
 from wingfit.service.http import csv_text
 from wingfit.service.http import responses as http
 from wingfit.service.http.problems import ProblemError, error_item, invalid
@@ -31,7 +31,7 @@ _EXAMPLE = "time_s,tip_x_m,tip_y_m,tip_z_m\n0.0,0.02,0.48,0.003\n0.005,,,\n"
     response_model=TrackImport,
     responses=http.errors(400, 413),
     summary="Read a file of a tracking system",
-    dependencies=[UPLOAD_SLOT],
+    dependencies=[READ_SLOT],
 )
 def import_file(file: UploadFile, given: Options) -> Response:
     """Return what was understood of the file, the options that it does not state, and a preview of the tracks."""
@@ -52,7 +52,7 @@ def import_file(file: UploadFile, given: Options) -> Response:
         **http.errors(400, 413),
     },
     summary="Convert a file of a tracking system",
-    dependencies=[UPLOAD_SLOT],
+    dependencies=[READ_SLOT],
 )
 def import_table(file: UploadFile, given: Options) -> Response:
     """Return the tracks as the table of a recording: times in seconds, positions in metres, empty cells in gaps."""

@@ -71,7 +71,7 @@ async function add(event) {
   if (found.length) return;
   try {
     const csv = await hooks.table();
-    recordings.push({ ...given, csv, frames: tracks.frames, markers: chosenNames().length });
+    recordings.push({ ...given, csv, frames: tracks.frames, markers: chosenNames() });
   } catch (error) {
     showFaults(form, $("import-recording-errors"), [["", error.text ?? error.message]]);
     return;
@@ -85,9 +85,10 @@ async function add(event) {
 
 function draw() {
   $("import-dataset-part").hidden = !recordings.length;
+  $("import-names").textContent = `The wing must list these markers: ${[...new Set(recordings.flatMap((one) => one.markers))].join(", ")}.`;
   $("import-recordings").tBodies[0].replaceChildren(...recordings.map((one) => el("tr", {},
     el("td", {}, one.name), el("td", {}, el("span", { className: one.held_out ? "badge held" : "badge" }, one.held_out ? "held out" : "to fit")),
-    el("td", { className: "n" }, one.frames.toLocaleString("en")), el("td", { className: "n" }, String(one.markers)),
+    el("td", { className: "n" }, one.frames.toLocaleString("en")), el("td", { className: "n" }, String(one.markers.length)),
     el("td", { className: "prose" }, conditions(one)),
     el("td", {}, el("button", { type: "button", ariaLabel: `Remove ${one.name}`, onclick: () => remove(one) }, "Remove")))));
 }

@@ -78,6 +78,7 @@ function choose(files) {
 
 // Send the file with the answers given so far, and show what the server understood.
 async function read() {
+  if (!file) return;
   const mine = ++request;
   showProblem(null);
   if (file.size > LARGEST) return showProblem(new ApiError(`${file.name} has ${size(file.size)}; at most 64 MiB are read here: cut the recording in parts, or use the command wingfit import.`));

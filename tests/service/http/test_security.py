@@ -18,6 +18,8 @@ from tests.oracles.datasets import example_files, zipped, zipped_with
 from tests.service import toy
 from tests.service.conftest import Api, serving
 from wingfit.diagnosis import DiagnosisSpec
+from wingfit.importers import inspection
+from wingfit.importers import limits as track_limits
 from wingfit.records import limits
 from wingfit.records.description.schema import dataset_schema
 from wingfit.records.files import confined
@@ -97,7 +99,7 @@ def test_nothing_answers_that_is_not_described(client: httpx.Client) -> None:
     ):
         assert path not in described
         assert client.get(path).status_code == 404, path
-    assert linked <= {"icon.svg", "style.css", "app.js", "docs"}
+    assert linked <= {"icon.svg", "style.css", "importing/style.css", "app.js", "docs"}
     assert all(path.startswith("/v1/") for path in described)
 
 
@@ -240,7 +242,7 @@ def test_the_documented_limits_are_those_of_the_code() -> None:
     run, diagnosis = requests.RunIn, diagnosis_requests.DiagnosisIn
     in_force = {
         "request line and headers": header_limits.HEAD_LIMIT // 2**10,
-        "body of an upload": request_limits.UPLOAD_LIMIT // 2**20,
+        "body of an upload, or of a file of a tracking system": request_limits.UPLOAD_LIMIT // 2**20,
         "any other body": request_limits.BODY_LIMIT // 2**20,
         "unpacked archive": limits.MAX_EXPANDED_BYTES // 2**20,
         "unpacked over packed size, of an upload of more than 16 MiB unpacked": limits.MAX_COMPRESSION_RATIO,
@@ -267,11 +269,14 @@ def test_the_documented_limits_are_those_of_the_code() -> None:
         "items on a page": responses.LARGEST_PAGE,
         "generations on a page of a history": responses.LARGEST_HISTORY_PAGE,
         "recorded coordinates in an answer": views.MOST_COORDINATES,
+        "frames of a preview of imported tracks": inspection.PREVIEW_FRAMES,
+        "positions of a preview of imported tracks": inspection.PREVIEW_POSITIONS,
+        "numbers of a file of a tracking system": track_limits.MAX_TRACK_VALUES,
         "concurrent simulations": concurrency_limit.SIMULATIONS,
-        "concurrent uploads": concurrency_limit.UPLOADS,
+        "concurrently read uploads and files of tracking systems": concurrency_limit.UPLOADS,
         "concurrent NetCDF exports": concurrency_limit.EXPORTS,
         "concurrent downloads of archives, exports, findings, reports and histories": concurrency_limit.DOWNLOADS,
-        "simulated answers sent concurrently": concurrency_limit.ANSWERS,
+        "simulated answers and imported tracks sent concurrently": concurrency_limit.ANSWERS,
         "requests waiting for each of these": concurrency_limit.MAX_WAITING,
         "concurrent backups": concurrency_limit.BACKUPS,
         "requests waiting for a backup": concurrency_limit.MAX_WAITING_BACKUPS,

@@ -107,7 +107,8 @@ def test_the_form_asks_what_the_file_does_not_state(seen: Seen) -> None:
     seen.wait("document.querySelectorAll('#import-asked .field').length === 2")
     assert asked(seen) == ["unit", "rate_hz"]
     known = seen.page.inner_text("#import-known")
-    assert known == "Format: DLTdv CSV; 3 markers, 8 frames; the numbers in it are x -0.100 to 20.3, y 2.00 to 480, z -258 to 266."
+    ranges = "x -0.100 to 20.3, y 2.00 to 480, z -258 to 266"
+    assert known == f"Format: DLTdv CSV; 3 markers, 8 frames; the numbers in it are {ranges}."
     assert "in the unit of the calibration" in seen.page.inner_text("#import-asked")
     assert not seen.page.evaluate(SHOWN)
     seen.page.select_option("#import-form [name=unit]", "mm")
@@ -118,7 +119,9 @@ def test_the_form_asks_what_the_file_does_not_state(seen: Seen) -> None:
     seen.wait(SHOWN)
     assert seen.rows("import-facts") == [["Unit", "mm", "you"], ["Rate", "60 Hz", "you"],
         ["Axes", "of the file; how they lie in the wing is not stated", "nobody"]]  # fmt: skip
-    assert seen.page.inner_text("#import-summary") == "DLTdv CSV, 3 markers, 8 frames, 0.1167 s, 60.00 frames per second"
+    assert (
+        seen.page.inner_text("#import-summary") == "DLTdv CSV, 3 markers, 8 frames, 0.1167 s, 60.00 frames per second"
+    )
     assert seen.rows("import-markers")[1][2:] == [
         "pt2", "75 %", "19.7 to 20.3", "409.6 to 480.0", "-258.0 to 265.9", "272.16"
     ]  # fmt: skip
