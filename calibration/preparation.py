@@ -69,6 +69,8 @@ def prepare(spec: CalibrationSpec, dataset: Dataset) -> Prepared:
     spec = resolved(spec, dataset)
     model, coarse = model_for(dataset, spec), search_model(dataset, spec)
     _refuse_genes(spec, model)
+    if isinstance(model, FlexibleWing):
+        _refuse_without_influence(spec, model)
     fitted = _fitted(spec, dataset)
     for recording in dataset.recordings:  # all of them are judged in the end
         _refuse_unusable(spec, dataset, recording, recording in fitted)
@@ -125,6 +127,23 @@ def _refuse_genes(spec: CalibrationSpec, model: Model) -> None:
         if name not in known:
             raise ValueError(f"unknown gene {name!r}; there are {', '.join(known)}")
     base_genome(model, spec.fixed)
+
+
+def _refuse_without_influence(spec: CalibrationSpec, model: FlexibleWing) -> None:
+    """Raise ValueError if ``spec`` requests a gene that cannot be estimated, or if there is none that can."""
+    structure = model.wing.structure
+    for name in spec.genes:
+        if name in model.idle:
+            raise ValueError(
+                f"gene {name!r} has no influence on a wing with structure {structure!r} and cannot be estimated; leave "
+                f"it out (genes with influence: {', '.join(model.searched) or 'none'})"
+            )
+    if not model.searched:
+        raise ValueError(
+            "nothing to calibrate: the wing is rigid, so that its markers follow the drive, whatever its stiffness and "
+            "the air; describe it with structure: sheet to estimate a stiffness, or include an effect of the drive or "
+            "the cameras (effects, --with), such as stroke_amplitude"
+        )
 
 
 def _free(spec: CalibrationSpec, model: Model, never: Collection[str] = ()) -> tuple[str, ...]:

@@ -110,6 +110,8 @@ class WingSubject(_Rig):
     @property
     def description(self) -> str:
         """The nominal model in one line of text for the user."""
+        if self.model.wing.structure == "rigid":
+            return "rigid wing" + _effects_text(self.model.effects)
         bodies = Division.parse(self.model.division).bodies
         along = ", ".join(map(str, bodies)) if len(set(bodies)) > 1 else f"{bodies[0]} each"
         words = f"flexible wing of {sum(bodies)} bodies in {len(bodies)} strips ({along})"
@@ -125,8 +127,10 @@ class WingSubject(_Rig):
         More strips alone do not show the chordwise bending that a discretisation omits, which is most of the error of a
         coarse one (Robird wing with 4 bodies: 4 to 6 mm, in 8 strips no less; with 24 bodies 1 mm), except where the
         chord does not bend. An even number, because an odd number is worse than one fewer: 18 bodies, 3 along the
-        chord, 3 to 5 mm. Wings of more than MAX_BODIES are omitted.
+        chord, 3 to 5 mm. Wings of more than MAX_BODIES are omitted. A rigid wing has no discretisation.
         """
+        if self.model.wing.structure == "rigid":
+            return ()
         bodies = Division.parse(self.model.division).bodies
         chordwise, strips = max(bodies), len(bodies) + 2
         finer = [(2 * len(bodies) if chordwise == 1 else strips, chordwise), (strips, chordwise // 2 * 2 + 2)]

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Literal
 
 from wingfit.records.drive import Drive
+
+Structure = Literal["sheet", "rigid"]
 
 
 @dataclass(frozen=True)
@@ -38,7 +41,10 @@ class Rod:
 
 @dataclass(frozen=True)
 class Materials:
-    """Densities of the wing, which no calibration searches: foam (kg/m^3), skin and its glue (kg/m^2, both faces)."""
+    """Densities of the wing, which no calibration searches: foam (kg/m^3), skin and its glue (kg/m^2, both faces).
+
+    The areal density of the wing, without rods and markers, is foam density times thickness plus that of the skin.
+    """
 
     foam_density: float
     skin_areal_density: float
@@ -69,18 +75,22 @@ class Wing:
     the rear rod; the rear rod lags by the condition's phase lag. ``reference_markers`` define the start of the beat:
     where their mean height crosses that of the hinge on the upstroke (van der Grinten's thesis, IV-A). ``estimates``
     are the user's estimates of genes by name, overriding the model's defaults.
+
+    ``structure`` is None for a wing of foam and rods. A "sheet" has no rods: it is elastic over its thickness, and the
+    drive holds its root chord. A "rigid" wing has no rods either and turns as a whole with the drive.
     """
 
     name: str
     stations: tuple[Station, ...]
     materials: Materials
     rods: tuple[Rod, ...]
-    driven_rods: tuple[str, str]
+    driven_rods: tuple[str, ...]
     markers: tuple[Marker, ...]
     reference_markers: tuple[str, ...]
     hinge: Hinge
     drive: Drive
     estimates: Mapping[str, float] = field(default_factory=dict)
+    structure: Structure | None = None
 
     @property
     def span(self) -> float:

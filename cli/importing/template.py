@@ -43,6 +43,12 @@ def wing_template(
     close: Annotated[bool, typer.Option("--close", help="The line from last to first point belongs to it.")] = False,
     fill_gaps: Annotated[bool, typer.Option("--fill-gaps", help="Gaps, e.g. between feathers, count as wing.")] = False,
     accuracy: Annotated[float, typer.Option(help="Largest error of the area of the stations, as a fraction.")] = 0.001,
+    structure: Annotated[
+        Literal["sheet", "rigid"] | None, typer.Option(help="A wing without rods, such as that of an animal.")
+    ] = None,
+    mass_g: Annotated[
+        float | None, typer.Option(help="Mass of such a wing without markers, g, spread evenly over its area.")
+    ] = None,
     thickness_mm: Annotated[str | None, typer.Option(help="Thickness: one number, or ROOT,TIP, mm.")] = None,
     marker_grid: Annotated[str | None, typer.Option(help="Markers: number along span x along chord, e.g. 4x3.")] = None,
     markers: Annotated[
@@ -73,7 +79,8 @@ def wing_template(
         found = planform.wing_template(
             outline_file, root=root, leading_edge=leading_edge, unit=unit, mm_per_unit=mm_per_unit, span_mm=span_mm,
             hinge_mm=hinge_mm, hinge_z_mm=hinge_z_mm, origin=_pair("--origin", origin, ",", "12.5,3"), outline=outline,
-            close=close, fill_gaps=fill_gaps, accuracy=accuracy, thickness_mm=_thickness(thickness_mm),
+            close=close, fill_gaps=fill_gaps, accuracy=accuracy,
+            structure=structure, mass_g=mass_g, thickness_mm=_thickness(thickness_mm),
             marker_grid=_grid(marker_grid), marker_file=None if markers is None else str(markers),
             marker_z_mm=marker_z_mm, marker_mass_g=marker_mass_g, name=name, decimal=decimal,
         )  # fmt: skip

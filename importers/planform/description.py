@@ -23,6 +23,13 @@ wing:
   # x aft, y outboard, z up, in metres; {origin}
   stations:
 """
+_WITHOUT_RODS = """\
+  structure: {structure}
+  # Areal density = foam density (of what fills the thickness) * thickness + that of the skin; one of the two may be 0
+  materials:
+    foam_density_kg_m3: 0
+    skin_areal_density_kg_m2: {skin}
+"""
 _REST = """\
   materials:
     foam_density_kg_m3: {foam}
@@ -47,21 +54,15 @@ def description(
     title: str,
     sections: Sections,
     hinge: tuple[float, float],
+    area: float,
     markers: Sequence[PlacedMarker],
     options: OutlineOptions,
 ) -> str:
-    """Return the text of ``dataset.yaml``; ``hinge`` is the place (y, z) of the flapping axis, m."""
+    """Return the text of ``dataset.yaml``; ``hinge`` is the place (y, z) of the flapping axis, m; ``area`` in m^2."""
     origin = "zero where --origin says" if options.origin else "zero at the leading edge of the root end"
     parts = [_HEAD.format(file=" ".join(file.split()), title=json.dumps(title, ensure_ascii=False), origin=origin)]
     parts += _stations(sections, options)
-    parts.append(
-        _REST.format(
-            foam=_blank("density of the foam, kg/m^3"),
-            skin=_blank("areal density of the skin with its glue, both faces together, kg/m^2"),
-            rods=_blank("list of at least two rods"),
-            driven=_blank("list of two rods that the drive turns, the front and the rear one: [front, rear]"),
-        )
-    )
+    parts.append(_structure(area, options))
     parts.append(_markers(markers))
     parts.append(
         _TAIL.format(
@@ -73,6 +74,19 @@ def description(
         )
     )
     return "".join(parts)
+
+
+def _structure(area: float, options: OutlineOptions) -> str:
+    if options.structure is not None:
+        mean = _blank("mean areal density of the wing, its mass / area, kg/m^2")
+        skin = mean if options.mass_g is None else f"{options.mass_g * 1e-3 / area:.6g}"
+        return _WITHOUT_RODS.format(structure=options.structure, skin=skin)
+    return _REST.format(
+        foam=_blank("density of the foam, kg/m^3"),
+        skin=_blank("areal density of the skin with its glue, both faces together, kg/m^2"),
+        rods=_blank("list of at least two rods"),
+        driven=_blank("list of two rods that the drive turns, the front and the rear one: [front, rear]"),
+    )
 
 
 def _stations(sections: Sections, options: OutlineOptions) -> list[str]:

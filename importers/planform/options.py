@@ -8,6 +8,7 @@ from typing import get_args
 
 from wingfit.importers.options import UNITS, Decimal
 from wingfit.records.errors import Faults, nearest
+from wingfit.records.wing import Structure
 
 SIDES = {"left": "low-x", "right": "high-x", "low-x": "low-x", "high-x": "high-x", "low-y": "low-y", "high-y": "high-y"}
 VERTICAL = ("top", "bottom")  # low-y or high-y, depending on where y points in the drawing
@@ -32,6 +33,8 @@ class OutlineOptions:
         close: the straight line from the last point to the first belongs to the outline.
         fill_gaps: gaps and overhangs (between feathers, say) count as wing.
         accuracy: largest error of the area of the stations, as a fraction of it.
+        structure: "sheet" or "rigid" for a wing without rods; None: a wing of foam and rods.
+        mass_g: of the wing without markers, spread evenly over its area; for a wing without rods.
         thickness_mm: of the wing, at its root and its tip, mm; linear in between.
         marker_grid: numbers of markers along span and chord.
         marker_file: path of a table of markers: name,x,y in the coordinates of the outline; optional z_mm, mass_g.
@@ -52,6 +55,8 @@ class OutlineOptions:
     close: bool = False
     fill_gaps: bool = False
     accuracy: float = 0.001
+    structure: str | None = None
+    mass_g: float | None = None
     thickness_mm: tuple[float, float] | None = None
     marker_grid: tuple[int, int] | None = None
     marker_file: str | None = None
@@ -94,6 +99,7 @@ class OutlineOptions:
             ("--hinge-z-mm", self.hinge_z_mm, -1000, 1000, "mm"),
             ("--thickness-mm", thickness[0], 1e-4, 500, "mm"),
             ("--thickness-mm", thickness[1], 1e-4, 500, "mm"),
+            ("--mass-g", self.mass_g, 1e-6, 1e5, "g"),
             ("--marker-z-mm", self.marker_z_mm, -1000, 1000, "mm"),
             ("--marker-mass-g", self.marker_mass_g, 0, 100, "g"),
             ("--accuracy", self.accuracy, LEAST_ACCURACY, MOST_ACCURACY, ""),
@@ -101,6 +107,13 @@ class OutlineOptions:
             if value is not None and not low <= value <= high:
                 limits = f"it must lie in [{low:g}, {high:g}] {unit}".rstrip()
                 faults.add(option, value, f"is {value:g} {unit}; {limits}")
+        if self.structure not in (None, *get_args(Structure)):
+            faults.add(
+                "--structure", self.structure, f"is {self.structure!r}; it must be sheet or rigid, or be left out"
+            )
+        if self.mass_g is not None and self.structure is None:
+            message = "is for a wing without rods; give --structure sheet or rigid, or fill in the densities instead"
+            faults.add("--mass-g", self.mass_g, message)
         if self.origin is not None and not all(map(math.isfinite, self.origin)):
             faults.add("--origin", self.origin, "must be two finite numbers, such as 12.5,3")
         if self.marker_grid is not None and not all(1 <= count <= 100 for count in self.marker_grid):

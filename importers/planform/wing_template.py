@@ -91,6 +91,8 @@ def wing_template(
     close: bool = False,
     fill_gaps: bool = False,
     accuracy: float = 0.001,
+    structure: str | None = None,
+    mass_g: float | None = None,
     thickness_mm: tuple[float, float] | None = None,
     marker_grid: tuple[int, int] | None = None,
     marker_file: str | None = None,
@@ -116,6 +118,8 @@ def wing_template(
         close: the straight line from the last point to the first belongs to the outline.
         fill_gaps: gaps and overhangs count as wing.
         accuracy: largest error of the area of the stations, as a fraction of it.
+        structure: "sheet" or "rigid" for a wing without rods, such as that of an animal.
+        mass_g: of the wing without markers, spread evenly over its area; for a wing without rods.
         thickness_mm: of the wing at its root and its tip.
         marker_grid: numbers of markers along span and chord.
         marker_file: table of markers: name,x,y in the coordinates of the outline; optional z_mm, mass_g.
@@ -154,7 +158,7 @@ def wing_template(
         markers=tuple(markers),
         measures=sizes,
         outline_area_m2=area,
-        yaml=description(file, title, found, hinge, markers, options),
+        yaml=description(file, title, found, hinge, sizes.area_m2, markers, options),
         remarks=(*drawn.remarks, *remarks, *_remarks(found, sizes, area, options)),
     )
 

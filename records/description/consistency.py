@@ -8,7 +8,7 @@ from decimal import Decimal
 import numpy as np
 
 from wingfit.records.array_types import Array, Float
-from wingfit.records.description.dataset_file import DatasetFile, SeriesDatasetFile, VehicleDatasetFile
+from wingfit.records.description.dataset_file import DatasetFile, SeriesDatasetFile, VehicleDatasetFile, WingDatasetFile
 from wingfit.records.description.fields import FourierFile
 from wingfit.records.description.vehicle_file import MotionFile, VehicleFile, VehicleRecordingFile
 from wingfit.records.description.wing_file import StationFile, WingFile
@@ -27,13 +27,15 @@ def inconsistencies(dataset: DatasetFile) -> Iterator[Inconsistency]:
     if isinstance(dataset, SeriesDatasetFile):
         yield from _series(dataset)
     else:
-        yield from _vehicle(dataset) if isinstance(dataset, VehicleDatasetFile) else _wing(dataset.wing)
+        yield from _vehicle(dataset) if isinstance(dataset, VehicleDatasetFile) else _wing(dataset)
     recordings = [recording.name for recording in dataset.recordings]
     yield from _unique(("recordings",), recordings, "name", ignore_case=True)
     yield from _references(("held_out",), dataset.held_out, recordings, "recording")
 
 
-def _wing(wing: WingFile) -> Iterator[Inconsistency]:
+def _wing(dataset: WingDatasetFile) -> Iterator[Inconsistency]:
+    wing = dataset.wing
+    yield from _foam_and_rods(wing) if wing.structure is None else _without_rods(dataset)
     yield from _increasing(("wing", "stations"), "y", [station.y_m for station in wing.stations])
     rods, markers = [rod.name for rod in wing.rods], [marker.name for marker in wing.markers]
     yield from _unique(("wing", "rods"), rods, "name")
@@ -45,6 +47,33 @@ def _wing(wing: WingFile) -> Iterator[Inconsistency]:
     yield from _references(("wing", "driven_rods"), wing.driven_rods, rods, "rod")
     yield from _references(("wing", "reference_markers"), wing.reference_markers, markers, "marker")
     yield from _markers(wing)
+
+
+def _foam_and_rods(wing: WingFile) -> Iterator[Inconsistency]:
+    """Yield what a wing of foam and rods needs and does not have."""
+    without = "for a wing without rods, state 'structure: sheet' or 'structure: rigid' (docs/formats.md)"
+    for key, names in (("rods", wing.rods), ("driven_rods", wing.driven_rods)):
+        if len(names) < 2:
+            message = f"has {len(names)} entries, at least 2 are needed: add some; {without}"
+            yield ("wing", key), None, message
+    if wing.materials.foam_density_kg_m3 == 0:
+        message = f"is 0 kg/m^3; the foam between rods has a density above 0; {without}"
+        yield ("wing", "materials", "foam_density_kg_m3"), wing.materials.foam_density_kg_m3, message
+
+
+def _without_rods(dataset: WingDatasetFile) -> Iterator[Inconsistency]:
+    """Yield what a sheet or a rigid wing must not have."""
+    wing, which = dataset.wing, f"a wing with 'structure: {dataset.wing.structure}'"
+    for key, names in (("rods", wing.rods), ("driven_rods", wing.driven_rods)):
+        if names:
+            yield ("wing", key), None, f"{which} has no rods; remove {key}, or remove structure"
+    if wing.materials.foam_density_kg_m3 == 0 and wing.materials.skin_areal_density_kg_m2 == 0:
+        message = "both densities are 0; a wing has mass: give its mean areal density (mass / area), or a density"
+        yield ("wing", "materials"), None, message
+    for index, recording in enumerate(dataset.recordings):
+        if recording.phase_lag_deg != 0:
+            message = f"is {recording.phase_lag_deg} deg; {which} has no rear rod that lags: it must be 0"
+            yield ("recordings", index, "phase_lag_deg"), recording.phase_lag_deg, message
 
 
 def _vehicle(dataset: VehicleDatasetFile) -> Iterator[Inconsistency]:

@@ -123,11 +123,11 @@ def _dataclasses(hint: Any) -> Iterator[type[Any]]:
 
 
 def _data(values: Mapping[str, object], model: type[BaseModel]) -> dict[str, object]:
-    """Convert attributes to plain data under the keys of ``model``, without None and empty mappings."""
+    """Convert attributes to plain data under the keys of ``model``, without None and what is empty."""
     data = dict[str, object]()
     for key, field in model.model_fields.items():
         attribute, unit = _attribute(key, values)
-        if attribute and values[attribute] not in (None, {}):
+        if attribute and values[attribute] not in (None, {}, ()):
             data[key] = _plain(values[attribute], list(models_in(field.annotation)), unit)
     return data
 

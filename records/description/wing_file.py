@@ -29,9 +29,11 @@ class StationFile(Strict):
 
 
 class MaterialsFile(Strict):
-    """Densities of the wing's foam and skin, which no calibration changes."""
+    """Densities of the wing's body (foam, or what it is made of) and skin, which no calibration changes."""
 
-    foam_density_kg_m3: Annotated[Decimal, limits("(0, 2000] kg/m^3", "density of the foam")]
+    foam_density_kg_m3: Annotated[
+        Decimal, limits("[0, 2000] kg/m^3", "density of the foam, or of what fills the thickness; 0 only without rods")
+    ]
     skin_areal_density_kg_m2: Annotated[
         Decimal, limits("[0, 10] kg/m^2", "skin with its glue, both faces together", "give kg/m^2, not g/m^2")
     ]
@@ -93,13 +95,24 @@ class FourBarFile(Strict):
 
 
 class WingFile(Strict):
-    """The wing: planform, materials, rods, markers, hinge and drive."""
+    """The wing: planform, materials, rods, markers, hinge and drive.
+
+    Without ``structure`` it is of foam with at least two rods. A ``sheet`` has no rods and is elastic, a ``rigid`` wing
+    turns as a whole.
+    """
 
     name: fields.Title
+    structure: Literal["sheet", "rigid"] | None = Field(
+        None, description="a wing without rods: an elastic sheet, or rigid; leave it out for a wing of foam and rods"
+    )
     stations: list[StationFile] = Field(min_length=2, max_length=MAX_STATIONS)
     materials: MaterialsFile
-    rods: list[RodFile] = Field(min_length=2, max_length=MAX_RODS)
-    driven_rods: list[fields.Name] = Field(min_length=2, max_length=2, description="front rod, rear rod")
+    rods: list[RodFile] = Field(
+        default_factory=list, max_length=MAX_RODS, description="at least 2; none with structure"
+    )
+    driven_rods: list[fields.Name] = Field(
+        default_factory=list, max_length=2, description="front rod, rear rod; none with structure"
+    )
     markers: list[MarkerFile] = Field(min_length=1, max_length=MAX_MARKERS)
     reference_markers: list[fields.Name] = Field(min_length=1, max_length=MAX_MARKERS)
     hinge: HingeFile

@@ -109,6 +109,7 @@ class Effect:
         observe: function that changes a simulated beat before it is compared with a recording; only for the port
             "observation".
         observed: kinds of recording that ``observe`` acts on.
+        of_rods: whether it needs a wing with rods.
     """
 
     name: str
@@ -130,6 +131,7 @@ class Effect:
     during: bool = False
     observe: Callable[[Sampling, Values], None] | None = None
     observed: tuple[Literal["tracks", "forces"], ...] = ()
+    of_rods: bool = False
 
     def __post_init__(self) -> None:
         if self.family not in FAMILIES[self.port]:
@@ -168,8 +170,15 @@ class Effect:
         return tuple(rig for rig, acts in both if acts)
 
     def applies_to(self, rig: Wing | Vehicle) -> bool:
-        """Return whether the effect applies to ``rig``."""
-        return ("wing" if isinstance(rig, Wing) else "vehicle") in self.rigs
+        """Return whether the effect applies to ``rig``.
+
+        A rigid wing moves as the drive does: only effects of its motion and of the observation show, and no load.
+        """
+        if not isinstance(rig, Wing):
+            return "vehicle" in self.rigs
+        if rig.structure == "rigid" and (self.port not in ("drive", "observation") or (self.wing and self.memory)):
+            return False
+        return "wing" in self.rigs and not (self.of_rods and rig.structure is not None)
 
     def fits(self, terms: Collection[str]) -> bool:
         """Return whether the effect can be added to a vehicle's model of these ``terms``."""

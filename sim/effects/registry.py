@@ -49,7 +49,7 @@ def chosen(names: Iterable[str], rig: Wing | Vehicle) -> tuple[Effect, ...]:
         if wanted.count(name) > 1:
             raise ValueError(f"effect {name!r} is named {wanted.count(name)} times; name it once")
         if not EFFECTS[name].applies_to(rig):
-            kind = "wing" if isinstance(rig, Wing) else "vehicle"
+            kind = f"{rig.structure or ''} wing".strip() if isinstance(rig, Wing) else "vehicle"
             known = ", ".join(n for n, effect in EFFECTS.items() if effect.applies_to(rig))
             raise ValueError(f"effect {name!r} does not apply to a {kind}; there are {known}: remove it")
     return tuple(effect for name, effect in EFFECTS.items() if name in wanted)

@@ -28,7 +28,8 @@ from wingfit.sim.solver.simulate import Beat, neighbouring_beats, periodic_beats
 from wingfit.sim.wing.alignment import REFERENCE_HARMONICS, recorded_crossing, reference_columns, upstroke_crossing
 from wingfit.sim.wing.beat_series import SlowChange, aligned_values, distinct, on_grid, series_of
 from wingfit.sim.wing.division import Division
-from wingfit.sim.wing.genes import AERODYNAMIC, FACTOR, STRUCTURAL, lanes, wing_genes
+from wingfit.sim.wing.genes import AERODYNAMIC, FACTOR, ROD_GENES, STRUCTURAL, lanes, wing_genes
+from wingfit.sim.wing.rigid import rigid_beats
 from wingfit.sim.wing.structure import Structure, build
 
 Key = TypeVar("Key")
@@ -112,8 +113,13 @@ class FlexibleWing:
 
     @property
     def searched(self) -> tuple[str, ...]:
-        """Names of the genes that a calibration estimates: all genes."""
-        return tuple(gene.name for gene in self.genes)
+        """Names of the genes that a calibration estimates: all that have an influence."""
+        return tuple(gene.name for gene in self.genes if gene.name not in self.idle)
+
+    @property
+    def idle(self) -> tuple[str, ...]:
+        """Names of the genes without influence: those of rods in a sheet, and all of the wing's own if it is rigid."""
+        return {None: (), "sheet": ROD_GENES, "rigid": STRUCTURAL + AERODYNAMIC}[self.wing.structure]
 
     @cached_property
     def structure(self) -> Structure:
@@ -173,6 +179,11 @@ class FlexibleWing:
         batch = self._at(moment, batch)
         first, wing = distinct(self._acting(batch, [effect for effect in self.chosen if effect.wing]))
         wings, found = batch[first], dict[int, Beat]()
+        if self.wing.structure == "rigid":
+            for effects, rows in by_active([effect for effect in self.chosen if effect.wing], self.genes, wings):
+                beats = rigid_beats(self.subject(effects, recording.condition), wings[rows])
+                found.update(zip(rows, beats, strict=True))
+            return [found[k] for k in range(len(wings))], wing
         if self.differentiates:
             return list(self._neighbours(wings, recording.condition)), wing
         for effects, rows in by_active([effect for effect in self.chosen if effect.wing], self.genes, wings):

@@ -43,6 +43,7 @@ NO_LAWS = Laws(
 )  # fmt: skip
 
 STRUCTURAL = tuple(row[0] for row in _STRUCTURE)
+ROD_GENES = ("E_r", "G_r")
 _WEIGHTS = tuple(f"{prefix}_{k}" for prefix in ("L", "ID") for k in range(1, QUARTERS + 1))
 AERODYNAMIC = (*(row[0] for row in _AERODYNAMICS), *_WEIGHTS)
 

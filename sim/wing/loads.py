@@ -30,6 +30,8 @@ def simulate_outputs(model: FlexibleWing, genome: Sequence[float], recording: Re
     to the energy supplied, unless the number is given in ``model.numerics``. ValueError with the reason if the
     simulation fails.
     """
+    if model.wing.structure == "rigid":
+        raise ValueError("the loads of a rigid wing are not computed; describe it as a stiff sheet: structure: sheet")
     beat = _fine(model).beat(genome, recording, with_motion=True)
     if beat.reason is not None:  # perhaps with the accuracy that tracks need
         beat = model.beat(genome, recording, with_motion=True)

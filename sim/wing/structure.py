@@ -261,6 +261,8 @@ def _at_root(planform: Planform, division: Division, parts: list[Body]) -> list[
     wing, count = planform.wing, division.bodies[0]
     y, y1 = wing.stations[0].y, float(parts[0].centroid[1])
     entries = []
+    if wing.structure is not None:
+        return _clamped_root(planform, division, y1)
     for name in wing.driven_rods:
         rod = next(r for r in wing.rods if r.name == name)
         if not (rod.y_root <= y + _DRIVEN_GAP and rod.y_tip >= y):
@@ -279,6 +281,25 @@ def _at_root(planform: Planform, division: Division, parts: list[Body]) -> list[
         rods = _rod_parts(planform, [replace(rod, y_root=min(y, rod.y_root))], y, y1)
         found.append(Connector(-1 - number, body, point, foam, *rods, SPANWISE_MODULUS))
     return found
+
+
+def _clamped_root(planform: Planform, division: Division, y1: float) -> list[Connector]:
+    """Connectors between the drive and the bodies at the root of a wing without rods; y1 (m): centroids of the bodies.
+
+    Each body at the root is held at the middle of its root chord; a single one at a quarter and three quarters of it.
+    The front half is counted as held by the front driving rod, the rear half by the rear one, which moves alike.
+    """
+    y, count = planform.wing.stations[0].y, division.bodies[0]
+    held = [(0, 0.25), (0, 0.75)] if count == 1 else [(k, (k + 0.5) / count) for k in range(count)]
+    section = Rectangle(float(planform.chord(y)) / len(held), float(planform.thickness(y)))
+    torsion = _twisting(planform, y) * section.width * _spanwise_share(count)
+    foam = _rigidities(section, torsion, True) / (y1 - y)
+    rods = _rod_parts(planform, [], y, y1)
+    return [
+        Connector(-1 if fraction < 0.5 else -2, body, np.array([planform.x(fraction, y), y, 0.0]), foam, *rods,
+                  SPANWISE_MODULUS)
+        for body, fraction in held
+    ]  # fmt: skip
 
 
 def _wiring(

@@ -171,3 +171,13 @@ def test_a_file_without_a_wing_is_not_drawn() -> None:
     ):
         with pytest.raises(DatasetError, match=words):
             read_plan(text.encode(), "dataset.yaml")
+
+
+def test_an_animal_s_wing_needs_no_rods(tmp_path: Path) -> None:
+    found = described(tmp_path, SWEPT, structure="rigid", mass_g=11.0, thickness_mm=(8.0, 4.0))
+    assert "rods" not in found.yaml
+    assert "structure: rigid" in found.yaml
+    density = float(re.findall(r"skin_areal_density_kg_m2: (\S+)", found.yaml)[0])
+    assert math.isclose(density, 0.011 / 0.011, rel_tol=1e-5)  # 11 g on 0.011 m^2
+    assert "give --structure" in refused(tmp_path, SWEPT, mass_g=11.0)
+    assert "must be sheet or rigid" in refused(tmp_path, SWEPT, structure="soft")

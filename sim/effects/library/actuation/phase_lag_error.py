@@ -15,6 +15,7 @@ def _wing(scene: WingScene, values: Values) -> None:
 
 EFFECT = effect_of_drive(
     name="phase_lag_error",
+    of_rods=True,
     title="Phase lag error",
     size=(Parameter("angle", "rad", -0.4, 0.4, 0.02, "lag of the rear rod beyond the described lag, in drive phase"),),
     law="zeta_rear(psi) = zeta(psi - lag - angle)",

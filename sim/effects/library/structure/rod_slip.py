@@ -80,6 +80,7 @@ _STICK = "bending stiffness of the sticking rods over the full bending stiffness
 
 EFFECT = effect_of_joints(
     name="rod_slip",
+    of_rods=True,
     title="Rods that slip in their straw",
     size=(
         Parameter(
