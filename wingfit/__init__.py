@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from wingfit.calibration.result import GeneResult, RecordingResult, Result
     from wingfit.calibration.series.result import SeriesResult
     from wingfit.calibration.spec import CalibrationSpec
+    from wingfit.checks import DatasetWarning, Mistake, check_dataset, examine, load_dataset
     from wingfit.client.client import Client
     from wingfit.client.transport import ServerAwayError, WingfitError
     from wingfit.diagnosis.finding import Finding
@@ -44,7 +45,6 @@ if TYPE_CHECKING:
         Recording,
         Series,
         SeriesDataset,
-        load_dataset,
         save_dataset,
     )
     from wingfit.report import finding_json, html
@@ -61,6 +61,7 @@ __all__ = [
     "Condition",
     "Dataset",
     "DatasetError",
+    "DatasetWarning",
     "DiagnosisSpec",
     "Finding",
     "ForceResult",
@@ -68,6 +69,7 @@ __all__ = [
     "GeneResult",
     "Genome",
     "ImportedTracks",
+    "Mistake",
     "Port",
     "Quantity",
     "Recording",
@@ -83,9 +85,11 @@ __all__ = [
     "Suspect",
     "WingfitError",
     "calibrate",
+    "check_dataset",
     "declaration",
     "diagnose",
     "drive",
+    "examine",
     "finding_json",
     "html",
     "import_tracks",
@@ -100,6 +104,7 @@ _MODULES = {
     "wingfit.calibration.result": ("GeneResult", "RecordingResult", "Result"),
     "wingfit.calibration.series.result": ("SeriesResult",),
     "wingfit.calibration.spec": ("CalibrationSpec",),
+    "wingfit.checks": ("DatasetWarning", "Mistake", "check_dataset", "examine", "load_dataset"),
     "wingfit.client.client": ("Client",),
     "wingfit.client.transport": ("ServerAwayError", "WingfitError"),
     "wingfit.diagnosis.finding": ("Finding",),
@@ -116,7 +121,6 @@ _MODULES = {
         "Recording",
         "Series",
         "SeriesDataset",
-        "load_dataset",
         "save_dataset",
     ),
     "wingfit.report": ("finding_json", "html"),
