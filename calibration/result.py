@@ -22,6 +22,7 @@ from wingfit.sim.model import Solution
 from wingfit.sim.wing.alignment import recorded_crossing
 from wingfit.sim.wing.flexible_wing import FlexibleWing
 
+CONTRADICTION = 0.2  # spans: a larger misfit is no missing physics, but tracks that contradict the description
 ADEQUATE = 1.3  # times the tracking noise: the largest misfit that noise is taken to explain
 
 
@@ -143,7 +144,14 @@ def judge(spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, genome:
         if part.reasons[1]
     ]
     drift = drift_remark(dataset.recordings)
-    if noise is not None and not adequate:
+    if after > CONTRADICTION * dataset.wing.span:
+        remarks.append(
+            f"the residual of the best genome on the fitted recordings is {after * 1e3:.3g} mm, on a wing of "
+            f"{dataset.wing.span * 1e3:.3g} mm: tracks and description likely disagree (axes, side of the wing, unit, "
+            "flap frequency), and no discretisation or effect repairs that: check the dataset with 'wingfit datasets "
+            "check'"
+        )
+    elif noise is not None and not adequate:
         cause = "the beat drifts (see below), the search" if drift else "the search"
         remarks.append(
             f"the residual of the best genome on the fitted recordings is {after * 1e3:.2f} mm, {after / noise:.1f} "

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from wingfit.cli.base.options import AsJson, Url
-from wingfit.cli.base.output import Columns, emit, moment, number, progress, records, say, size
+from wingfit.cli.base.output import Columns, emit, moment, number, progress, records, remarks, say, size
 from wingfit.cli.jobs import upload as upload_dataset
 from wingfit.client import answers as a
 from wingfit.client.client import DEFAULT_URL, Client, WingfitError
 
 if TYPE_CHECKING:
-    from wingfit.records import Series, SeriesDataset
+    from wingfit.checks import Mistake
+    from wingfit.records import AnyDataset, Series, SeriesDataset
 
 app = typer.Typer(no_args_is_help=True, help="Upload, list, fetch, delete and check datasets.")
 
@@ -85,19 +86,58 @@ def delete(dataset_id: DatasetId, url: Url = DEFAULT_URL) -> None:
 
 
 @app.command()
-def check(path: Source) -> None:
-    """Check a dataset on this machine, without a server.
+def check(
+    path: Source,
+    fix: Annotated[
+        Path | None,
+        typer.Option(
+            "--fix", help="Write a corrected copy into this new folder, with the changes that need no decision."
+        ),
+    ] = None,
+) -> None:
+    """Check a dataset on this machine, without a server: its format, and its physics (docs/checks.md).
 
     Example: wingfit datasets check my-campaign/
     """
-    from wingfit.records import Recording, SeriesDataset, load_dataset  # imported late: other commands start faster
+    from wingfit.checks import check_dataset  # imported late: other commands start faster
 
     try:
-        dataset = load_dataset(path)
+        dataset, mistakes = check_dataset(path)
+        if fix is not None:
+            _fix(path, fix, mistakes)
+            return
     except ValueError as error:
         faults = [vars(fault) for fault in getattr(error, "errors", [])]
         detail = f"{len(faults)} errors" if faults else str(error)
         raise WingfitError(f"{path} is not a valid dataset", detail, errors=faults) from error
+    remarks((str(one) for one in mistakes if not one.certain), "warning")
+    certain = [vars(one.fault) for one in mistakes if one.certain]
+    if certain:
+        fixable = any(one.edits for one in mistakes)
+        hint = f"; for a corrected copy: wingfit datasets check {path} --fix NEW_FOLDER" if fixable else ""
+        raise WingfitError(f"{path} has mistakes", f"{len(certain)} errors{hint}", errors=certain)
+    _valid(path, dataset)
+
+
+def _fix(path: Path, target: Path, mistakes: Sequence[Mistake]) -> None:
+    """Write the corrected copy, and say what was changed, what was not, and whether it passes the checks now."""
+    from wingfit.checks import check_dataset
+    from wingfit.checks.repair import repaired
+
+    edits = repaired(path, target, mistakes)
+    for edit in edits:
+        say(f"changed {edit}")
+    for one in mistakes:
+        if not one.edits:
+            say(f"not changed {one}")
+    left = check_dataset(target).mistakes
+    remarks((str(one) for one in left), "left")
+    say(f"{target}: {len(edits)} changes; {path} is as it was" + ("" if left else "; the copy passes all checks"))
+
+
+def _valid(path: Path, dataset: AnyDataset) -> None:
+    from wingfit.records import Recording, SeriesDataset
+
     if isinstance(dataset, SeriesDataset):
         say(f"{path} is valid: '{dataset.name}', rig '{dataset.rig}'")
         records(dataset.recordings, _series_columns(dataset))
@@ -140,7 +180,15 @@ def _list(datasets: list[a.Dataset]) -> None:
     records(datasets, columns, "no datasets; upload one: wingfit datasets upload FOLDER")
 
 
+def _warned(dataset: a.Dataset) -> None:
+    """Print the likely mistakes that the server found at the upload."""
+    for one in dataset["warnings"]:
+        text = f"{one['where']}: {one['value']}; expected {one['expected']}; likely cause: {one['cause']}"
+        remarks([f"{text}; change {one['change']}"], "warning")
+
+
 def _uploaded(dataset: a.Dataset) -> None:
+    _warned(dataset)
     say(f"dataset {dataset['id']} '{dataset['name']}' with {len(dataset['recordings'])} recordings")
     if dataset["kind"] == "series":
         say(f"next: wingfit diagnose {dataset['id']} --rig my_rig.py")
@@ -153,6 +201,7 @@ def _show(dataset: a.Dataset) -> None:
     say(f"{size(dataset['size_bytes'])}, uploaded {moment(dataset['created_at'])}")
     if dataset["description"]:
         say(dataset["description"])
+    _warned(dataset)
     if dataset["rig"]:
         _show_series(dataset, dataset["rig"])
         return

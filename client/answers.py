@@ -135,10 +135,25 @@ class RigInfo(TypedDict):
     settings: list[QuantityInfo]
 
 
+class DatasetWarning(TypedDict):
+    """A likely mistake in a dataset that was accepted: where, the value, the expected one, the cause and the change.
+
+    ``kind`` names what is wrong in one or two words, such as "frequency" or "air pressure".
+    """
+
+    kind: str
+    where: str
+    value: str
+    expected: str
+    cause: str
+    change: str
+
+
 class Dataset(TypedDict):
     """An uploaded dataset: marker tracks of a wing, forces of a vehicle, or series of a rig of the user's own.
 
-    ``sha256`` is that of the uploaded file; ``rig`` describes the rig of series, and is null for others.
+    ``sha256`` is that of the uploaded file; ``rig`` describes the rig of series, and is null for others. ``warnings``
+    are likely mistakes that the checks found at the upload; empty also for a dataset from before there were checks.
     """
 
     id: str
@@ -151,6 +166,7 @@ class Dataset(TypedDict):
     markers: int
     rig: RigInfo | None
     recordings: list[RecordingInfo]
+    warnings: list[DatasetWarning]
 
 
 class SeriesValues(TypedDict):

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from wingfit.calibration.result import GeneResult, RecordingResult, Result
     from wingfit.calibration.series.result import SeriesResult
     from wingfit.calibration.spec import CalibrationSpec
+    from wingfit.checks import DatasetWarning, Mistake, check_dataset, examine, load_dataset
     from wingfit.client.client import Client
     from wingfit.client.transport import ServerAwayError, WingfitError
     from wingfit.diagnosis.finding import Finding
@@ -47,7 +48,6 @@ if TYPE_CHECKING:
         Recording,
         Series,
         SeriesDataset,
-        load_dataset,
         save_dataset,
     )
     from wingfit.report import finding_json, html
@@ -65,6 +65,7 @@ __all__ = [
     "Condition",
     "Dataset",
     "DatasetError",
+    "DatasetWarning",
     "DiagnosisSpec",
     "Finding",
     "ForceResult",
@@ -72,6 +73,7 @@ __all__ = [
     "GeneResult",
     "Genome",
     "ImportedTracks",
+    "Mistake",
     "Port",
     "Quantity",
     "Recording",
@@ -88,9 +90,11 @@ __all__ = [
     "WingTemplate",
     "WingfitError",
     "calibrate",
+    "check_dataset",
     "declaration",
     "diagnose",
     "drive",
+    "examine",
     "finding_json",
     "html",
     "import_tracks",
@@ -107,6 +111,7 @@ _MODULES = {
     "wingfit.calibration.result": ("GeneResult", "RecordingResult", "Result"),
     "wingfit.calibration.series.result": ("SeriesResult",),
     "wingfit.calibration.spec": ("CalibrationSpec",),
+    "wingfit.checks": ("DatasetWarning", "Mistake", "check_dataset", "examine", "load_dataset"),
     "wingfit.client.client": ("Client",),
     "wingfit.client.transport": ("ServerAwayError", "WingfitError"),
     "wingfit.diagnosis.finding": ("Finding",),
@@ -124,7 +129,6 @@ _MODULES = {
         "Recording",
         "Series",
         "SeriesDataset",
-        "load_dataset",
         "save_dataset",
     ),
     "wingfit.report": ("finding_json", "html"),

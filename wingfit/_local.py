@@ -14,6 +14,8 @@ from wingfit.calibration.search import calibrate_prepared
 from wingfit.calibration.series.result import SeriesResult
 from wingfit.calibration.spec import CalibrationSpec
 from wingfit.calibration.summary import summarise, summarise_rig
+from wingfit.checks.examine import examine
+from wingfit.checks.load import refuse
 from wingfit.diagnosis import DiagnosisSpec, Finding, Progress, diagnose_rig
 from wingfit.diagnosis import diagnose as steps_of
 from wingfit.records import AnyDataset, Dataset, SeriesDataset, wing_or_vehicle
@@ -118,6 +120,7 @@ def _steps(
 def _checked(dataset: AnyDataset) -> Dataset:
     """Return ``dataset``, of a wing or a vehicle, checked as one that is read from files; DatasetError lists errors."""
     checked_description(dataset)
+    refuse(examine(dataset))
     return wing_or_vehicle(dataset)
 
 

@@ -24,10 +24,10 @@ _JUNK = re.compile(r"(?:^|/)(?:__MACOSX/|\.DS_Store$|Thumbs\.db$|desktop\.ini$|\
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 
 
-def read_zip(data: bytes, label: str) -> AnyDataset:
+def read_zip(data: bytes, label: str, *, plausible: bool = True) -> AnyDataset:
     """Read a dataset from the bytes of a zip, which holds the dataset's files or one folder with them.
 
-    ``label`` names the zip in messages. DatasetError lists its errors.
+    ``label`` names the zip in messages. DatasetError lists its errors; without ``plausible``, not implausible units.
     """
     try:
         archive = zipfile.ZipFile(io.BytesIO(data))
@@ -44,7 +44,7 @@ def read_zip(data: bytes, label: str) -> AnyDataset:
         except _BROKEN as error:
             raise fail(f"{label}: {name}", None, f"damaged in the zip: {error}; zip and upload again") from None
 
-    return read_files(label, list(entries), read)
+    return read_files(label, list(entries), read, plausible=plausible)
 
 
 def write_zip(dataset: AnyDataset) -> bytes:

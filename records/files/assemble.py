@@ -40,12 +40,19 @@ Entry = TypeVar("Entry", RecordingFile, SeriesRecordingFile)
 
 
 def assemble(
-    document: Document, read: ReadSamples, where: Callable[[str], str], at: At, room: int = MAX_VALUES
+    document: Document,
+    read: ReadSamples,
+    where: Callable[[str], str],
+    at: At,
+    room: int = MAX_VALUES,
+    *,
+    plausible: bool = True,
 ) -> AnyDataset:
     """Build the dataset described by ``document``, of at most ``room`` numbers; DatasetError lists the faults.
 
     ``read(name, room)`` returns the samples, at most ``room`` numbers, of the recording called ``name``. For messages,
     ``where(name)`` says where these samples are stored, and ``at(name, samples, row)`` where one row of them is.
+    ``plausible``: also refuse implausible units and sampling.
     """
     checked, faults = check_description(document), Faults()
     if isinstance(checked, SeriesDatasetFile):
@@ -62,7 +69,8 @@ def assemble(
     for index, entry, whole in _read_all(entries, read, room, faults):
         samples = in_window(entry, whole, document, ("recordings", index), faults)
         recording = to_recording(entry, samples, document, ("recordings", index), faults)
-        check_numbers(recording, rig, where(entry.name), partial(at, entry.name, samples), faults)
+        place = partial(at, entry.name, samples)
+        check_numbers(recording, rig, where(entry.name), place, faults, plausible=plausible)
         recordings.append(recording)
     faults.raise_any()
     return Dataset(checked.name, rig, tuple(recordings), tuple(checked.held_out), checked.description)
@@ -84,7 +92,7 @@ def _read_all(
             break
 
 
-def checked_description(dataset: AnyDataset) -> dict[str, object]:
+def checked_description(dataset: AnyDataset, *, plausible: bool = True) -> dict[str, object]:
     """Check ``dataset`` as reading does, and return the plain data of ``dataset.yaml``; DatasetError lists errors."""
     faults = Faults()
     if isinstance(dataset, SeriesDataset):
@@ -100,7 +108,7 @@ def checked_description(dataset: AnyDataset) -> dict[str, object]:
         where = f"recording {recording.name!r}"
         if dataset.kind == "tracks":
             check_markers(recording.markers, [marker.name for marker in dataset.wing.markers], where, faults)
-        check_numbers(recording, dataset.rig, where, f"{where}, frame {{}}".format, faults)
+        check_numbers(recording, dataset.rig, where, f"{where}, frame {{}}".format, faults, plausible=plausible)
         numbers += recording.values.size + recording.times.size
     if numbers > MAX_VALUES:
         faults.extend(too_much(f"dataset {dataset.name!r}"))

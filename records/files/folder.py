@@ -24,8 +24,8 @@ DESCRIPTION = "dataset.yaml"
 RECORDINGS = "recordings"
 
 
-def read_folder(path: Path) -> AnyDataset:
-    """Read the dataset in the folder ``path``; DatasetError lists its errors."""
+def read_folder(path: Path, *, plausible: bool = True) -> AnyDataset:
+    """Read the dataset in the folder ``path``; DatasetError lists its errors, without ``plausible`` fewer."""
     top = [file.name for file in path.iterdir() if file.is_file()]
     names = top + [f"{RECORDINGS}/{file.name}" for file in (path / RECORDINGS).glob("*") if file.is_file()]
     check_most(str(path), "holds", len(names), MAX_ENTRIES, "files", "is this the right folder?")
@@ -37,13 +37,16 @@ def read_folder(path: Path) -> AnyDataset:
         except OSError as error:
             raise fail(name, None, f"cannot be read: {error.strerror}; check its permissions") from None
 
-    return read_files(str(path), names, read)
+    return read_files(str(path), names, read, plausible=plausible)
 
 
-def read_files(label: str, names: list[str], contents_of: Callable[[str], bytes]) -> AnyDataset:
+def read_files(
+    label: str, names: list[str], contents_of: Callable[[str], bytes], *, plausible: bool = True
+) -> AnyDataset:
     """Read a dataset from the files ``names`` (folders separated by "/"); DatasetError lists its errors.
 
-    ``contents_of(name)`` returns the bytes of a file. ``label`` names the folder or zip in messages.
+    ``contents_of(name)`` returns the bytes of a file. ``label`` names the folder or zip in messages. ``plausible``:
+    also refuse implausible units and sampling.
     """
     if DESCRIPTION not in names:
         raise fail(label, None, _no_description(names))
@@ -66,7 +69,11 @@ def read_files(label: str, names: list[str], contents_of: Callable[[str], bytes]
     faults, dataset = Faults(), None
     try:
         dataset = assemble(
-            document, read, sample_file, lambda name, s, row: f"{sample_file(name)}, line {s.lines[row]}"
+            document,
+            read,
+            sample_file,
+            lambda name, s, row: f"{sample_file(name)}, line {s.lines[row]}",
+            plausible=plausible,
         )
     except DatasetError as error:
         faults.extend(error)
@@ -80,9 +87,12 @@ def read_files(label: str, names: list[str], contents_of: Callable[[str], bytes]
     return dataset
 
 
-def contents(dataset: AnyDataset) -> dict[str, bytes]:
-    """Return the contents of the files of ``dataset`` by file name; DatasetError if it violates the format."""
-    files = {DESCRIPTION: write_yaml(checked_description(dataset)).encode()}
+def contents(dataset: AnyDataset, *, plausible: bool = True) -> dict[str, bytes]:
+    """Return the contents of the files of ``dataset`` by file name; DatasetError if it violates the format.
+
+    ``plausible``: also refuse implausible units and sampling.
+    """
+    files = {DESCRIPTION: write_yaml(checked_description(dataset, plausible=plausible)).encode()}
     for recording in dataset.recordings:
         columns, values = _columns(recording)
         files[sample_file(recording.name)] = write_table(columns, recording.times, values).encode()

@@ -109,13 +109,16 @@ def _write_recording(group: Any, recording: AnyRecording) -> None:
         values.attrs["units"] = unit
 
 
-def read_netcdf(data: bytes, label: str) -> AnyDataset:
-    """Read a dataset from the bytes of a trusted NetCDF-4 file, called ``label`` in messages."""
-    return parse_netcdf(io.BytesIO(data), label)[0]
+def read_netcdf(data: bytes, label: str, *, plausible: bool = True) -> AnyDataset:
+    """Read a dataset from the bytes of a trusted NetCDF-4 file, called ``label`` in messages.
+
+    Without ``plausible``, units and sampling are not checked.
+    """
+    return parse_netcdf(io.BytesIO(data), label, plausible=plausible)[0]
 
 
 def parse_netcdf(
-    opened: BinaryIO, label: str, most: int = limits.MAX_VALUES, *, storage: bool = True
+    opened: BinaryIO, label: str, most: int = limits.MAX_VALUES, *, storage: bool = True, plausible: bool = True
 ) -> tuple[AnyDataset, Parsed]:
     """Read a NetCDF-4 file of at most ``most`` numbers; return the dataset, and its text and samples as stored.
 
@@ -145,7 +148,8 @@ def parse_netcdf(
                 samples[name] = _samples(group, where, _LAYOUTS[model], known, Limit(room, most, storage))
                 return samples[name]
 
-        dataset = assemble(document, read, place, lambda name, _, row: f"{place(name)}, time index {row}", most)
+        at = "{}, time index {}".format
+        dataset = assemble(document, read, place, lambda name, _, row: at(place(name), row), most, plausible=plausible)
     return dataset, Parsed(text, samples)
 
 

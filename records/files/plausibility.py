@@ -8,8 +8,6 @@ from wingfit.records import limits
 from wingfit.records.array_types import Array, Float
 from wingfit.records.dataset import STANDARD_GRAVITY, Recording
 from wingfit.records.errors import Faults
-from wingfit.records.files.flap_frequency import check_frequency
-from wingfit.records.files.track_axes import check_axes
 from wingfit.records.series_checks import SHOWN, Locate, check_times
 from wingfit.records.vehicle import Vehicle
 from wingfit.records.wing import Wing
@@ -17,10 +15,13 @@ from wingfit.records.wing import Wing
 ABSURD = 1e6  # weights: in no unit is the weight so large a number
 
 
-def check_numbers(recording: Recording, rig: Wing | Vehicle, where: str, at: Locate, faults: Faults) -> None:
+def check_numbers(
+    recording: Recording, rig: Wing | Vehicle, where: str, at: Locate, faults: Faults, *, plausible: bool = True
+) -> None:
     """Add a fault for each error in the times and values of ``recording``, a recording of ``rig``.
 
-    In messages, ``where`` is the place of the recording and ``at(row)`` that of one row.
+    In messages, ``where`` is the place of the recording and ``at(row)`` that of one row. ``plausible``: also check
+    units and sampling; without it, only what nothing can be computed with.
     """
     times, values, frames = recording.times, recording.values, len(recording.times)
     quantity = "force" if isinstance(rig, Vehicle) else "position"
@@ -28,7 +29,6 @@ def check_numbers(recording: Recording, rig: Wing | Vehicle, where: str, at: Loc
     markers = len(recording.markers)
     if isinstance(rig, Wing) and not 1 <= markers <= limits.MAX_MARKERS:
         faults.add(where, markers, f"{markers} markers; it must be 1 to {limits.MAX_MARKERS}: add or remove some")
-    known = faults.count
     increasing = check_times(times, at, faults)
     infinite = np.flatnonzero(np.isinf(values).any(axis=1))
     for row in infinite[:SHOWN]:
@@ -38,16 +38,14 @@ def check_numbers(recording: Recording, rig: Wing | Vehicle, where: str, at: Loc
     if np.isnan(values).all():
         faults.add(where, None, f"there is no {quantity} at all; leave the recording out")
         return
+    if not plausible:
+        return
     if isinstance(rig, Wing):
         _check_positions(values, recording.markers, rig, where, faults)
     else:
         _check_forces(recording, rig, where, faults)
         if increasing and frames >= limits.MIN_FRAMES:
             _check_clock(recording, where, at, faults)
-    if faults.count == known:
-        check_frequency(recording, where, faults)
-        if isinstance(rig, Wing):
-            check_axes(recording, rig, where, faults)
 
 
 def check_frames(frames: int, where: str, faults: Faults, what: str = "frames") -> None:

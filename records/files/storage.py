@@ -25,16 +25,19 @@ _OTHERS = {
 }
 
 
-def load_dataset(path: str | Path) -> AnyDataset:
-    """Read the dataset in the folder, zip or NetCDF file ``path``; DatasetError lists its errors."""
+def load_dataset(path: str | Path, *, plausible: bool = True) -> AnyDataset:
+    """Read the dataset in the folder, zip or NetCDF file ``path``; DatasetError lists its errors.
+
+    ``plausible``: also refuse implausible units and sampling. :mod:`wingfit.checks` looks at the physics.
+    """
     path = Path(path)
     if path.is_dir():
-        return read_folder(path)
+        return read_folder(path, plausible=plausible)
     if path.name == "dataset.yaml" and path.is_file():
-        return read_folder(path.parent)
+        return read_folder(path.parent, plausible=plausible)
     try:
         _check_size(path.stat().st_size, str(path))
-        return load_archive(path.read_bytes(), path.name)
+        return load_archive(path.read_bytes(), path.name, plausible=plausible)
     except OSError as error:
         raise fail(str(path), None, f"cannot be read: {error.strerror}; check the path") from None
 
@@ -49,7 +52,7 @@ def is_netcdf(data: bytes) -> bool:
     return data[: len(_HDF5)] == _HDF5
 
 
-def load_archive(data: bytes, filename: str) -> AnyDataset:
+def load_archive(data: bytes, filename: str, *, plausible: bool = True) -> AnyDataset:
     """Read a dataset from the bytes of a zip or NetCDF file; ``filename`` is used in messages only.
 
     DatasetError lists its errors. For untrusted NetCDF files use :func:`wingfit.records.files.confined.convert_netcdf`.
@@ -57,9 +60,9 @@ def load_archive(data: bytes, filename: str) -> AnyDataset:
     label = label_of(filename)
     _check_size(len(data), label)
     if data.startswith(_ZIP):
-        return read_zip(data, label)
+        return read_zip(data, label, plausible=plausible)
     if is_netcdf(data):
-        return read_netcdf(data, label)
+        return read_netcdf(data, label, plausible=plausible)
     if not data:
         raise fail(label, None, "the file is empty; upload a zip of the dataset's folder, or NetCDF-4")
     found = next((name for magic, name in _OTHERS.items() if data.startswith(magic)), None)

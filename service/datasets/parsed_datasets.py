@@ -14,6 +14,7 @@ from typing import NamedTuple
 from sqlalchemy.exc import OperationalError
 from sqlalchemy.orm import Session
 
+from wingfit.checks import Mistake
 from wingfit.records import AnyDataset, Dataset, DatasetError, wing_or_vehicle
 from wingfit.records.files.confined import STORED, Limits, convert_netcdf
 from wingfit.records.files.parsed import load_parsed
@@ -32,10 +33,12 @@ class Opened(NamedTuple):
     """An uploaded dataset that was read.
 
     ``parsed``: for a NetCDF file the dataset in the internal format of `records/files/parsed.py`, for a zip None.
+    ``mistakes``: likely ones, found by the checks of an upload.
     """
 
     dataset: AnyDataset
     parsed: bytes | None
+    mistakes: tuple[Mistake, ...] = ()
 
 
 class Datasets:
@@ -69,6 +72,17 @@ class Datasets:
             return wing_or_vehicle(self.get(dataset_id))
         except ValueError as error:
             raise conflict(f"dataset {dataset_id}: {error}") from None
+
+    def accept(self, archive: bytes, filename: str) -> Opened:
+        """Read and check an upload, the bytes ``archive`` of a zip or NetCDF file; ValueError says what is wrong.
+
+        A dataset that is stored is not checked again when it is loaded: what was accepted stays accepted.
+        """
+        if not is_netcdf(archive):
+            checked = self._engine.load_checked(archive, filename)
+            return Opened(checked.dataset, None, checked.mistakes)
+        opened = self.open(archive, filename)
+        return opened._replace(mistakes=self._engine.examine(opened.dataset))
 
     def open(self, archive: bytes, filename: str, limits: Limits | None = None) -> Opened:
         """Read ``archive``, the bytes of a zip or NetCDF file; ValueError says what is wrong with it.

@@ -11,10 +11,11 @@ from typing import Any
 from pydantic import ValidationError
 
 from wingfit.calibration.evaluator import Evaluator
+from wingfit.checks import load_dataset
 from wingfit.client.transport import WingfitError
 from wingfit.diagnosis import DiagnosisSpec, Progress
 from wingfit.diagnosis.finding import Finding
-from wingfit.records import AnyDataset, SeriesDataset, load_dataset
+from wingfit.records import AnyDataset, SeriesDataset
 from wingfit.rigs.load import RigError, load_rig
 from wingfit.rigs.rig import Rig
 from wingfit.service.diagnoses.checks import checked, checked_rig

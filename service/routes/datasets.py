@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Sequence
 from pathlib import PurePath
 from typing import Annotated
 
@@ -12,6 +12,7 @@ from sqlalchemy.orm import Session
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response, StreamingResponse
 
+from wingfit.checks import Mistake
 from wingfit.client import answers as a
 from wingfit.records import AnyDataset, SeriesDataset
 from wingfit.records.files.confined import ReaderError
@@ -48,7 +49,10 @@ def upload(
     name: Annotated[str | None, Form(min_length=1, max_length=200, description="instead of the dataset's own")] = None,
     idempotency_key: http.RepeatKey = None,
 ) -> Response:
-    """Upload a zip of a dataset folder, or a NetCDF file; stored byte for byte if it reads without error."""
+    """Upload a zip of a dataset folder, or a NetCDF file; stored byte for byte if it reads without error.
+
+    The checks (docs/checks.md) refuse mistakes that are certain; doubtful ones are `warnings` of the answer.
+    """
     data = file.file.read(UPLOAD_LIMIT + 1)
     if len(data) > UPLOAD_LIMIT:
         raise ProblemError(413, "too-large", f"the archive is larger than {UPLOAD_LIMIT // 2**20} MiB")
@@ -59,10 +63,10 @@ def upload(
         earlier = store.earlier_answer(session, again)
     if earlier:
         return http.sent(earlier)
-    loaded, parsed = _open(service, data, filename)
+    loaded, parsed, mistakes = _open(service, data, filename)
 
     def create(session: Session) -> store.Answer:
-        row = _row(loaded, name, filename, digest, len(data))
+        row = _row(loaded, mistakes, name, filename, digest, len(data))
         store.make_room(session, row.owner, len(data) + len(parsed or b""), service.settings.max_stored_mb)
         session.add(row)
         session.flush()
@@ -161,7 +165,7 @@ def delete(service: ServiceDep, dataset_id: str) -> None:
 
 def _open(service: Service, data: bytes, filename: str) -> Opened:
     try:
-        return service.datasets.open(data, filename)
+        return service.datasets.accept(data, filename)
     except ReaderError as error:
         raise ProblemError(503, "unavailable", str(error)) from None
     except ValueError as error:
@@ -171,7 +175,9 @@ def _open(service: Service, data: bytes, filename: str) -> Opened:
         raise invalid("the dataset cannot be read", listed or fallback) from None
 
 
-def _row(loaded: AnyDataset, name: str | None, filename: str, digest: str, size: int) -> DatasetRow:
+def _row(
+    loaded: AnyDataset, mistakes: Sequence[Mistake], name: str | None, filename: str, digest: str, size: int
+) -> DatasetRow:
     return DatasetRow(
         id=store.new_id("ds"),
         owner=owner_of_new(),
@@ -185,4 +191,5 @@ def _row(loaded: AnyDataset, name: str | None, filename: str, digest: str, size:
         markers=len(loaded.wing.markers) if loaded.kind == "tracks" else 0,
         recordings=views.recordings(loaded),
         rig=views.rig_info(loaded),
+        warnings=views.warnings(mistakes),
     )

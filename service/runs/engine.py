@@ -16,6 +16,8 @@ from wingfit.calibration.problem import base_genome
 from wingfit.calibration.result import Comparison, GeneResult, Result
 from wingfit.calibration.search import CalibrationSpec, Generation
 from wingfit.calibration.spec import vehicle_model, wing_model
+from wingfit.checks import Mistake, check_archive, examine
+from wingfit.checks.load import Checked, refuse
 from wingfit.records import AnyDataset, Condition, Dataset, Recording, load_archive
 from wingfit.sim.wing.loads import simulate_outputs
 from wingfit.sim.wing.outputs import Outputs
@@ -31,6 +33,16 @@ class Engine:
     def load(self, data: bytes, filename: str) -> AnyDataset:
         """Parse ``data``, an uploaded zip called ``filename``; DatasetError says where it is malformed."""
         return load_archive(data, filename)
+
+    def load_checked(self, data: bytes, filename: str) -> Checked:
+        """Parse and check an uploaded zip; DatasetError also lists mistakes that are certain, others are returned."""
+        return check_archive(data, filename)
+
+    def examine(self, dataset: AnyDataset) -> tuple[Mistake, ...]:
+        """Return the likely mistakes in ``dataset``; DatasetError if one is certain."""
+        found = examine(dataset)
+        refuse(found)
+        return found
 
     def check(self, spec: CalibrationSpec, dataset: Dataset) -> CalibrationSpec:
         """Return ``spec`` with every default filled in; raise ValueError if it does not fit ``dataset``."""

@@ -16,7 +16,8 @@ REMEDIES = (
     (
         "never cross the hinge height",
         "the wing droops or bends too far to be laid over the recording: give it more stiffness, or other reference "
-        "markers",
+        "markers; if all genomes fail, tracks and description may disagree: 'wingfit datasets check' finds wrong axes, "
+        "units and frequencies",
     ),
 )
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, TypeVar
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy.typing as npt
 from sqlalchemy.orm import class_mapper
 
 from wingfit.calibration import result as tracks_result
+from wingfit.checks import Mistake
 from wingfit.client import answers as a
 from wingfit.client.answers import Comparison, Numerics
 from wingfit.records import AnyDataset, Recording, Series, SeriesDataset
@@ -34,7 +35,13 @@ PHASE_DECIMALS = 9
 def dataset(row: DatasetRow) -> a.Dataset:
     """Return the JSON answer that describes the dataset stored in ``row``."""
     recordings = [LATER | record for record in row.recordings]
-    return checked(a.Dataset, columns(row) | {"recordings": recordings})
+    return checked(a.Dataset, columns(row) | {"recordings": recordings, "warnings": row.warnings or []})
+
+
+def warnings(mistakes: Sequence[Mistake]) -> list[dict[str, Any]]:
+    """Return the likely ``mistakes`` in a dataset as its database row stores them."""
+    fields = a.DatasetWarning.__annotations__
+    return [{name: getattr(one, name) for name in fields} for one in mistakes]
 
 
 def recording(record: Recording | Series, held_out: bool) -> a.RecordingInfo:

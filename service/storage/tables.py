@@ -66,7 +66,7 @@ class DatasetRow(OwnedRow, Table):
 
     ``filename``, ``sha256`` and ``size_bytes`` are those of the uploaded file; ``markers`` is the number of markers on
     the wing (else 0); ``recordings`` describes each recording as JSON, ``rig`` the rig of a dataset of series (else
-    None).
+    None); ``warnings`` the likely mistakes found at its upload (None for one of an earlier version).
     """
 
     __tablename__ = "dataset"
@@ -78,6 +78,7 @@ class DatasetRow(OwnedRow, Table):
     markers: Mapped[int]
     recordings: Mapped[list[dict[str, Any]]]
     rig: Mapped[dict[str, Any] | None] = mapped_column(JSON(none_as_null=True))
+    warnings: Mapped[list[dict[str, Any]] | None] = mapped_column(JSON(none_as_null=True))
 
 
 class ArchiveRow(Table):
