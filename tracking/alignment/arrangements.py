@@ -1,0 +1,125 @@
+"""Every way the described wing can lie on the tracks, fitted; and whether the best one is the only one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from wingfit.records.array_types import Array
+from wingfit.tracking.alignment.candidates import Candidate, Layout, candidates, gate_of, start_of, with_all
+from wingfit.tracking.alignment.fit import Fit, fit
+from wingfit.tracking.alignment.identity import whole_tracks
+from wingfit.tracking.alignment.rigid_motion import RigidMotion
+from wingfit.tracking.alignment.wing_model import Strip, positions
+
+DISTINCT = 12.0
+"""Minus twice the log-likelihood by which an arrangement must be worse to be excluded: 0.25 % of the other's weight."""
+_NEAR = 2.0  # candidates whose misfit is up to as many times the best one's are fitted
+_MOST = 3  # candidates that are fitted
+_CUT = 9.0 * np.log1p(100.0 / 9.0)  # cost of a sample that fits no marker, 10 standard deviations away
+_ROUNDS = 4  # of relabelling
+_FIRST_STEPS = 12
+
+
+@dataclass(frozen=True, eq=False)
+class Arrangement:
+    """A fit with the markers of the tracks.
+
+    Attributes:
+        marker: [K] of each track; -1 for none.
+        doubtful: [K] whether another marker is nearly as near.
+        away: [K, M] RMS distance of each track from each marker, m.
+        fit: of the matched tracks, in the order of ``marker``'s tracks.
+        unmatched: count of samples of tracks that move with the wing, but are no marker's.
+    """
+
+    marker: Array
+    doubtful: Array
+    away: Array
+    fit: Fit
+    unmatched: int
+
+    def cost(self, described: Array, noise: float, memory: float) -> float:
+        """Minus twice the log-likelihood under a common ``noise`` (m) and ``memory``."""
+        r = self.fit.residuals
+        squares = np.nansum(r**2, axis=-1)[np.isfinite(r[..., 0])] / noise**2
+        data = 9 * np.log1p(squares / 9).sum() + _CUT * self.unmatched
+        moves = self.fit.rest - described[self.marker[self.marker >= 0]]
+        rest = (moves**2).sum() / self.fit.scatter**2 + 6 * len(moves) * np.log(self.fit.scatter)
+        line = 0.0
+        return float(data / memory + rest + line)
+
+
+@dataclass(frozen=True, eq=False)
+class Search:
+    """What all arrangements share: ``described`` [M, 3] hinge coordinates (m), tracks [T, K, 3], their rigid motion."""
+
+    strip: Strip
+    described: Array
+    tracks: Array
+    motion: RigidMotion
+    layout: Layout
+    mean: Array
+
+    def candidates(self, given: Array) -> list[Candidate]:
+        """Return the candidates that deserve a fit, best first; ``given`` [K] are markers of named tracks (-1: none)."""
+        flat = self.described[:, :2]
+        found = candidates(self.layout, flat, self.strip.span, None)
+        if (given >= 0).sum() >= 3:
+            found = candidates(self.layout, flat, self.strip.span, given)[:1] + found
+        best = min(one.misfit for one in found)
+        kept = list[Candidate]()
+        for one in sorted(found, key=lambda one: one.misfit):
+            alike = any(np.array_equal(one.marker, other.marker) and one.sense == other.sense for other in kept)
+            if one.misfit <= _NEAR * best + 1e-3 * self.strip.span and not alike and (one.marker >= 0).sum() >= 4:
+                kept.append(one)
+        return kept[:_MOST]
+
+    def arranged(self, candidate: Candidate, right: bool, given: Array) -> Arrangement | None:
+        """Return the fit that starts from ``candidate``, relabelled until labels and fit agree; None if it has no fit."""
+        start = start_of(candidate, self.layout, self.motion, right, self.described, self.strip)
+        marker, rest = candidate.marker, self.described.copy()
+        gate, here = gate_of(self.described[:, :2]), start
+        before = np.full_like(marker, -2)
+        doubtful, away = np.zeros(len(marker), dtype=bool), np.zeros((len(marker), len(rest)))
+        for round_ in range(_ROUNDS):
+            tracks = np.flatnonzero(marker >= 0)
+            which = marker[tracks]
+            if len(tracks) < 4:
+                return None
+            steps = _FIRST_STEPS if round_ == 0 else 40
+            here = fit(self.strip, self.described[which], self.tracks[:, tracks], self.mean, with_all(here, rest[which]),
+                       steps=steps)  # fmt: skip
+            if np.array_equal(before, marker) and round_ > 1:
+                break
+            rest = self.described.copy()
+            rest[which] = here.rest
+            model = positions(self.strip, rest, here.states, here.line)[0]
+            before = marker
+            marker, away, doubtful = whole_tracks(here.coordinates(self.tracks), model, gate)
+            marker = _with_given(marker, given)
+        if not np.array_equal(before, marker):
+            tracks = np.flatnonzero(marker >= 0)
+            which = marker[tracks]
+            here = fit(self.strip, self.described[which], self.tracks[:, tracks], self.mean, with_all(here, rest[which]))
+        moving = self.motion.weight > 0.5
+        unmatched = int(np.isfinite(self.tracks[:, (marker < 0) & moving, 0]).sum())
+        return Arrangement(marker, doubtful, away, here, unmatched)
+
+
+def _with_given(marker: Array, given: Array) -> Array:
+    found = marker.copy()
+    for track in np.flatnonzero(given >= 0):
+        found[(found == given[track])] = -1
+        found[track] = given[track]
+    return found
+
+
+def ranked(found: Sequence[Arrangement], described: Array) -> list[tuple[float, Arrangement]]:
+    """Return the arrangements, best first, each with by how much its cost exceeds the best one's."""
+    noise, memory = min(one.fit.noise for one in found), max(one.fit.memory for one in found)
+    costs = [one.cost(described, noise, memory) for one in found]
+    order = np.argsort(costs)
+    return [(costs[k] - costs[order[0]], found[k]) for k in order]
