@@ -6,7 +6,7 @@ The names below are public and documented; everything else in the package may ch
 - :func:`load_dataset` reads recordings from a folder, a zip file of a folder, or NetCDF. If they are not valid, it
 raises :class:`DatasetError`, which lists what is wrong.
 - :func:`import_tracks` reads marker tracks from the files of motion-capture systems and digitisers, and returns
-:class:`ImportedTracks`.
+:class:`ImportedTracks`; :func:`align_tracks` brings them to the frame of a described wing, :class:`AlignedTracks`.
 - :func:`calibrate` estimates the genes of a model in this process, without a server; :func:`diagnose` reports which
 physics the model is missing.
 - :func:`drive` simulates a rig of the user's own for a job on a server, which knows only its :func:`declaration`.
@@ -22,6 +22,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from wingfit._align import align_tracks
     from wingfit._drive import drive
     from wingfit._local import calibrate, diagnose
     from wingfit.calibration.forces.result import ForceResult
@@ -53,8 +54,10 @@ if TYPE_CHECKING:
     from wingfit.rigs.rig import Rig
     from wingfit.rigs.run import Run, SimulationError
     from wingfit.rigs.suspect import Suspect
+    from wingfit.tracking.alignment import AlignedTracks
 
 __all__ = [
+    "AlignedTracks",
     "CalibrationSpec",
     "Channel",
     "Client",
@@ -82,6 +85,7 @@ __all__ = [
     "SimulationError",
     "Suspect",
     "WingfitError",
+    "align_tracks",
     "calibrate",
     "declaration",
     "diagnose",
@@ -94,6 +98,7 @@ __all__ = [
 ]
 
 _MODULES = {
+    "wingfit._align": ("align_tracks",),
     "wingfit._drive": ("drive",),
     "wingfit._local": ("calibrate", "diagnose"),
     "wingfit.calibration.forces.result": ("ForceResult",),
@@ -125,6 +130,7 @@ _MODULES = {
     "wingfit.rigs.rig": ("Rig",),
     "wingfit.rigs.run": ("Run", "SimulationError"),
     "wingfit.rigs.suspect": ("Suspect",),
+    "wingfit.tracking.alignment": ("AlignedTracks",),
 }
 _MODULE_OF = {name: module for module, names in _MODULES.items() for name in names}
 

@@ -46,16 +46,19 @@ def whole_tracks(points: Array, model: Array, gate: float) -> tuple[Array, Array
         doubtful [K], because another one is nearly as near.
 
     """
-    away = np.empty((points.shape[1], model.shape[1]))
-    for k in range(points.shape[1]):
+    K, M = points.shape[1], model.shape[1]
+    away, doubtful = np.full((K, M), gate), np.zeros(K, dtype=bool)
+    for k in range(K):
         squares = ((points[:, k, None] - model) ** 2).sum(axis=-1)
         seen = np.isfinite(squares[:, 0])
-        away[k] = np.sqrt(np.minimum(squares[seen], gate**2).mean(axis=0)) if seen.any() else gate
+        if not seen.any():
+            continue
+        away[k] = np.sqrt(np.minimum(squares[seen], gate**2).mean(axis=0))
+        # In the same frame, so that a track that swaps is not doubtful.
+        first, second = np.sqrt(np.partition(squares[seen], 1, axis=1)[:, :2].T) if M > 1 else (0.0, np.inf)
+        doubtful[k] = np.median(second) < _APART * np.median(first)
     marker = assigned(away, _SURE * gate)
-    own = away[np.arange(len(away)), marker]
-    others = away.copy()
-    others[np.arange(len(away)), marker] = np.inf
-    return marker, away, np.asarray((marker >= 0) & (others.min(axis=1) < _APART * own))
+    return marker, away, doubtful & (marker >= 0)
 
 
 def frame_by_frame(points: Array, model: Array, marker: Array, noise: float, gate: float) -> Array:
