@@ -61,15 +61,16 @@ def score(trial: Trial, found: AlignedTracks) -> Score:
     """Return how far ``found`` is from the truth; with a moving body, frame errors are those of the middle frame."""
     side = (found.side == "left") == trial.left
     names = [one.name for one in trial.wing.markers]
-    mine = trial.clean[:, [names.index(name) for name in found.markers]]
-    truth = trial.true_positions()[:, [names.index(name) for name in found.markers]]
-    both = np.isfinite(found.positions[..., 0])
-    near = np.linalg.norm(found.positions - truth, axis=-1) < 0.012 * trial.wing.span + 4 * trial.noise
+    order = [names.index(name) for name in found.markers]
+    every, both = trial.true_positions(), np.isfinite(found.positions[..., 0])
+    truth = every[:, order]
+    away = np.linalg.norm(found.positions[:, :, None] - every[:, None], axis=-1)
+    nearest = np.argmin(np.where(np.isfinite(away), away, np.inf), axis=-1)
+    near = (nearest == order) & both
     right = float(near[both].mean()) if side else 0.0
     kept = float(both.sum() / np.isfinite(trial.clean[..., 0]).sum())
-    del mine
     # The frame that the aligned positions are in, relative to the true one, from all positions.
-    shown = both & near
+    shown = near & np.isfinite(truth[..., 0])
     a, b = found.positions[shown], truth[shown]
     turned, _ = Rotation.align_vectors(a - a.mean(axis=0), b - b.mean(axis=0))
     hinge = np.array([0.0, trial.wing.hinge.y, trial.wing.hinge.z])

@@ -147,7 +147,7 @@ def _mixed(
     named = bool(rng.integers(2))
     names = [*markers, *(f"extra{k}" for k in range(spurious))] if named else [f"t{k:02d}" for k in range(every.shape[1])]
     names = names[: len(markers) + spurious]
-    held = [f"body{k}" for k in range(len(points))] if body == "flies" else []
+    held = [f"body{k}" for k in range(len(_BODY_POINTS))] if body == "flies" else []
     if not named:
         shuffled = rng.permutation(len(names))
         every = np.concatenate([every[:, : len(names)][:, shuffled], every[:, len(names) :]], axis=1)

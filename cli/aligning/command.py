@@ -16,6 +16,10 @@ def align(
     tracks: Annotated[Path, typer.Argument(metavar="TRACKS", help="Tracks: what wingfit import writes, or reads.")],
     wing: Annotated[Path, typer.Option(help="Description of the wing: dataset.yaml, or the keys of a wing alone.")],
     output: Annotated[Path | None, new_file("Write the tracks in the wing's frame: FILE.csv.", "--output", "-o")] = None,
+    axes: Annotated[
+        Literal["wing", "body"],
+        typer.Option(help="Of what is written: 'wing' for a dataset; 'body' (x nose, y right, z down) for kinematics."),
+    ] = "wing",
     force: Annotated[bool, typer.Option("--force", help="Overwrite tracks that were written before.")] = False,
     side: Annotated[
         Literal["left", "right"] | None, typer.Option(help="Side of the wing; default: estimated.")
@@ -62,7 +66,7 @@ def align(
         count = f"{error.count} error{'s' if error.count > 1 else ''}"
         raise WingfitError("the tracks were not aligned", count, errors=[vars(one) for one in error.errors]) from error
     if output:
-        write_text(output, found.csv(), f"aligned tracks of {found.file}")
+        write_text(output, found.csv(axes), f"aligned tracks of {found.file}")
     if as_json:
         print_json(found.as_json() | {"written": None if output is None else str(output)})
         return

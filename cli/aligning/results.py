@@ -22,7 +22,7 @@ def show(found: AlignedTracks) -> None:
     say(f"origin in the tracks: {origin} mm; standard errors along wing x, y, z: {errors} mm")
     say(f"side: {found.side}, {_evidence(found.side_evidence)}")
     period = f"{number(found.flap_frequency)} Hz as it appears in the frames"
-    angles = f"{np.degrees(found.mean_flap):.2f} +- {np.degrees(found.flap_amplitude):.1f} deg"
+    angles = f"mean {np.degrees(found.mean_flap):.2f} deg, half range {np.degrees(found.flap_amplitude):.1f} deg"
     say(f"flapping: {angles}, {period}")
     scatter = f"{mm(1e3 * found.rest_scatter)} mm"
     say(f"described rest positions differ from the estimated ones by {scatter} (standard deviation of a coordinate)")

@@ -5,7 +5,7 @@ that says what is not certain and what would settle it. See ``docs/alignment.md`
 ``docs/decisions/0025-alignment.md``.
 """
 
-from wingfit.tracking.alignment.align import align
+from wingfit.tracking.alignment.procedure import align
 from wingfit.tracking.alignment.request import Known, Tracks
 from wingfit.tracking.alignment.result import AlignedTracks
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from wingfit.records.array_types import Array
 from wingfit.tracking.alignment.candidates import Candidate, Layout, candidates, gate_of, start_of, with_all
-from wingfit.tracking.alignment.fit import Fit, fit
+from wingfit.tracking.alignment.fit import Fit, fit, shaken
 from wingfit.tracking.alignment.identity import whole_tracks
 from wingfit.tracking.alignment.rigid_motion import RigidMotion
 from wingfit.tracking.alignment.wing_model import Strip, positions
@@ -19,6 +19,7 @@ DISTINCT = 12.0
 _NEAR = 2.0  # candidates whose misfit is up to as many times the best one's are fitted
 _MOST = 3  # candidates that are fitted
 _CUT = 9.0 * np.log1p(100.0 / 9.0)  # cost of a sample that fits no marker, 10 standard deviations away
+_LARGEST_SCATTER = 0.01  # of rest positions, spans
 _ROUNDS = 4  # of relabelling
 _FIRST_STEPS = 12
 
@@ -32,24 +33,27 @@ class Arrangement:
         doubtful: [K] whether another marker is nearly as near.
         away: [K, M] RMS distance of each track from each marker, m.
         fit: of the matched tracks, in the order of ``marker``'s tracks.
-        unmatched: count of samples of tracks that move with the wing, but are no marker's.
+        samples: [K] count of the frames that show each track.
     """
 
     marker: Array
     doubtful: Array
     away: Array
     fit: Fit
-    unmatched: int
+    samples: Array
 
-    def cost(self, described: Array, noise: float, memory: float) -> float:
-        """Minus twice the log-likelihood under a common ``noise`` (m) and ``memory``."""
-        r = self.fit.residuals
-        squares = np.nansum(r**2, axis=-1)[np.isfinite(r[..., 0])] / noise**2
-        data = 9 * np.log1p(squares / 9).sum() + _CUT * self.unmatched
+    def cost(self, described: Array, noise: float, memory: float, span: float, every: Array) -> float:
+        """Minus twice the log-likelihood of the tracks ``every`` [K] (a mask) under a common ``noise`` (m) and ``memory``.
+
+        A sample costs at most what one that fits no marker costs. So do all those of tracks that are no marker.
+        """
+        squares = (self.fit.residuals**2).sum(axis=-1) / noise**2
+        data = np.nansum(np.minimum(9 * np.log1p(squares / 9), _CUT))
+        data += _CUT * self.samples[every & (self.marker < 0)].sum()
         moves = self.fit.rest - described[self.marker[self.marker >= 0]]
-        rest = (moves**2).sum() / self.fit.scatter**2 + 6 * len(moves) * np.log(self.fit.scatter)
-        line = 0.0
-        return float(data / memory + rest + line)
+        scatter = self.fit.scatter
+        rest = (moves**2).sum() / scatter**2 + 6 * len(moves) * np.log(scatter / (_LARGEST_SCATTER * span))
+        return float(data / memory + rest)
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +66,7 @@ class Search:
     motion: RigidMotion
     layout: Layout
     mean: Array
+    shaking: Array
 
     def candidates(self, given: Array) -> list[Candidate]:
         """Return the candidates that deserve a fit, best first; ``given`` [K] are markers of named tracks (-1: none)."""
@@ -90,23 +95,22 @@ class Search:
             if len(tracks) < 4:
                 return None
             steps = _FIRST_STEPS if round_ == 0 else 40
-            here = fit(self.strip, self.described[which], self.tracks[:, tracks], self.mean, with_all(here, rest[which]),
+            here = fit(self.strip, self.described[which], self.tracks[:, tracks], self.mean, self.shaking, with_all(here, rest[which]),
                        steps=steps)  # fmt: skip
             if np.array_equal(before, marker) and round_ > 1:
                 break
             rest = self.described.copy()
             rest[which] = here.rest
             model = positions(self.strip, rest, here.states, here.line)[0]
+            model += shaken(model, here.jitter)
             before = marker
             marker, away, doubtful = whole_tracks(here.coordinates(self.tracks), model, gate)
             marker = _with_given(marker, given)
         if not np.array_equal(before, marker):
             tracks = np.flatnonzero(marker >= 0)
             which = marker[tracks]
-            here = fit(self.strip, self.described[which], self.tracks[:, tracks], self.mean, with_all(here, rest[which]))
-        moving = self.motion.weight > 0.5
-        unmatched = int(np.isfinite(self.tracks[:, (marker < 0) & moving, 0]).sum())
-        return Arrangement(marker, doubtful, away, here, unmatched)
+            here = fit(self.strip, self.described[which], self.tracks[:, tracks], self.mean, self.shaking, with_all(here, rest[which]))
+        return Arrangement(marker, doubtful, away, here, np.isfinite(self.tracks[..., 0]).sum(axis=0))
 
 
 def _with_given(marker: Array, given: Array) -> Array:
@@ -117,9 +121,10 @@ def _with_given(marker: Array, given: Array) -> Array:
     return found
 
 
-def ranked(found: Sequence[Arrangement], described: Array) -> list[tuple[float, Arrangement]]:
+def ranked(found: Sequence[Arrangement], described: Array, span: float) -> list[tuple[float, Arrangement]]:
     """Return the arrangements, best first, each with by how much its cost exceeds the best one's."""
     noise, memory = min(one.fit.noise for one in found), max(one.fit.memory for one in found)
-    costs = [one.cost(described, noise, memory) for one in found]
+    every = np.any([one.marker >= 0 for one in found], axis=0)
+    costs = [one.cost(described, noise, memory, span, every) for one in found]
     order = np.argsort(costs)
     return [(costs[k] - costs[order[0]], found[k]) for k in order]

@@ -8,27 +8,35 @@ import numpy as np
 
 from wingfit.records.array_types import Array
 from wingfit.records.errors import fail
-from wingfit.tracking.alignment.flapping import Flapping, basis
+from wingfit.tracking.alignment.flapping import Flapping, basis, flapping_of
 from wingfit.tracking.alignment.request import Tracks
 from wingfit.tracking.alignment.rigid_motion import RigidMotion, rigid_motion
 from wingfit.tracking.rigid_body import poses
 
 _BODY_MISFIT = 0.05  # RMS over the extent of the body markers above which they are not rigid
-_BEATS_PER_ORDER = 1.0
 _MOST_ORDER = 3
+_SETTLED = 1e-4
+_ROUNDS = 10  # as the body's motion and the wing's do not add up, but multiply
+_LEAST_TURN, _LEAST_WAY = 0.01, 0.015  # RMS of slow motion below which there is none: rad, and of the tracks' extent
 _NOTICED = 4.0  # a slow motion is removed if it is as many times larger than the scatter around it, in RMS of a mean
 
 
 @dataclass(frozen=True, eq=False)
 class BodyMotion:
-    """Motion of the body relative to its mean pose: ``rotation`` [T, 3, 3], ``shift`` [T, 3] (m), and in words.
+    """Motion of the body relative to its mean pose.
 
-    A point that rests on the body is at rotation @ point + shift.
+    Attributes:
+        rotation, shift: [T, 3, 3], [T, 3] (m); a point that rests on the body is at rotation @ point + shift.
+        words: what it is.
+        error: standard deviations of its rotation (rad), about any axis, and of its position (m) in a frame.
+        middle: [3] where the position has this error, m.
     """
 
     rotation: Array
     shift: Array
     words: str
+    error: tuple[float, float]
+    middle: Array
 
     def removed(self, positions: Array) -> Array:
         """Return ``positions`` [T, K, 3] as seen from the body."""
@@ -52,22 +60,28 @@ def by_markers(tracks: Tracks, names: tuple[str, ...]) -> BodyMotion:
         raise fail("--body", ", ".join(names), f"{', '.join(names)} {message}; name tracks on the body")
     path = np.linalg.norm(np.ptp(found.position[np.isfinite(found.position[:, 0])], axis=0))
     words = f"motion of the body removed by {len(names)} tracks on it, {100 * path:.3g} cm of way"
-    return BodyMotion(found.rotation, found.position, words)
+    arms = found.shape - found.shape.mean(axis=0)
+    noise = misfit * np.sqrt(3 * len(names) / (3 * len(names) - 6))
+    turning = noise / np.sqrt(np.linalg.eigvalsh(arms.T @ arms)[:2].sum())
+    return BodyMotion(found.rotation, found.position, words, (float(turning), noise / np.sqrt(len(names))), found.shape.mean(axis=0))
 
 
-def slow(times: Array, motion: RigidMotion, flapping: Flapping) -> BodyMotion | None:
+def slow(times: Array, motion: RigidMotion, flapping: Flapping, *, surely: bool = False) -> BodyMotion | None:
     """Return the slow motion that is common to the wing's tracks, a polynomial over time; None if there is none.
+
+    With ``surely``, it is known that there is one.
 
     The pose of the wing as a rigid body is a polynomial, the body's motion, plus harmonics of the flapping.
     """
     fitted = np.isfinite(motion.rotation[:, 0, 0])
     t = times - times[0]
-    order = min(_MOST_ORDER, int(flapping.frequency * t[-1] / _BEATS_PER_ORDER))
+    order = min(_MOST_ORDER, int(flapping.frequency * t[-1] + 0.6))
     if order < 1:
         return None
     s = 2 * t / t[-1] - 1
     powers = np.polynomial.legendre.legvander(s, order)
-    X = np.column_stack([powers, basis(t, flapping.frequency)[:, 1:]])
+    turns = basis(t, flapping.frequency)[:, 1:]
+    X = np.column_stack([powers, turns])
     hinge = np.einsum("tij,j->ti", motion.rotation, motion.pivot) + motion.shift
     y = np.column_stack([motion.rotation.reshape(-1, 9), hinge])[fitted]
     c, *_ = np.linalg.lstsq(X[fitted], y, rcond=None)
@@ -76,7 +90,8 @@ def slow(times: Array, motion: RigidMotion, flapping: Flapping) -> BodyMotion | 
     still[1 : order + 1] = 0
     drift = (X[fitted] @ (c - still)).std(axis=0)
     limit = _NOTICED * left / np.sqrt(max(fitted.sum() / 8, 1))
-    if not (drift > np.maximum(limit, [2e-3] * 9 + [1e-6] * 3)).any():
+    size = float(np.linalg.norm(np.nanstd(motion.shape, axis=0)))
+    if not surely and not (drift > np.maximum(limit, [_LEAST_TURN] * 9 + [_LEAST_WAY * size] * 3)).any():
         return None
     mean = powers @ c[: order + 1]
     rotation, place = _nearest(mean[:, :9].reshape(-1, 3, 3)), mean[:, 9:]
@@ -86,7 +101,7 @@ def slow(times: Array, motion: RigidMotion, flapping: Flapping) -> BodyMotion | 
     angle = np.degrees(np.arccos(np.clip((np.trace(relative, axis1=1, axis2=2) - 1) / 2, -1, 1))).max()
     way = 1e3 * np.linalg.norm(np.ptp(place, axis=0))
     words = f"the hinge moves slowly, by {way:.3g} mm and {angle:.2g} deg; this motion, a polynomial over time, was removed"
-    return BodyMotion(relative, place - relative @ pivot, words)
+    return BodyMotion(relative, place - relative @ pivot, words, (0.0, 0.0), pivot)
 
 
 def _nearest(matrices: Array) -> Array:
@@ -98,13 +113,13 @@ def _nearest(matrices: Array) -> Array:
 
 def without_slow_motion(times: Array, positions: Array) -> tuple[Array, list[str]]:
     """Return ``positions`` [T, K, 3] without slow common motion, and what was removed in words."""
-    from wingfit.tracking.alignment.flapping import flapping_of
-
     words = list[str]()
-    for _ in range(2):
+    for _ in range(_ROUNDS):
         motion = rigid_motion(positions)
-        found = slow(times, motion, flapping_of(times, motion.angle))
+        found = slow(times, motion, flapping_of(times, motion.angle, trend=2), surely=bool(words))
         if found is None:
             break
         positions, words = found.removed(positions), words or [found.words]
+        if np.abs(found.rotation - np.eye(3)).max() < _SETTLED:
+            break
     return positions, words

@@ -209,7 +209,7 @@ def start_of(candidate: Candidate, layout: Layout, motion: RigidMotion, right: b
     states[:, 0] = np.interp(instants, instants[fitted], np.unwrap(angle))
     origin = (R @ hinge + p).mean(axis=0)
     empty = np.zeros((0, 0))
-    return Fit(np.stack([ex, ey, ez]), origin, states, np.array(strip.line), rest, 1.0, 1.0, 1.0, np.inf, 0.0, empty, empty)
+    return Fit(np.stack([ex, ey, ez]), origin, states, np.zeros((len(states), 5)), np.array(strip.line), rest, 1.0, 1.0, 1.0, np.inf, 0.0, empty, empty)
 
 
 def with_all(start: Fit, rest: Array) -> Fit:

@@ -23,8 +23,11 @@ _STATE_PRIOR = np.array([1e3] + [0.35] * BENDING + [0.45] * TWISTING + [0.025] *
 _MEAN_PRIOR = np.radians([0.4] * BENDING + [0.8] * TWISTING + [0.12] * SWEEPING)
 _ELASTIC = slice(1, STATES)
 _MEANS = STATES - 1
+_JITTER = 5
+_LOCAL = STATES + _JITTER
 _LINE_PRIOR = 0.15  # standard deviation of the line that a wing twists about, chords
 _FRAME = 7  # small rotation about y and z, a shift, and the line: rotation about x is the zero of phi
+_STEADY = 1e-7  # standard deviation of jitter where there is none
 _STEPS = 40
 _STATE_STEPS = 10
 _SETTLED = 1e-5  # change of the pose in radians and in spans at which the iteration ends
@@ -42,6 +45,7 @@ class Fit:
         turn: [3, 3] F, from camera axes to wing axes; its determinant is 1 for a right wing, -1 for a left one.
         hinge: [3] o, camera position of the hinge, m.
         states: [T, STATES] as in :mod:`.wing_model`, rad.
+        jitter: [T, 5] motion of the body in each frame that was not removed: rotation about y and z (rad), shift (m).
         line: [2] that the wing twists about, as in :mod:`.wing_model`, m.
         rest: [M, 3] rest positions in hinge coordinates, m.
         noise: standard deviation of one coordinate of one sample, model errors included, m.
@@ -56,6 +60,7 @@ class Fit:
     turn: Array
     hinge: Array
     states: Array
+    jitter: Array
     line: Array
     rest: Array
     noise: float
@@ -77,14 +82,17 @@ class Fit:
 
 
 @one_blas_thread
-def fit(strip: Strip, described: Array, tracks: Array, mean: Array, start: Fit, *, steps: int = _STEPS) -> Fit:
+def fit(
+    strip: Strip, described: Array, tracks: Array, mean: Array, shaking: Array, start: Fit, *, steps: int = _STEPS
+) -> Fit:
     """Fit the frame of ``tracks`` [T, M, 3] (m; NaN where not seen) to ``described`` rest positions [M, 3], m.
 
     ``described`` are hinge coordinates; the tracks are in the order of the markers. ``mean`` [T]: weights of the frames
-    whose sum over a state is its mean over the beat. ``start`` is where to begin.
+    whose sum over a state is its mean over the beat. ``shaking`` [5]: standard deviations of the jitter of the body (rad,
+    m), in every frame anew. ``start`` is where to begin.
     """
     seen = np.isfinite(tracks).all(axis=-1)
-    problem = _Problem(strip, described, tracks, seen, mean)
+    problem = _Problem(strip, described, tracks, seen, mean, np.maximum(shaking, _STEADY))
     here, damping = problem.scaled(replace(start, residuals=problem.residuals(start), scatter=5e-3 * strip.span)), 1e-4
     for _ in range(steps):
         step = _Step(problem, here)
@@ -110,9 +118,11 @@ class _Problem:
     tracks: Array
     seen: Array
     mean: Array
+    shaking: Array
 
     def residuals(self, at: Fit) -> Array:
-        return np.asarray(at.coordinates(self.tracks) - positions(self.strip, at.rest, at.states, at.line)[0])
+        model = positions(self.strip, at.rest, at.states, at.line)[0]
+        return np.asarray(at.coordinates(self.tracks) - model - shaken(model, at.jitter))
 
     def weighed(self, at: Fit) -> Fit:
         """Return ``at`` with its cost under its own noise and scatter."""
@@ -122,7 +132,8 @@ class _Problem:
         states = ((at.states / _STATE_PRIOR) ** 2).sum() / at.memory
         means = (((self.mean @ at.states[:, _ELASTIC]) / _MEAN_PRIOR) ** 2).sum()
         line = (((at.line - self.strip.line) / (_LINE_PRIOR * self.strip.chord)) ** 2).sum()
-        return replace(at, cost=float(data / at.memory + moves + states + means + line))
+        jitter = ((at.jitter / self.shaking) ** 2).sum() / at.memory
+        return replace(at, cost=float(data / at.memory + moves + states + jitter + means + line))
 
     def scaled(self, at: Fit) -> Fit:
         """Return ``at`` with new estimates of noise, its memory, scatter and covariance, and its cost under these."""
@@ -135,6 +146,21 @@ class _Problem:
         spread = float(np.sqrt(np.mean(moves.ravel() + np.diag(covariance)[_FRAME:])))  # expectation maximisation
         scatter = min(max(spread, _LEAST_REST * self.strip.span), _MOST_REST * self.strip.span)
         return self.weighed(replace(at, scatter=scatter, covariance=covariance, flap_error=flap_error))
+
+
+def by_pose(q: Array) -> Array:
+    """Derivatives [T, M, 3, 5] of positions ``q`` [T, M, 3] (m) by rotations about y and z and by a shift."""
+    found = np.zeros((*q.shape, 5))
+    x, y, z = np.moveaxis(q, -1, 0)
+    found[..., 0, 0], found[..., 2, 0] = z, -x
+    found[..., 0, 1], found[..., 1, 1] = -y, x
+    found[..., 2:] = np.eye(3)
+    return found
+
+
+def shaken(q: Array, jitter: Array) -> Array:
+    """Displacements [T, M, 3] of positions ``q`` [T, M, 3] by the ``jitter`` [T, 5], m."""
+    return np.asarray(np.einsum("tmia,ta->tmi", by_pose(q), jitter))
 
 
 def _memory(residuals: Array, noise: float) -> float:
@@ -162,18 +188,15 @@ class _Step:
         q, by_state, by_rest, by_line = positions(problem.strip, at.rest, at.states, at.line)
         r = np.where(problem.seen[..., None], np.nan_to_num(at.residuals), 0.0)
         weight = problem.seen / (at.memory * at.noise**2 * (1 + (r**2).sum(-1) / (_CAUCHY * at.noise) ** 2))
-        by_frame = np.zeros((T, M, 3, _FRAME))
-        x, y, z = np.moveaxis(q, -1, 0)
-        by_frame[:, :, 0, 0], by_frame[:, :, 2, 0] = z, -x  # rotation about y
-        by_frame[:, :, 0, 1], by_frame[:, :, 1, 1] = -y, x  # rotation about z
-        by_frame[:, :, :, 2:5] = np.eye(3)
-        by_frame[:, :, :, 5:] = by_line
-        J, free, prior = weight[..., None, None] * by_state, _FRAME + 3 * M, _STATE_PRIOR**-2.0 / at.memory
+        by_frame = np.concatenate([by_pose(q), by_line], axis=-1)
+        by_state = np.concatenate([by_state, by_frame[..., :_JITTER]], axis=-1)
+        J, free = weight[..., None, None] * by_state, _FRAME + 3 * M
+        prior = np.concatenate([_STATE_PRIOR, problem.shaking]) ** -2.0 / at.memory
         self.A = np.einsum("tmia,tmib->tab", J, by_state) + np.diag(prior)
-        self.a = np.einsum("tmia,tmi->ta", J, r) - at.states * prior
-        self.B = np.zeros((T, free + _MEANS, STATES))
+        self.a = np.einsum("tmia,tmi->ta", J, r) - np.hstack([at.states, at.jitter]) * prior
+        self.B = np.zeros((T, free + _MEANS, _LOCAL))
         self.B[:, :_FRAME] = np.einsum("tmia,tmib->tab", by_frame, J)
-        self.B[:, _FRAME:free] = np.einsum("tmia,tmib->tmab", by_rest, J).reshape(T, 3 * M, STATES)
+        self.B[:, _FRAME:free] = np.einsum("tmia,tmib->tmab", by_rest, J).reshape(T, 3 * M, _LOCAL)
         self.B[:, free:, _ELASTIC] = problem.mean[:, None, None] * np.eye(_MEANS)
         weighted = weight[..., None, None] * by_rest
         C = np.zeros((free + _MEANS, free + _MEANS))
@@ -194,7 +217,7 @@ class _Step:
         self.c = np.concatenate([common, by_all.ravel(), -(problem.mean @ at.states[:, _ELASTIC])])
 
     def _reduced(self, damping: float) -> tuple[Array, Array, Array]:
-        grown = self.A + damping * np.einsum("tab,ab->tab", self.A, np.eye(STATES))
+        grown = self.A + damping * np.einsum("tab,ab->tab", self.A, np.eye(_LOCAL))
         solved = np.linalg.solve(grown, np.swapaxes(self.B, 1, 2))  # [T, STATES, G]
         S = self.C + damping * np.diag(np.maximum(np.diag(self.C), 0))
         S -= np.einsum("tga,tah->gh", self.B, solved, optimize=True)
@@ -209,7 +232,8 @@ class _Step:
             self.at,
             turn=Rotation.from_rotvec([0.0, d[0], d[1]]).as_matrix().T @ self.at.turn,
             hinge=self.at.hinge + self.at.turn.T @ d[2:5],
-            states=self.at.states + states,
+            states=self.at.states + states[:, :STATES],
+            jitter=self.at.jitter + states[:, STATES:],
             line=self.at.line + d[5:_FRAME],
             rest=self.at.rest + d[_FRAME:-_MEANS].reshape(-1, 3),
         )
@@ -219,28 +243,30 @@ class _Step:
         """Return the covariance of frame, line and rest positions, and the standard error of the mean flap angle."""
         grown, solved, S = self._reduced(0.0)
         whole = np.linalg.inv(S)
-        first = np.zeros(STATES)
+        first = np.zeros(_LOCAL)
         first[0] = 1.0
-        alone = np.linalg.solve(grown, np.broadcast_to(first, (len(grown), STATES))[..., None])[:, 0, 0]
+        alone = np.linalg.solve(grown, np.broadcast_to(first, (len(grown), _LOCAL))[..., None])[:, 0, 0]
         common = np.einsum("t,tg->g", self.problem.mean, solved[:, 0])
         variance = float((self.problem.mean**2) @ alone + common @ whole @ common)
         return np.asarray(whole[:-_MEANS, :-_MEANS]), float(np.sqrt(max(variance, 0.0)))
 
 
-def states_of(strip: Strip, tracks: Array, at: Fit, flap: Array) -> Array:
-    """Return the states [T, STATES] of ``tracks`` [T, M, 3] (m) with everything else as in the fit ``at``.
+def states_of(strip: Strip, tracks: Array, at: Fit, shaking: Array, flap: Array) -> tuple[Array, Array]:
+    """Return states [T, STATES] and jitter [T, 5] of ``tracks`` [T, M, 3] (m) with the rest as in the fit ``at``.
 
     ``flap`` [T]: where the flap angle begins, rad. The tracks are in the order of the fit's rest positions.
     """
-    states = np.zeros((len(tracks), STATES))
-    states[:, 0] = flap
+    local = np.zeros((len(tracks), _LOCAL))
+    local[:, 0] = flap
+    prior = np.concatenate([_STATE_PRIOR, np.maximum(shaking, _STEADY)]) ** -2.0 / at.memory
     seen = np.isfinite(tracks).all(axis=-1)
     measured = at.coordinates(np.nan_to_num(tracks))
     for _ in range(_STATE_STEPS):
-        q, J, _, _ = positions(strip, at.rest, states, at.line)
-        r = np.where(seen[..., None], measured - q, 0.0)
-        weight = seen / (at.noise**2 * (1 + (r**2).sum(-1) / (_CAUCHY * at.noise) ** 2))
-        A = np.einsum("tm,tmia,tmib->tab", weight, J, J, optimize=True) + np.diag(_STATE_PRIOR**-2.0)
-        a = np.einsum("tm,tmia,tmi->ta", weight, J, r, optimize=True) - states / _STATE_PRIOR**2
-        states += np.linalg.solve(A, a[..., None])[..., 0]
-    return states
+        q, J, _, _ = positions(strip, at.rest, local[:, :STATES], at.line)
+        r = np.where(seen[..., None], measured - q - shaken(q, local[:, STATES:]), 0.0)
+        J = np.concatenate([J, by_pose(q)], axis=-1)
+        weight = seen / (at.memory * at.noise**2 * (1 + (r**2).sum(-1) / (_CAUCHY * at.noise) ** 2))
+        A = np.einsum("tm,tmia,tmib->tab", weight, J, J, optimize=True) + np.diag(prior)
+        a = np.einsum("tm,tmia,tmi->ta", weight, J, r, optimize=True) - local * prior
+        local += np.linalg.solve(A, a[..., None])[..., 0]
+    return local[:, :STATES], local[:, STATES:]

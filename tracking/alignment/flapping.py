@@ -13,6 +13,10 @@ from wingfit.tracking.noise import products
 
 _HARMONICS = 4
 _LEAST_EXPLAINED = 0.8
+_LEAST_BEATS = 0.9  # in the recording
+_STEP = 0.04  # of the frequencies that are tried, periods per recording
+_REFINED = 6
+_AS_GOOD = 2.0  # ratio of the variances that two periods leave
 _TURN = 720
 
 
@@ -33,29 +37,47 @@ class Flapping:
     harmonics: Array
 
 
-def flapping_of(times: Array, angle: Array) -> Flapping:
-    """Return the flapping of the flap ``angle`` [T] (rad; NaN where unknown) at ``times`` [T], s."""
+def flapping_of(times: Array, angle: Array, trend: int = 0, known: float | None = None) -> Flapping:
+    """Return the flapping of the flap ``angle`` [T] (rad; NaN where unknown) at ``times`` [T], s.
+
+    ``trend``: order of a polynomial over time that is not part of the flapping, and is not in what is returned either. ``known``: frequency
+    (Hz) near which the right one is, by default searched.
+    """
     seen = np.isfinite(angle)
     t, y = times[seen] - times[0], angle[seen]
+    powers = np.polynomial.legendre.legvander(2 * t / t[-1] - 1, trend)[:, 1:]
     span = float(t[-1])
     step = float(np.median(np.diff(t)))
     highest = min(0.25 / step, len(t) / 6 / span)
-    grid = np.arange(0.8 / span, max(highest, 1.0 / span), 0.1 / span)
-    first = float(grid[int(np.argmin([_left(t, y, f) for f in grid]))])
-    # Of a period and its multiples, which explain as much, the shortest is right.
-    for parts in (4, 3, 2):
-        if parts * first <= highest and _left(t, y, parts * first) < 1.3 * _left(t, y, first) + 1e-3 * float(y.var()):
-            first *= parts
+    if known:
+        best = _near(t, y, powers, known)
+    else:
+        grid = np.arange(_LEAST_BEATS / span, max(highest, 1.2 / span), _STEP / span)
+        left = np.array([_left(t, y, powers, f) for f in grid])
+        ends = [_near(t, y, powers, float(grid[k])) for k in np.argsort(left)[:_REFINED]]
+        best = min(ends, key=lambda f: _left(t, y, powers, f))
+    # Of a period and its parts, which explain as much, the shortest is right.
+    for parts in () if known else (4, 3, 2):
+        if parts * best > highest:
+            continue
+        shorter = _near(t, y, powers, parts * best)
+        if _left(t, y, powers, shorter) < _AS_GOOD * _left(t, y, powers, best) + 1e-4 * float(y.var()):
+            best = shorter
             break
-    width = 0.1 / span
-    best = minimize_scalar(lambda f: _left(t, y, f), bounds=(first - width, first + width), method="bounded")
-    X = basis(t, float(best.x))
+    X = np.column_stack([basis(t, best), powers])
     inverse = np.linalg.inv(products(X, X))
     weights = np.zeros(len(times))
     weights[seen] = X @ inverse[0]
     c = inverse @ (X.T @ y)
     harmonics = np.array([c[0], *(c[1 + 2 * k] - 1j * c[2 + 2 * k] for k in range(_HARMONICS))])
-    return Flapping(float(best.x), 1 - _left(t, y, float(best.x)) / max(float(y.var()), 1e-300), weights, harmonics)
+    return Flapping(best, 1 - _left(t, y, powers, best) / max(float(y.var()), 1e-300), weights, harmonics)
+
+
+def _near(t: Array, y: Array, powers: Array, frequency: float) -> float:
+    width = 0.06 / float(t[-1])
+    ends = (frequency - width, frequency + width)
+    found = minimize_scalar(lambda f: _left(t, y, powers, f), bounds=ends, method="bounded", options={"xatol": 1e-5 * width})
+    return float(found.x)
 
 
 def basis(t: Array, frequency: float) -> Array:
@@ -64,9 +86,9 @@ def basis(t: Array, frequency: float) -> Array:
     return np.column_stack([np.ones_like(t), *(f(k * turn) for k in range(1, _HARMONICS + 1) for f in (np.cos, np.sin))])
 
 
-def _left(t: Array, y: Array, frequency: float) -> float:
-    """Variance that a Fourier series of ``frequency`` leaves, rad^2."""
-    X = basis(t, frequency)
+def _left(t: Array, y: Array, powers: Array, frequency: float) -> float:
+    """Variance that a Fourier series of ``frequency`` and the columns ``powers`` leave, rad^2."""
+    X = np.column_stack([basis(t, frequency), powers])
     normal = products(X, X) + 1e-9 * len(t) * np.eye(X.shape[1])
     return float(np.mean((y - X @ np.linalg.solve(normal, X.T @ y)) ** 2))
 

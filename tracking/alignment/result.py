@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from wingfit.records.files.table import write_table
 from wingfit.tracking.alignment.identity import Exchange
 from wingfit.tracking.alignment.request import Side
 
+Axes = Literal["wing", "body"]
 _DECIMALS = 9  # of metres
 
 
@@ -94,10 +95,16 @@ class AlignedTracks:
     lost_samples: int
     remarks: tuple[str, ...]
 
-    def csv(self) -> str:
-        """Return the tracks as a table of ``recordings/<name>.csv`` (docs/formats.md): seconds, metres, gaps empty."""
+    def csv(self, axes: Axes = "wing") -> str:
+        """Return the tracks as a table: seconds, metres, an empty cell for a gap.
+
+        ``axes``: "wing" for ``recordings/<name>.csv`` (docs/formats.md); "body" for x to the nose, y right, z down, as
+        ``wingfit kinematics`` reads them (docs/tracking.md), with the origin of the wing frame.
+        """
+        signs = (1, 1, 1) if axes == "wing" else (-1, 1 if self.side == "right" else -1, -1)
         columns = [f"{marker}_{axis}_m" for marker in self.markers for axis in "xyz"]
-        return write_table(columns, self.times, np.round(self.positions, _DECIMALS).reshape(len(self.times), -1))
+        values = np.round(self.positions * signs, _DECIMALS) + 0.0  # not -0
+        return write_table(columns, self.times, values.reshape(len(self.times), -1))
 
     def as_json(self) -> dict[str, Any]:
         """Return everything but the positions and the covariance, for JSON; angles in degrees."""

@@ -13,7 +13,7 @@ from wingfit.records.wing import Wing
 from wingfit.tracking.alignment.arrangements import DISTINCT, Arrangement, Search, ranked
 from wingfit.tracking.alignment.body_motion import by_markers, without_slow_motion
 from wingfit.tracking.alignment.candidates import gate_of, layout_of
-from wingfit.tracking.alignment.fit import Fit, fit, states_of
+from wingfit.tracking.alignment.fit import Fit, fit, shaken, states_of
 from wingfit.tracking.alignment.flapping import Flapping, drive_series, flapping_of, half_range
 from wingfit.tracking.alignment.identity import exchanges, frame_by_frame, gathered
 from wingfit.tracking.alignment.report import Frame, aligned
@@ -42,6 +42,7 @@ class _Prepared:
     frames: Array
     motion: RigidMotion
     flapping: Flapping
+    shaking: Array
     remarks: list[str]
 
 
@@ -66,11 +67,15 @@ def described_of(wing: Wing) -> Array:
 
 def _prepared(tracks: Tracks, wing: Wing, known: Known) -> _Prepared:
     remarks = list[str]()
+    shaking = np.zeros(5)
     if known.body:
         body = by_markers(tracks, known.body)
         tracks = tracks.only(np.array([name not in known.body for name in tracks.names]))
         tracks = Tracks(tracks.file, tracks.times, tracks.names, body.removed(tracks.positions))
         remarks.append(body.words)
+        hinge = np.nanmean(tracks.positions, axis=(0, 1)) - body.middle
+        way = np.hypot(body.error[1], body.error[0] * np.linalg.norm(hinge))
+        shaking[:2], shaking[2:] = body.error[0], way
     usable = np.flatnonzero(np.isfinite(tracks.positions[..., 0]).sum(axis=1) >= LEAST_TRACKS)
     if len(usable) < LEAST_TRACKS:
         few = f"{len(usable)} frames show {LEAST_TRACKS} or more tracks; track more markers at a time"
@@ -86,7 +91,7 @@ def _prepared(tracks: Tracks, wing: Wing, known: Known) -> _Prepared:
     if amplitude < _LEAST_AMPLITUDE:
         few = f"the wing turns by +-{np.degrees(amplitude):.2g} deg; at least {np.degrees(_LEAST_AMPLITUDE):.2g} deg are"
         raise fail(tracks.file, None, f"too little motion: {few} needed to see its hinge; align a recording that flaps")
-    return _Prepared(tracks, frames, motion, flapping_of(tracks.times[frames], motion.angle), remarks)
+    return _Prepared(tracks, frames, motion, flapping_of(tracks.times[frames], motion.angle), shaking, remarks)
 
 
 def _check_size(tracks: Tracks, wing: Wing, motion: RigidMotion) -> None:
@@ -115,7 +120,7 @@ def _arranged(
     found: _Prepared, wing: Wing, strip: Strip, described: Array, known: Known
 ) -> tuple[Arrangement, float | None]:
     tracks, motion = found.tracks, found.motion
-    search = Search(strip, described, tracks.positions[found.frames], motion, layout_of(motion), found.flapping.mean)
+    search = Search(strip, described, tracks.positions[found.frames], motion, layout_of(motion), found.flapping.mean, found.shaking)
     named, stated = _given(found, wing, known)
     sides = [True, False] if known.side is None else [known.side == "right"]
     up, every = known.up_vector(), list[Arrangement]()
@@ -145,7 +150,7 @@ def _best(
     every: list[Arrangement], described: Array, named: Array, tracks: Tracks, wing: Wing
 ) -> tuple[Arrangement, float]:
     """Return the best arrangement, and the evidence for its side; DatasetError if another one is nearly as good."""
-    order = ranked(every, described)
+    order = ranked(every, described, wing.span)
     agreeing = [pair for pair in order if _agrees(pair[1], named)]
     if agreeing and agreeing[0][0] < DISTINCT and (named >= 0).sum() >= 3:
         order = [(cost - agreeing[0][0], one) for cost, one in agreeing]  # names decide between what fits equally
@@ -214,16 +219,19 @@ def _finished(
     shown = np.full((len(points), len(described)), -1)
     for start in range(0, len(points), _CHUNK):
         part = slice(start, start + _CHUNK)
-        states = states_of(strip, points[part][:, best.marker >= 0], best.fit, flap[part])
+        states, jitter = states_of(strip, points[part][:, best.marker >= 0], best.fit, found.shaking, flap[part])
         model = positions(strip, rest, states, best.fit.line)[0]
+        model += shaken(model, jitter)
         shown[part] = frame_by_frame(best.fit.coordinates(points[part]), model, marker, best.fit.noise, gate)
     shown[:, (shown >= 0).sum(axis=0) < _LEAST_SAMPLES] = -1
     used = np.flatnonzero((shown >= 0).any(axis=0))
     mine = gathered(tracks.positions, shown[:, used])
     begun = _with_rest(best.fit, rest[used])
-    final = fit(strip, described[used], mine[found.frames], found.flapping.mean, begun)
+    final = fit(strip, described[used], mine[found.frames], found.flapping.mean, found.shaking, begun)
     _check_fit(tracks.file, final, strip)
-    flapping = flapping_of(tracks.times[found.frames], final.states[:, 0])
+    if known.body:
+        mine = _steadied(mine, strip, final, found)
+    flapping = flapping_of(tracks.times[found.frames], final.states[:, 0], known=found.flapping.frequency)
     zero = _zero(tracks.file, wing, flapping, known)
     names = tuple(one.name for one in wing.markers)
     changed = exchanges(shown, best.marker, tracks.times, tracks.names, names)
@@ -234,6 +242,18 @@ def _finished(
     turned = Rotation.from_rotvec([flapping.harmonics[0].real - zero, 0.0, 0.0]).as_matrix().T @ final.turn
     frame = Frame(turned, final.hinge, flapping, zero, evidence)
     return aligned(tracks, wing, final, frame, used, shown, mine, changed, dropped, lost, remarks)
+
+
+def _steadied(mine: Array, strip: Strip, final: Fit, found: _Prepared) -> Array:
+    """Return positions [T, M, 3] of the markers, m, without what remains of the body's motion."""
+    flap = np.interp(np.arange(len(mine)), found.frames, final.states[:, 0])
+    result = mine.copy()
+    for start in range(0, len(mine), _CHUNK):
+        part = slice(start, start + _CHUNK)
+        states, jitter = states_of(strip, mine[part], final, found.shaking, flap[part])
+        model = positions(strip, final.rest, states, final.line)[0]
+        result[part] -= shaken(model, jitter) @ final.turn
+    return result
 
 
 def _with_rest(one: Fit, rest: Array) -> Fit:
