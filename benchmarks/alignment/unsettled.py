@@ -14,7 +14,7 @@ from wingfit.records import FourierDrive, Hinge, Marker, Rod, Wing
 from wingfit.tracking.alignment import Tracks
 
 Array = npt.NDArray[np.float64]
-_FRAMES, _PER_BEAT, _NOISE = 90, 30.0, 3e-4
+_FRAMES, _PER_BEAT, _NOISE = 60, 28.0, 3e-4
 _STROKE = 0.6
 
 

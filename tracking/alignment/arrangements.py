@@ -21,7 +21,8 @@ _MOST = 3  # candidates that are fitted
 _CUT = 9.0 * np.log1p(100.0 / 9.0)  # cost of a sample that fits no marker, 10 standard deviations away
 _LARGEST_SCATTER = 0.01  # of rest positions, spans
 _ROUNDS = 4  # of relabelling
-_FIRST_STEPS = 12
+_FIRST_STEPS, _STEPS = 8, 40
+_LEAST_MARKERS = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,38 +79,36 @@ class Search:
         kept = list[Candidate]()
         for one in sorted(found, key=lambda one: one.misfit):
             alike = any(np.array_equal(one.marker, other.marker) and one.sense == other.sense for other in kept)
-            if one.misfit <= _NEAR * best + 1e-3 * self.strip.span and not alike and (one.marker >= 0).sum() >= 4:
+            if one.misfit <= _NEAR * best + 1e-3 * self.strip.span and not alike and (one.marker >= 0).sum() >= _LEAST_MARKERS:
                 kept.append(one)
         return kept[:_MOST]
 
+    def _fitted(self, here: Fit, marker: Array, rest: Array, steps: int) -> Fit:
+        which = marker[marker >= 0]
+        begun, tracks = with_all(here, rest[which]), self.tracks[:, marker >= 0]
+        return fit(self.strip, self.described[which], tracks, self.mean, self.shaking, begun, steps=steps)
+
     def arranged(self, candidate: Candidate, right: bool, given: Array) -> Arrangement | None:
         """Return the fit that starts from ``candidate``, relabelled until labels and fit agree; None if it has no fit."""
-        start = start_of(candidate, self.layout, self.motion, right, self.described, self.strip)
-        marker, rest = candidate.marker, self.described.copy()
-        gate, here = gate_of(self.described[:, :2]), start
-        before = np.full_like(marker, -2)
-        doubtful, away = np.zeros(len(marker), dtype=bool), np.zeros((len(marker), len(rest)))
+        here = start_of(candidate, self.layout, self.motion, right, self.described, self.strip)
+        marker, rest, gate = candidate.marker, self.described.copy(), gate_of(self.described[:, :2])
         for round_ in range(_ROUNDS):
-            tracks = np.flatnonzero(marker >= 0)
-            which = marker[tracks]
-            if len(tracks) < 4:
+            if (marker >= 0).sum() < _LEAST_MARKERS:
                 return None
-            steps = _FIRST_STEPS if round_ == 0 else 40
-            here = fit(self.strip, self.described[which], self.tracks[:, tracks], self.mean, self.shaking, with_all(here, rest[which]),
-                       steps=steps)  # fmt: skip
-            if np.array_equal(before, marker) and round_ > 1:
-                break
+            here = self._fitted(here, marker, rest, _FIRST_STEPS if round_ == 0 else _STEPS)
             rest = self.described.copy()
-            rest[which] = here.rest
+            rest[marker[marker >= 0]] = here.rest
             model = positions(self.strip, rest, here.states, here.line)[0]
             model += shaken(model, here.jitter)
-            before = marker
-            marker, away, doubtful = whole_tracks(here.coordinates(self.tracks), model, gate)
-            marker = _with_given(marker, given)
-        if not np.array_equal(before, marker):
-            tracks = np.flatnonzero(marker >= 0)
-            which = marker[tracks]
-            here = fit(self.strip, self.described[which], self.tracks[:, tracks], self.mean, self.shaking, with_all(here, rest[which]))
+            found, away, doubtful = whole_tracks(here.coordinates(self.tracks), model, gate)
+            found = _with_given(found, given)
+            if round_ > 0 and np.array_equal(found, marker):
+                break
+            marker = found
+        else:
+            if (marker >= 0).sum() < _LEAST_MARKERS:
+                return None
+            here = self._fitted(here, marker, rest, _STEPS)
         return Arrangement(marker, doubtful, away, here, np.isfinite(self.tracks[..., 0]).sum(axis=0))
 
 

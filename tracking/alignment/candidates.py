@@ -213,5 +213,5 @@ def start_of(candidate: Candidate, layout: Layout, motion: RigidMotion, right: b
 
 
 def with_all(start: Fit, rest: Array) -> Fit:
-    """Return ``start`` with the ``rest`` positions [M, 3] of other markers."""
-    return replace(start, rest=rest)
+    """Return ``start`` with the ``rest`` positions [M, 3] of other markers, whose covariance is not known."""
+    return replace(start, rest=rest, covariance=np.zeros((0, 0)))

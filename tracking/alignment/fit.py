@@ -30,7 +30,8 @@ _FRAME = 7  # small rotation about y and z, a shift, and the line: rotation abou
 _STEADY = 1e-7  # standard deviation of jitter where there is none
 _STEPS = 40
 _STATE_STEPS = 10
-_SETTLED = 1e-5  # change of the pose in radians and in spans at which the iteration ends
+_SETTLED = 3e-5  # change of the pose in radians and in spans at which the iteration ends
+_FIRST_SCATTER = 5e-3
 _LEAST_REST, _MOST_REST = 2e-4, 1e-2  # standard deviation of described rest positions, spans
 _CAUCHY = 3.0
 _LEAST_CORRELATION = 0.6  # of consecutive residuals: where noise is white, the errors of the model are not
@@ -93,9 +94,11 @@ def fit(
     """
     seen = np.isfinite(tracks).all(axis=-1)
     problem = _Problem(strip, described, tracks, seen, mean, np.maximum(shaking, _STEADY))
-    here, damping = problem.scaled(replace(start, residuals=problem.residuals(start), scatter=5e-3 * strip.span)), 1e-4
+    here = replace(start, residuals=problem.residuals(start), scatter=_FIRST_SCATTER * strip.span)
+    here, damping = problem.scaled(here), 1e-4
     for _ in range(steps):
         step = _Step(problem, here)
+        covariance, flap_error = step.errors()
         while True:
             there = problem.weighed(step.taken(damping))
             if there.cost <= here.cost + 1e-9 * abs(here.cost) or damping > 1e3:
@@ -103,10 +106,11 @@ def fit(
             damping *= 10
         turned, shifted = np.abs(there.turn - here.turn).max(), np.abs(there.hinge - here.hinge).max()
         damping = max(damping / 10, 1e-9)
-        here = problem.scaled(there)
+        here = problem.scaled(replace(there, covariance=covariance, flap_error=flap_error))
         if max(float(turned), float(shifted) / strip.span) < _SETTLED:
             break
-    return here
+    covariance, flap_error = _Step(problem, here).errors()
+    return replace(here, covariance=covariance, flap_error=flap_error)
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,16 +140,17 @@ class _Problem:
         return replace(at, cost=float(data / at.memory + moves + states + jitter + means + line))
 
     def scaled(self, at: Fit) -> Fit:
-        """Return ``at`` with new estimates of noise, its memory, scatter and covariance, and its cost under these."""
+        """Return ``at`` with new estimates of noise, its memory and scatter, and its cost under these."""
         squares = (at.residuals[self.seen] ** 2).sum(axis=-1)
         # The median of |r|^2 of three normal coordinates is 2.366 times their variance.
         noise = max(float(np.sqrt(np.median(squares) / 2.366)), _LEAST_NOISE * self.strip.span)
         at = replace(at, noise=noise, memory=_memory(at.residuals, noise))
-        covariance, flap_error = _Step(self, at).errors()
-        moves = (at.rest - self.described) ** 2
-        spread = float(np.sqrt(np.mean(moves.ravel() + np.diag(covariance)[_FRAME:])))  # expectation maximisation
-        scatter = min(max(spread, _LEAST_REST * self.strip.span), _MOST_REST * self.strip.span)
-        return self.weighed(replace(at, scatter=scatter, covariance=covariance, flap_error=flap_error))
+        moves = ((at.rest - self.described) ** 2).ravel()
+        scatter = at.scatter
+        if at.covariance.size:  # expectation maximisation
+            scatter = float(np.sqrt(np.mean(moves + np.diag(at.covariance)[_FRAME:])))
+        scatter = min(max(scatter, _LEAST_REST * self.strip.span), _MOST_REST * self.strip.span)
+        return self.weighed(replace(at, scatter=scatter))
 
 
 def by_pose(q: Array) -> Array:

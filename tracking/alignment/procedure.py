@@ -12,7 +12,7 @@ from wingfit.records.errors import DatasetError, fail
 from wingfit.records.wing import Wing
 from wingfit.tracking.alignment.arrangements import DISTINCT, Arrangement, Search, ranked
 from wingfit.tracking.alignment.body_motion import by_markers, without_slow_motion
-from wingfit.tracking.alignment.candidates import gate_of, layout_of
+from wingfit.tracking.alignment.candidates import gate_of, layout_of, with_all
 from wingfit.tracking.alignment.fit import Fit, fit, shaken, states_of
 from wingfit.tracking.alignment.flapping import Flapping, drive_series, flapping_of, half_range
 from wingfit.tracking.alignment.identity import exchanges, frame_by_frame, gathered
@@ -226,7 +226,7 @@ def _finished(
     shown[:, (shown >= 0).sum(axis=0) < _LEAST_SAMPLES] = -1
     used = np.flatnonzero((shown >= 0).any(axis=0))
     mine = gathered(tracks.positions, shown[:, used])
-    begun = _with_rest(best.fit, rest[used])
+    begun = with_all(best.fit, rest[used])
     final = fit(strip, described[used], mine[found.frames], found.flapping.mean, found.shaking, begun)
     _check_fit(tracks.file, final, strip)
     if known.body:
@@ -254,12 +254,6 @@ def _steadied(mine: Array, strip: Strip, final: Fit, found: _Prepared) -> Array:
         model = positions(strip, final.rest, states, final.line)[0]
         result[part] -= shaken(model, jitter) @ final.turn
     return result
-
-
-def _with_rest(one: Fit, rest: Array) -> Fit:
-    from dataclasses import replace
-
-    return replace(one, rest=rest)
 
 
 def _check_match(tracks: Tracks, best: Arrangement, motion: RigidMotion, strip: Strip) -> None:
