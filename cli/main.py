@@ -23,6 +23,7 @@ from wingfit.cli import (
     serve,
     simulate,
 )
+from wingfit.cli.aligning import command as aligning
 from wingfit.cli.base.output import note
 from wingfit.cli.forces import free_flight, kinematics
 from wingfit.cli.forces import runs as force_runs
@@ -46,6 +47,7 @@ app.command()(campaigns.balance)
 app.command("import")(importing.import_)
 app.command("wing-template")(template.wing_template)
 app.command("wing-drawing")(template.wing_drawing)
+app.command()(aligning.align)
 app.command()(kinematics.kinematics)
 app.command()(free_flight.forces)
 app.add_typer(datasets.app, name="datasets")

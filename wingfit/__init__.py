@@ -6,7 +6,7 @@ The names below are public and documented; everything else in the package may ch
 - :func:`load_dataset` reads recordings from a folder, a zip file of a folder, or NetCDF. If they are not valid, it
 raises :class:`DatasetError`, which lists what is wrong.
 - :func:`import_tracks` reads marker tracks from the files of motion-capture systems and digitisers, and returns
-:class:`ImportedTracks`.
+:class:`ImportedTracks`; :func:`align_tracks` brings them to the frame of a described wing, :class:`AlignedTracks`.
 - :func:`wing_template` describes a wing by an outline of its planform, and returns :class:`WingTemplate`;
 :func:`wing_drawing` draws a described wing as SVG.
 - :func:`calibrate` estimates the genes of a model in this process, without a server; :func:`diagnose` reports which
@@ -24,6 +24,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from wingfit._align import align_tracks
     from wingfit._drive import drive
     from wingfit._local import calibrate, diagnose
     from wingfit.calibration.forces.result import ForceResult
@@ -57,8 +58,10 @@ if TYPE_CHECKING:
     from wingfit.rigs.rig import Rig
     from wingfit.rigs.run import Run, SimulationError
     from wingfit.rigs.suspect import Suspect
+    from wingfit.tracking.alignment import AlignedTracks
 
 __all__ = [
+    "AlignedTracks",
     "CalibrationSpec",
     "Channel",
     "Client",
@@ -89,6 +92,7 @@ __all__ = [
     "Suspect",
     "WingTemplate",
     "WingfitError",
+    "align_tracks",
     "calibrate",
     "check_dataset",
     "declaration",
@@ -105,6 +109,7 @@ __all__ = [
 ]
 
 _MODULES = {
+    "wingfit._align": ("align_tracks",),
     "wingfit._drive": ("drive",),
     "wingfit._local": ("calibrate", "diagnose"),
     "wingfit.calibration.forces.result": ("ForceResult",),
@@ -138,6 +143,7 @@ _MODULES = {
     "wingfit.rigs.rig": ("Rig",),
     "wingfit.rigs.run": ("Run", "SimulationError"),
     "wingfit.rigs.suspect": ("Suspect",),
+    "wingfit.tracking.alignment": ("AlignedTracks",),
 }
 _MODULE_OF = {name: module for module, names in _MODULES.items() for name in names}
 

@@ -1,0 +1,1 @@
+"""Proves the alignment of tracks on wings of independent plants."""

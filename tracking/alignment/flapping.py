@@ -1,0 +1,122 @@
+"""Period of the flapping in the recorded frames, and the mean of the drive's flap angle: the zero of the angle."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from wingfit.records.array_types import Array
+from wingfit.records.drive import Drive, FourBarDrive, FourierSeries
+from wingfit.tracking.noise import products
+
+_HARMONICS = 4
+_LEAST_EXPLAINED = 0.8
+_LEAST_BEATS = 0.9  # in the recording
+_STEP = 0.04  # of the frequencies that are tried, periods per recording
+_REFINED = 6
+_AS_GOOD = 2.0  # ratio of the variances that two periods leave
+_TURN = 720
+
+
+@dataclass(frozen=True, eq=False)
+class Flapping:
+    """The flapping as it appears in the frames.
+
+    Attributes:
+        frequency: apparent, Hz: with a strobe it is not the flap frequency.
+        explained: part of the variance of the flap angle that this period explains.
+        mean: [T] weights whose sum with the samples is their mean over the beat.
+        harmonics: complex amplitudes [5] of the flap angle (rad); the first is the mean.
+    """
+
+    frequency: float
+    explained: float
+    mean: Array
+    harmonics: Array
+
+
+def flapping_of(times: Array, angle: Array, trend: int = 0, known: float | None = None) -> Flapping:
+    """Return the flapping of the flap ``angle`` [T] (rad; NaN where unknown) at ``times`` [T], s.
+
+    ``trend``: order of a polynomial over time that is not part of the flapping, and is not in what is returned either. ``known``: frequency
+    (Hz) near which the right one is, by default searched.
+    """
+    seen = np.isfinite(angle)
+    t, y = times[seen] - times[0], angle[seen]
+    powers = np.polynomial.legendre.legvander(2 * t / t[-1] - 1, trend)[:, 1:]
+    span = float(t[-1])
+    step = float(np.median(np.diff(t)))
+    highest = min(0.25 / step, len(t) / 6 / span)
+    if known:
+        best = _near(t, y, powers, known)
+    else:
+        grid = np.arange(_LEAST_BEATS / span, max(highest, 1.2 / span), _STEP / span)
+        left = np.array([_left(t, y, powers, f) for f in grid])
+        ends = [_near(t, y, powers, float(grid[k])) for k in np.argsort(left)[:_REFINED]]
+        best = min(ends, key=lambda f: _left(t, y, powers, f))
+    # Of a period and its parts, which explain as much, the shortest is right.
+    for parts in () if known else (4, 3, 2):
+        if parts * best > highest:
+            continue
+        shorter = _near(t, y, powers, parts * best)
+        if _left(t, y, powers, shorter) < _AS_GOOD * _left(t, y, powers, best) + 1e-4 * float(y.var()):
+            best = shorter
+            break
+    X = np.column_stack([basis(t, best), powers])
+    inverse = np.linalg.inv(products(X, X))
+    weights = np.zeros(len(times))
+    weights[seen] = X @ inverse[0]
+    c = inverse @ (X.T @ y)
+    harmonics = np.array([c[0], *(c[1 + 2 * k] - 1j * c[2 + 2 * k] for k in range(_HARMONICS))])
+    return Flapping(best, 1 - _left(t, y, powers, best) / max(float(y.var()), 1e-300), weights, harmonics)
+
+
+def _near(t: Array, y: Array, powers: Array, frequency: float) -> float:
+    width = 0.06 / float(t[-1])
+    ends = (frequency - width, frequency + width)
+    found = minimize_scalar(lambda f: _left(t, y, powers, f), bounds=ends, method="bounded", options={"xatol": 1e-5 * width})
+    return float(found.x)
+
+
+def basis(t: Array, frequency: float) -> Array:
+    """Return the columns 1, cos, sin, cos 2, sin 2, ... [N, 9] of ``frequency`` (Hz) at times ``t`` [N], s."""
+    turn = 2 * np.pi * frequency * t
+    return np.column_stack([np.ones_like(t), *(f(k * turn) for k in range(1, _HARMONICS + 1) for f in (np.cos, np.sin))])
+
+
+def _left(t: Array, y: Array, powers: Array, frequency: float) -> float:
+    """Variance that a Fourier series of ``frequency`` and the columns ``powers`` leave, rad^2."""
+    X = np.column_stack([basis(t, frequency), powers])
+    normal = products(X, X) + 1e-9 * len(t) * np.eye(X.shape[1])
+    return float(np.mean((y - X @ np.linalg.solve(normal, X.T @ y)) ** 2))
+
+
+def drive_series(drive: Drive) -> Array:
+    """Complex amplitudes [5] of the driving rod's angle (rad) over the drive phase; the first is the mean.
+
+    A four-bar linkage closes as Freudenstein's equation says (1955); its rocker lies clockwise of the line from its
+    pivot to the crank pin.
+    """
+    if isinstance(drive, FourierSeries):
+        found = np.zeros(_HARMONICS + 1, complex)
+        found[: len(drive.series)] = drive.series[: _HARMONICS + 1]
+        return found
+    found = 2 * np.fft.rfft(_rocker(drive))[: _HARMONICS + 1] / _TURN
+    found[0] /= 2
+    return np.asarray(found)
+
+
+def _rocker(link: FourBarDrive) -> Array:
+    psi = 2 * np.pi * np.arange(_TURN) / _TURN
+    x, y = link.crank * np.cos(psi) - link.ground, link.crank * np.sin(psi)
+    k = (link.rocker**2 - link.coupler**2 + x**2 + y**2) / (2 * link.rocker)
+    angle = np.unwrap(2 * np.arctan2(y - np.sqrt(x**2 + y**2 - k**2), x + k)) + link.offset
+    return np.asarray(angle - 2 * np.pi * np.round(angle.mean() / (2 * np.pi)))
+
+
+def half_range(harmonics: Array) -> float:
+    """Return half the range of the angle with the complex amplitudes ``harmonics`` [5], rad."""
+    turn = np.exp(2j * np.pi * np.outer(np.arange(_TURN) / _TURN, np.arange(len(harmonics))))
+    return float(np.ptp((turn @ harmonics).real) / 2)

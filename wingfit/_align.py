@@ -1,0 +1,48 @@
+"""Aligns tracks to a described wing, in this process."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from os import PathLike
+from typing import Literal
+
+from wingfit.importers import ImportedTracks, import_tracks
+from wingfit.records import Wing
+from wingfit.records.description.wing_description import read_wing
+from wingfit.tracking.alignment import AlignedTracks, Known, Tracks, align
+
+
+def align_tracks(
+    tracks: ImportedTracks | str | PathLike[str],
+    wing: Wing | str | PathLike[str],
+    *,
+    side: Literal["left", "right"] | None = None,
+    up: str | None = None,
+    labels: Mapping[str, str] | None = None,
+    ignore_names: bool = False,
+    body: Sequence[str] = (),
+    mean_flap_deg: float | None = None,
+) -> AlignedTracks:
+    """Align tracks in any camera axes to the frame of a described wing, and name its markers.
+
+    Args:
+        tracks: as :func:`wingfit.import_tracks` returns them, or a file that it reads without options.
+        wing: its description, or a file with it: ``dataset.yaml``, or the keys of a wing alone.
+        side: of the body on which the wing is; by default it is estimated.
+        up: axis of the tracks that is up on the rig, for example "z" or "-y"; by default it is estimated.
+        labels: marker of a track by the name of the track, where it is known.
+        ignore_names: names of tracks say nothing about markers.
+        body: tracks on the body that carries the hinge, three or more; its motion is removed.
+        mean_flap_deg: mean flap angle over the beat; by default that of the described drive.
+
+    Returns:
+        The tracks in the wing's frame, the frame, the labels, residuals, and rest positions with standard errors.
+
+    Raises:
+        DatasetError: what is wrong with the tracks or the description, or what is not certain and would settle it.
+
+    """
+    found = tracks if isinstance(tracks, ImportedTracks) else import_tracks(tracks)
+    described = wing if isinstance(wing, Wing) else read_wing(wing)
+    known = Known(side, up, dict(labels or {}), ignore_names, tuple(body), mean_flap_deg)
+    return align(Tracks(found.file, found.times, found.markers, found.positions), described, known)
