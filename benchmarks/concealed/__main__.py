@@ -64,10 +64,10 @@ def main() -> None:
     if not lattice:
         print(f"without the trials in a vortex lattice: {VARIABLE} is not set", file=sys.stderr)
     trials = plan(arguments.seed, quick=arguments.quick, only=arguments.only, lattice=lattice)
-    trials = [one for one in trials if arguments.rig in (None, one.build.rig)][: arguments.first]
+    trials = tuple(one for one in trials if arguments.rig in (None, one.build.rig))[: arguments.first]
     before = results.read(arguments.results, arguments.seed) if arguments.results else None
     known = {mark.trial for mark in before.marks} if before else set[str]()
-    new = [trial for trial in trials if trial.name not in known]
+    new = tuple(trial for trial in trials if trial.name not in known)
     with tempfile.TemporaryDirectory() as scratch:
         tables = conduct(new, arguments.keep or Path(scratch), arguments.jobs, peers=arguments.peers, before=before)
     if arguments.results:
