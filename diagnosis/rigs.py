@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import pairwise, product
 from typing import Literal
 
 import numpy as np
@@ -13,6 +12,7 @@ import numpy as np
 from wingfit.calibration.effects import sizes
 from wingfit.calibration.preparation import fitted_through
 from wingfit.calibration.spec import CalibrationSpec, model_for
+from wingfit.diagnosis.candidate_conditions import candidate_conditions, normalised
 from wingfit.diagnosis.subject import BeatSubject, ChannelLocation
 from wingfit.records import Condition, Dataset, Recording, Vehicle, Wing
 from wingfit.records.array_types import Array, Float
@@ -33,8 +33,6 @@ from wingfit.sim.wing.probing import Probed, probed
 MAX_BODIES = 64  # of a finer wing; one individual of 80 bodies takes ten times as long as one of 24
 MAX_ELEMENTS = 640
 FORCE_TOLERANCE = 1e-3  # of the root mean square force: far below the resolution of any balance
-MAX_CONDITIONS = 40
-LEVEL_TOLERANCE = 0.05  # of the range of a variable: values nearer than that count as one setting
 MAX_MARKERS_TRIED = 64  # as candidates for the fault of a marker
 _LOCATION_GENES: dict[str, Literal["span", "chord"]] = {"station": "span", "chord": "chord"}
 
@@ -62,16 +60,8 @@ class _Rig:
         return self.model.with_effects(*names)
 
     def candidate_conditions(self) -> tuple[Condition, ...]:
-        """Return conditions that the dataset's rigs can run and did not, at most MAX_CONDITIONS, far from each other.
-
-        They are selected from all combinations of the flap frequencies and phase lags of a rig, and their midpoints,
-        with every air stream (pressure, airspeed, angle of attack). None in free flight, where the vehicle and not the
-        experimenter chooses the combinations.
-        """
-        recordings, candidates = self.dataset.recordings, list[Condition]()
-        for rig in dict.fromkeys(r.rig for r in recordings if r.rig != "free_flight"):
-            candidates += _combinations([r.condition for r in recordings if r.rig == rig])
-        return tuple(_farthest_first(candidates, [r.condition for r in recordings], MAX_CONDITIONS))
+        """Return conditions that could be recorded next (:func:`.candidate_conditions.candidate_conditions`)."""
+        return candidate_conditions(self.dataset.recordings)
 
     def simulated_recording(self, model: Model, genome: Float[Array, " G"], condition: Condition) -> Recording | None:
         """Return what the rig would record of ``model`` with ``genome`` [G] under ``condition``; None if that fails.
@@ -316,82 +306,5 @@ def _name(condition: Condition) -> str:
 
 def _dissimilarity(dataset: Dataset, one: Condition, other: Condition) -> tuple[bool, float]:
     """Return whether only one of two conditions has an air stream, and their distance otherwise, for sorting."""
-    positions = _normalised([one, other], [recording.condition for recording in dataset.recordings])
+    positions = normalised([one, other], [recording.condition for recording in dataset.recordings])
     return (one.airspeed > 0) != (other.airspeed > 0), float(np.linalg.norm(positions[0] - positions[1]))
-
-
-def _combinations(ran: Sequence[Condition]) -> Iterator[Condition]:
-    """Yield all combinations of the settings in ``ran``, the recorded conditions of one rig, and their midpoints."""
-    frequencies, lags = (_levels([getattr(c, name) for c in ran]) for name in ("flap_frequency", "phase_lag"))
-    for f, lag, stream in product(_with_midpoints(frequencies), _with_midpoints(lags), _streams(ran)):
-        yield replace(stream, flap_frequency=f, phase_lag=lag)
-
-
-def _streams(ran: Sequence[Condition]) -> list[Condition]:
-    """Return conditions with different streams of air, and midpoints between neighbours (of pressure: geometric)."""
-    names = ("pressure", "airspeed", "angle_of_attack")
-    scales = dict.fromkeys(names, float) | {"pressure": _logarithm}
-    levels = {name: _levels([getattr(c, name) for c in ran], scales[name]) for name in names}
-    snapped = {tuple(_nearest(levels[name], getattr(c, name)) for name in names): c for c in ran}
-    streams = [replace(c, **dict(zip(names, key, strict=True))) for key, c in sorted(snapped.items())]
-    streams.sort(key=lambda c: (c.airspeed, c.pressure))
-    for one, other in list(pairwise(streams)):
-        half = {name: 0.5 * (getattr(one, name) + getattr(other, name)) for name in names}
-        streams.append(replace(one, **half | {"pressure": float(np.sqrt(one.pressure * other.pressure))}))
-    return streams
-
-
-def _levels(values: Sequence[float], scale: Callable[[float], float] = float) -> list[float]:
-    """Return the distinct settings among ``values``; of those that are nearly equal, the middle one.
-
-    Nearly equal are values within LEVEL_TOLERANCE of their range, or of half the largest value if that is more, both
-    measured on ``scale`` (a function of the value).
-    """
-    ordered = sorted(values)
-    low, high = scale(ordered[0]), scale(ordered[-1])
-    apart = LEVEL_TOLERANCE * max(high - low, 0.5 * abs(high))
-    groups = [[ordered[0]]]
-    for value in ordered[1:]:
-        if scale(value) - scale(groups[-1][0]) > apart:
-            groups.append([])
-        groups[-1].append(value)
-    return [group[len(group) // 2] for group in groups]
-
-
-def _logarithm(pressure: float) -> float:
-    """Return the logarithm of a ``pressure`` in Pa, at least 1 Pa: lower ones do not differ."""
-    return float(np.log(max(pressure, 1.0)))
-
-
-def _with_midpoints(levels: Sequence[float]) -> list[float]:
-    """Return ``levels`` and the midpoints between neighbours."""
-    return [*levels, *(0.5 * (one + other) for one, other in pairwise(levels))]
-
-
-def _nearest(levels: Sequence[float], value: float) -> float:
-    return min(levels, key=lambda level: abs(level - value))
-
-
-def _farthest_first(candidates: Sequence[Condition], recorded: Sequence[Condition], most: int) -> Iterator[Condition]:
-    """Yield up to ``most`` of ``candidates``, each the farthest from all that are recorded or selected already."""
-    if not candidates:
-        return
-    places, taken = _normalised(candidates, recorded), _normalised(recorded, recorded)
-    near = np.linalg.norm(places[:, None] - taken[None], axis=2).min(axis=1)
-    for _ in range(most):
-        k = int(np.argmax(near))
-        if near[k] <= LEVEL_TOLERANCE:
-            return
-        yield candidates[k]
-        near = np.minimum(near, np.linalg.norm(places - places[k], axis=1))
-
-
-def _normalised(conditions: Sequence[Condition], ran: Sequence[Condition]) -> Array:
-    """Return frequency, lag, log pressure, airspeed, incidence of ``conditions`` [N, 5] over their range in ``ran``."""
-
-    def numbers(some: Sequence[Condition]) -> Array:
-        rows = [(c.flap_frequency, c.phase_lag, _logarithm(c.pressure), c.airspeed, c.angle_of_attack) for c in some]
-        return np.array(rows, float)
-
-    reach = np.ptp(numbers(ran), axis=0)
-    return numbers(conditions) / np.where(reach > 0, reach, 1.0)

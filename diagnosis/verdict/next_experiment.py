@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from wingfit.calibration.estimates.linearised import free_genes, residuals_of, values_at
+from wingfit.diagnosis.candidate_conditions import settings_beyond
 from wingfit.diagnosis.evidence.context import FitContext
 from wingfit.diagnosis.evidence.fit import PRIOR_SD, Fit
 from wingfit.diagnosis.evidence.refit import Refit
@@ -176,6 +177,9 @@ def _advice(
     where = f"{condition.flap_frequency:.3g} Hz, {lag:.3g} deg of lag, {condition.pressure / 100.0:.4g} mbar"
     if condition.airspeed > 0:
         where += f", {condition.airspeed:.3g} m/s at {incidence:.3g} deg"
+    beyond = settings_beyond(condition, [one.condition for one in data.recordings if isinstance(one, Recording)])
+    if beyond:
+        where += f" ({' and '.join(beyond)} beyond what was recorded, if the rig allows it)"
     between, titles = rivals_in_words(rivals)
     return Advice(
         words=f"record {where}: there the predictions of {titles} differ by {apart:.2g} sigma",
