@@ -116,6 +116,7 @@ def test_bad_statements(tmp_path: Path, options: dict[str, Any], words: str) -> 
         ("", {}, "is empty"),
         ("chord,span\n1,2\n", {}, "how the wing is swept"),
         ("x_mm,y_cm\n1,2\n", {}, "write all in one unit"),
+        ("span,le,cm\n1,2,3\n", {}, "stations need"),
         (table(*SQUARE), {"root": "left", "leading_edge": "top"}, "does not say where y points"),
         (table(*SQUARE, header="x_mm,y_mm"), {"unit": "cm"}, "but the file states mm"),
         ("span,le,te\n0,0,9\n50,0,9\n40,0,9\n", {}, "span 40 follows 50"),
