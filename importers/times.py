@@ -215,7 +215,11 @@ def _check_times(times: Array, raw: Raw, file: str) -> None:
     if not np.isfinite(times).all():
         at = int(np.flatnonzero(~np.isfinite(times))[0])
         raise _time_fault(
-            raw, at, file, None, f"is empty; each of the {raw.row_word} needs a time: fill it in, or remove the row"
+            raw,
+            at,
+            file,
+            None,
+            f"is empty; every {raw.row_word.removesuffix('s')} needs a time: fill it in, or remove the row",
         )
     wrong = np.flatnonzero(~(np.diff(times) > 0))
     if len(wrong):
