@@ -28,6 +28,7 @@ from wingfit.cli.base.output import note
 from wingfit.cli.forces import free_flight, kinematics
 from wingfit.cli.forces import runs as force_runs
 from wingfit.cli.importing import command as importing
+from wingfit.cli.importing import forces as force_files
 from wingfit.cli.importing import template
 from wingfit.client.client import WingfitError
 from wingfit.sim.requested_lanes import requested_lanes
@@ -45,6 +46,7 @@ app.command()(serve.serve)
 app.command()(campaigns.campaign)
 app.command()(campaigns.balance)
 app.command("import")(importing.import_)
+app.command("import-forces")(force_files.import_forces)
 app.command("wing-template")(template.wing_template)
 app.command("wing-drawing")(template.wing_drawing)
 app.command()(aligning.align)

@@ -81,7 +81,7 @@ def read_samples(
     check_most(source.file, "has", len(layout.labels), MAX_MARKERS, "markers", "export fewer markers")
     wanted = [column for place in layout.columns for column in place]
     wanted += [column for column in (layout.time, layout.frame) if column is not None]
-    matrix, lines = _matrix(rows, wanted, layout.names, source, decimal, keep)
+    matrix, lines = read_columns(rows, wanted, layout.names, source, decimal, keep)
     count = 3 * len(layout.labels)
     times = matrix[:, count].copy() if layout.time is not None else None
     frames = None
@@ -90,14 +90,18 @@ def read_samples(
     return Samples(matrix[:, :count].reshape(len(matrix), -1, 3).copy(), lines, times, frames)
 
 
-def _matrix(
+def read_columns(
     rows: Iterable[Row],
     wanted: list[int],
     names: Sequence[str],
     source: Source,
     decimal: Decimal,
-    keep: Callable[[list[str]], bool] | None,
+    keep: Callable[[list[str]], bool] | None = None,
 ) -> tuple[Array, Index]:
+    """Return the numbers [T, K] in the K ``wanted`` columns (indices) of ``rows``, and the line [T] of each.
+
+    ``names`` are those of all columns; the other arguments and DatasetError are as in read_samples.
+    """
     numbers, lines, faults, blank, width = array("d"), array("q"), Faults(), 0, len(names)
     for line, cells in rows:
         if not any(cells):

@@ -32,6 +32,7 @@ class Raw:
             bit set where the file writes the word NaN (:mod:`wingfit.importers.numbers`).
         lines: [T], the line of each frame for messages, or its number from 1 in a binary file.
         line_word: what ``lines`` counts: "line" or "frame".
+        row_word: what a rate counts: "frames" of cameras, or "samples".
         frames: numbers [T] of the frames in the capture, or None if the file has none: consecutive frames.
         first: the number that the first frame of a capture has; it is at time 0.
         times: [T] as the file gives them, in ``time_unit``; None if it has none.
@@ -52,6 +53,7 @@ class Raw:
     positions: Float[Array, "T M 3"]
     lines: Int[Index, " T"]
     line_word: str = "line"
+    row_word: str = "frames"
     frames: Int[Index, " T"] | None = None
     first: int = 0
     times: Float[Array, " T"] | None = None

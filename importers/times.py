@@ -115,7 +115,7 @@ def _from_rate(raw: Raw, rate: Statement | None, given: Given, file: str, faults
     if rate is None:
         if not raw.rates:
             hint = f" ({raw.rate_hint})" if raw.rate_hint else ""
-            message = f"states neither a rate nor times{hint}; add the frames per second: --rate-hz 500"
+            message = f"states neither a rate nor times{hint}; add the {raw.row_word} per second: --rate-hz 500"
             faults.put(question("rate_hz", file, None, message, hint=raw.rate_hint))
         return None
     hertz = _value(rate, raw, given)
@@ -221,7 +221,13 @@ def _check_times(times: Array, raw: Raw, file: str) -> None:
     """Raise DatasetError unless ``times`` (s) are complete and increase."""
     if not np.isfinite(times).all():
         at = int(np.flatnonzero(~np.isfinite(times))[0])
-        raise _time_fault(raw, at, file, None, "is empty; every frame needs a time: fill it in, or remove the row")
+        raise _time_fault(
+            raw,
+            at,
+            file,
+            None,
+            f"is empty; every {raw.row_word.removesuffix('s')} needs a time: fill it in, or remove the row",
+        )
     wrong = np.flatnonzero(~(np.diff(times) > 0))
     if len(wrong):
         at = int(wrong[0]) + 1

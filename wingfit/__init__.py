@@ -7,6 +7,7 @@ The names below are public and documented; everything else in the package may ch
 raises :class:`DatasetError`, which lists what is wrong.
 - :func:`import_tracks` reads marker tracks from the files of motion-capture systems and digitisers, and returns
 :class:`ImportedTracks`; :func:`align_tracks` brings them to the frame of a described wing, :class:`AlignedTracks`.
+- :func:`import_forces` reads forces from the files of balances, and returns :class:`ImportedForces`.
 - :func:`wing_template` describes a wing by an outline of its planform, and returns :class:`WingTemplate`;
 :func:`wing_drawing` draws a described wing as SVG.
 - :func:`calibrate` estimates the genes of a model in this process, without a server; :func:`diagnose` reports which
@@ -37,6 +38,7 @@ if TYPE_CHECKING:
     from wingfit.diagnosis.finding import Finding
     from wingfit.diagnosis.spec import DiagnosisSpec
     from wingfit.importers import ImportedTracks, import_tracks
+    from wingfit.importers.forces import ImportedForces, import_forces
     from wingfit.importers.planform import WingTemplate, wing_template
     from wingfit.records import (
         Channel,
@@ -75,6 +77,7 @@ __all__ = [
     "Gene",
     "GeneResult",
     "Genome",
+    "ImportedForces",
     "ImportedTracks",
     "Mistake",
     "Port",
@@ -101,6 +104,7 @@ __all__ = [
     "examine",
     "finding_json",
     "html",
+    "import_forces",
     "import_tracks",
     "load_dataset",
     "save_dataset",
@@ -122,6 +126,7 @@ _MODULES = {
     "wingfit.diagnosis.finding": ("Finding",),
     "wingfit.diagnosis.spec": ("DiagnosisSpec",),
     "wingfit.importers": ("ImportedTracks", "import_tracks"),
+    "wingfit.importers.forces": ("ImportedForces", "import_forces"),
     "wingfit.importers.planform": ("WingTemplate", "wing_template"),
     "wingfit.records": (
         "Channel",

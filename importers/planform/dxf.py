@@ -43,6 +43,9 @@ def read_dxf(raw: bytes, file: str) -> Drawn:
         if audit.has_errors:
             raise fail(file, None, f"is damaged: {audit.errors[0].message}; save the drawing again, or export SVG")
         found = Drawn("dxf", [], y_up=True, unit=_unit(document))
+        if audit.has_fixes:
+            what = f"{len(audit.fixes)} faults of the file were repaired while reading: {audit.fixes[0].message}"
+            found.remarks.append(f"{what}; check the drawing")
         lines, ignored = [], dict[str, int]()
         for entity in document.modelspace():
             if entity.dxftype() in _READ:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from wingfit.importers.planform.options import OutlineOptions
-from wingfit.importers.planform.shapes import Drawn, Shape, extent
+from wingfit.importers.planform.shapes import LARGEST, Drawn, Shape, extent
 from wingfit.importers.planform.slabs import crossing
 from wingfit.importers.planform.table import MAX_POINTS
 from wingfit.records.array_types import Array, Float
@@ -21,6 +21,9 @@ def outline_of(drawn: Drawn, options: OutlineOptions, file: str) -> tuple[Float[
     """Return the corners of the outline, its name and remarks; DatasetError says what is wrong and the remedy."""
     shape, remarks = _chosen(drawn, options, file)
     where = file if len(drawn.shapes) == 1 else f"{file}, {shape.name!r}"
+    if not np.abs(shape.points).max() <= LARGEST:
+        message = f"has a coordinate that is no finite number up to {LARGEST:g}; check the drawing and its transforms"
+        raise fail(where, None, message)
     check_most(where, "has", len(shape.points), MAX_POINTS, "points", "draw it with fewer, or with curves")
     size = extent(shape.points)
     points = _without_repeats(shape.points, size)

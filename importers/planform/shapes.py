@@ -10,6 +10,7 @@ import numpy as np
 from wingfit.records.array_types import Array, Float
 
 FLATTENING = 1e-5  # largest distance of a flattened curve from the curve, in extents of that curve
+LARGEST = 1e9  # magnitude of a coordinate, in any unit
 Format = Literal["svg", "dxf", "points", "stations"]
 
 

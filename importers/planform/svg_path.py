@@ -13,8 +13,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from wingfit.importers.planform.shapes import FLATTENING
+from wingfit.importers.planform.shapes import FLATTENING, LARGEST
 from wingfit.records.array_types import Array
+from wingfit.records.errors import shown
 
 _NUMBER = re.compile(r"[\s,]*([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]{1,3})?)")
 _FLAG = re.compile(r"[\s,]*([01])")
@@ -91,6 +92,10 @@ def _commands(data: str) -> Iterator[tuple[str, list[float]]]:
             if match is None:
                 raise ValueError(f"has {data[at : at + 10]!r} where a number of the command {command} is expected")
             numbers.append(float(match[1]))
+            if abs(numbers[-1]) > LARGEST:
+                raise ValueError(
+                    f"has the number {shown(match[1])}; numbers up to {LARGEST:g} are read: scale the drawing"
+                )
             at = match.end()
         yield command, numbers
         command = {"M": "L", "m": "l"}.get(command, command)

@@ -21,7 +21,9 @@ from wingfit.records.array_types import Array, Float
 from wingfit.records.errors import Faults, check_most, fail
 
 MAX_POINTS = 20_000
-_HEADER = re.compile(r"(?P<name>.+?)(?:[\s_.]*[\[(]?(?P<unit>mm|cm|um|µm|m|in|ft|px)[\])]?)?", re.IGNORECASE)
+_HEADER = re.compile(
+    r"(?P<name>.+?)(?:(?:[\s_./]+|(?=[\[(]))[\[(]?(?P<unit>mm|cm|um|µm|m|in|ft|px)[\])]?)?", re.IGNORECASE
+)
 _NAMES = {
     "x": ("x",),
     "y": ("y",),

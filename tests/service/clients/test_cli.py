@@ -94,7 +94,7 @@ def test_the_commands_are_those_promised() -> None:
     data = ["list", "upload", "show", "download", "delete", "check"]
     expected = (
         {"serve", "campaign", "balance", "kinematics", "forces", "simulate", "models", "effects", "diagnose", "drive"}
-        | {"import", "align", "wing-template", "wing-drawing"}
+        | {"import", "import-forces", "align", "wing-template", "wing-drawing"}
         | {f"diagnoses {c}" for c in ("list", "watch", "cancel", "delete", "export")}
         | {f"runs {c}" for c in steer}
         | {f"datasets {c}" for c in data}

@@ -1,0 +1,1 @@
+"""Calibrations of wings that are described in other ways than by foam and rods."""

@@ -1,0 +1,1 @@
+"""Forces from the files of balances."""
