@@ -118,5 +118,5 @@ function options(select, words, empty) {
 }
 
 // A message of the server, with the labels of this form instead of the options of the command line.
-export const inWords = (text) => text.replace(/--([a-z]+(?:-[a-z]+)*)/g, (option, name) =>
+export const inWords = (text) => text.replace(/^body\.(\w+)/, (place, name) => FIELDS[name]?.label ?? (name === "axes" ? "Axes" : place)).replace(/--([a-z]+(?:-[a-z]+)*)/g, (option, name) =>
   (name === "axes" ? "“Where each axis points”" : FIELDS[name.replaceAll("-", "_")] ? `“${FIELDS[name.replaceAll("-", "_")].label}”` : option));

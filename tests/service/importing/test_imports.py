@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import io
 import json
+import socket
 from collections.abc import Iterator
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
+import httpx
 import numpy as np
 import pytest
 
-from tests.oracles.track_files import Case, cases, flapping, refusals, text_writers
+from tests.oracles.track_files import Case, Truth, binary_writers, cases, flapping, refusals, text_writers
 from tests.service.conftest import Api, As, toy_service
 from tests.service.shapes import valid
 from wingfit.client.answers import Problem
@@ -22,7 +25,7 @@ from wingfit.importers.inspection import PREVIEW_FRAMES, PREVIEW_POSITIONS
 from wingfit.importers.readers import READERS
 from wingfit.importers.summary import as_json
 from wingfit.records import DatasetError
-from wingfit.service.http import request_limits
+from wingfit.service.http import concurrency_limit, request_limits
 from wingfit.service.settings import Settings
 
 CASES = {case.format: case for case in cases(0)}
@@ -183,7 +186,7 @@ def test_the_preview_is_bounded(api: Api) -> None:
     assert (preview.stride, len(preview.time_s), preview.time_s[1]) == (7, 286, pytest.approx(7 / 240))
     assert len(preview.positions_mm) == len(preview.time_s) <= PREVIEW_FRAMES
     header = "time_s," + ",".join(f"m{m}_{axis}_m" for m in range(1000) for axis in "xyz")
-    wide = "\n".join([header, *(f"{t}" + ",1" * 3000 for t in range(100))])
+    wide = "\n".join([header, *(f"{t}" + ",1" * 3000 for t in range(50))])
     preview = understood(api, wide).tracks.preview
     assert len(preview.positions_mm) * 1000 <= PREVIEW_POSITIONS
     assert len(preview.positions_mm[0]) == 1000
@@ -223,6 +226,20 @@ def test_a_file_with_many_frames_is_sent_in_parts(api: Api) -> None:
     assert table == import_bytes(text.encode(), "trial.dat", Given()).csv()
     assert table.count("time_s") == 1
     assert np.loadtxt(io.StringIO(table), delimiter=",", skiprows=1, usecols=0).shape == (2500,)
+
+
+def test_clients_that_do_not_read_keep_nobody_from_importing(api: Api) -> None:
+    one = flapping(frames=3000, gaps=False)
+    wide = Truth(tuple(f"m{k}" for k in range(120)), one.rate, np.tile(one.mm, (1, 30, 1)))
+    large = {"file": ("large.c3d", binary_writers.by_hand(wide))}
+    small = httpx.HTTPTransport(socket_options=[(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)])
+    with ExitStack() as waiting, httpx.Client(base_url=api.client.base_url, transport=small, timeout=20.0) as slow:
+        for _ in range(concurrency_limit.UPLOADS):
+            answer = waiting.enter_context(slow.stream("POST", "/v1/imports/table", files=large))
+            assert answer.status_code == 200
+        file = {"file": ("trial.trc", text_writers.trc(flapping()))}
+        # Within less time than that after which a client that does not read is disconnected.
+        assert api.client.post("/v1/imports", files=file, timeout=10.0).status_code == 200
 
 
 class TestKeys:
