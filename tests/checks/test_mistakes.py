@@ -47,8 +47,9 @@ CAUGHT = [
     "wing: temperature in Fahrenheit", "wing: rods in g/cm^3", "wing: foam in g/cm^3",
     "wing: masses of markers in grams", "wing: thickness ten times", "wing: millimetres", "vehicle: sign of x",
     "vehicle: sign of z", "vehicle: both signs: forces on the balance", "vehicle: x and z exchanged",
-    "vehicle: gram-force", "vehicle: time zero a quarter beat late", "vehicle: lost samples are zeros", "vehicle: pressure in kPa",
-    "vehicle: mass in grams", "vehicle: times in milliseconds", "vehicle: body pitch in radians",
+    "vehicle: gram-force", "vehicle: time zero a quarter beat late", "vehicle: lost samples are zeros",
+    "vehicle: pressure in kPa", "vehicle: mass in grams", "vehicle: times in milliseconds",
+    "vehicle: body pitch in radians",
 ]  # fmt: skip
 
 
