@@ -28,6 +28,7 @@ RECORDINGS = 3  # that are compared
 COEFFICIENTS = {"C_l": (0.15, 6.0), "C_r": (0.0, 10.0), "C_F": (0.0, 8.0), "C_D0": (0.0, 1.5), "C_Dpi2": (0.0, 8.0)}
 LEFT = 0.75  # of the forces, residual of the model at least where a mistake is looked for
 SUSPECT = 0.35  # from here on, if it then leaves next to nothing
+EXPLAINED = 0.1  # residual with which no other mistake is looked for
 BETTER, FAR_BETTER = 0.5, 0.2  # of that, the residual at most with the mistake undone
 SHIFTS = 24  # parts of a beat that are tried
 LATE = 2 / 24  # beats: smaller shifts are not remarked on
@@ -62,9 +63,13 @@ def check_forces(dataset: Dataset) -> Iterator[Mistake]:
         return
     given = _left(beats)
     if given > SUSPECT:
-        found = _rearranged(dataset, beats, given) or _described(dataset, beats, given)
+        found = _rearranged(dataset, beats, given)
+        if found is None or found[0] > EXPLAINED:
+            # Exchanged columns may imitate a wrong motion; the motion itself then explains far more.
+            other = _described(dataset, beats, given)
+            found = other if other and (found is None or other[0] < 0.6 * found[0]) else found
         if found is not None:
-            yield found
+            yield found[1]
             return
     yield from _trim(dataset)
 
@@ -125,7 +130,7 @@ def _left_of(beat: _Beat, forces: Array) -> float:
     return float(np.sqrt(2.0 * found.cost / total)) if total > 0 else 0.0
 
 
-def _rearranged(dataset: Dataset, beats: Sequence[_Beat], given: float) -> Mistake | None:
+def _rearranged(dataset: Dataset, beats: Sequence[_Beat], given: float) -> tuple[float, Mistake] | None:
     """Mistakes in the columns: axes, signs, unit, start of the beat. The simplest one that explains most."""
     tried: list[tuple[float, int, Mistake]] = []
 
@@ -171,7 +176,9 @@ def _rearranged(dataset: Dataset, beats: Sequence[_Beat], given: float) -> Mista
     if not tried:
         return None
     least = min(left for left, _, _ in tried)
-    return min((one for one in tried if one[0] < 1.6 * least + 0.02), key=lambda one: (one[1], one[0]))[2]
+    near = (one for one in tried if one[0] < 1.6 * least + 0.02)
+    left, _, found = min(near, key=lambda one: (one[1], one[0]))
+    return left, found
 
 
 def _times(factor: Array | float, *, turned: bool = False) -> Callable[[Array], Array]:
@@ -234,7 +241,7 @@ def _mistake(kind: Kind, given: float, left: float, cause: str, edits: tuple[Edi
     )
 
 
-def _described(dataset: Dataset, beats: Sequence[_Beat], given: float) -> Mistake | None:
+def _described(dataset: Dataset, beats: Sequence[_Beat], given: float) -> tuple[float, Mistake] | None:
     """Mistakes in the description of motion and conditions, each undone in turn."""
     best: tuple[float, Mistake] | None = None
     for hypothesis in MOTIONS:
@@ -249,7 +256,7 @@ def _described(dataset: Dataset, beats: Sequence[_Beat], given: float) -> Mistak
         if left < _enough_better(given) and (best is None or left < best[0]):
             edits = hypothesis.edits(dataset)
             best = left, _mistake(hypothesis.kind, given, left, hypothesis.cause, edits)
-    return best[1] if best else None
+    return best
 
 
 def _trim(dataset: Dataset) -> Iterator[Mistake]:

@@ -1,4 +1,4 @@
-"""Checks of an upload: a certain mistake is refused, a doubtful one is a warning of the dataset; reloading checks nothing."""
+"""Checks of an upload: a certain mistake is refused, a doubtful one is a warning; reloading checks nothing."""
 
 from __future__ import annotations
 
