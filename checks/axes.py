@@ -21,12 +21,12 @@ FEW = 4  # with fewer markers other axes can fit by chance: they are warned abou
 # In spans, of the misfit of the axes as given: warned about, refused. No elastic wing that flaps is so far from its
 # shape at rest, root mean square over all markers and a whole beat.
 DOUBTFUL, REFUSED = 0.08, 0.15
-BETTER = 0.35  # of that misfit, what other axes leave at most
+BETTER = 0.35  # of that misfit, residual with other axes at most
 UNITS = ((1000.0, "millimetres"), (100.0, "centimetres"), (39.3701, "inches"), (3.28084, "feet"), (0.001, "kilometres"))
 NEAR_UNIT = 1.12  # factor between a measured scale and that of a unit
 SCALE = 1.15  # largest factor between tracks and rest positions that is not remarked on
 TILTED_DEG = 17.0  # a hinge that is hidden to be tilted has 11
-SHIFT, SHIFTED = 0.08, 0.3  # spans: displacement that is remarked on, and of the misfit what it leaves at most
+SHIFT, SHIFTED = 0.08, 0.3  # spans: displacement that is remarked on, and of the misfit the residual at most
 
 Axes = tuple[tuple[int, int, int], tuple[int, int, int]]
 """For x, y, z of the wing: the number of the recorded axis, and its sign."""

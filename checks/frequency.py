@@ -62,10 +62,14 @@ def check_frequency(recording: Recording, index: int) -> Mistake | None:
     if (found := _counted_frames(recording, times, values, given)) is not None:
         return found
     ratios = _by_ratio(recording, index, times, values, given)
-    near = _by_scan(recording, index, times, values, given)
-    if near and ONE_A_BEAT <= samples < STROBE:
+    strobe = recording.kind == "tracks" and ONE_A_BEAT <= samples < STROBE
+    # Where frames are many beats apart, any frequency has an alias nearby.
+    near = [] if ratios and samples < STROBE and not strobe else _by_scan(recording, index, times, values, given)
+    if near and strobe:
         return near[0].mistake
     tried = [*near, *ratios]
+    step = float(np.median(np.diff(recording.times)))
+    tried = [one for one in tried if one.repeat.frequency * step < 0.5] or tried
     if not tried:
         return None
     least = min(one.repeat.left for one in tried)
@@ -92,7 +96,8 @@ def _by_scan(recording: Recording, index: int, times: Array, values: Array, give
     if not apart or best.left > DOUBTFULLY * given.left:
         return []
     certain = given.left > REFUSED and best.left < REFUSABLY * given.left
-    strobe = 1.0 / (stated * float(np.median(np.diff(recording.times)))) < STROBE
+    samples = 1.0 / (stated * float(np.median(np.diff(recording.times))))
+    strobe = recording.kind == "tracks" and samples < STROBE
     return [Candidate(best, _other(recording, index, given, best, strobe=strobe, certain=certain))]
 
 

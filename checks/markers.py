@@ -61,7 +61,7 @@ def _placeholders(tracked: Tracked) -> Mistake | None:
     if not found:
         return None
     value, filled = max(found.items(), key=lambda item: int(item[1].sum()))
-    names = [name for name, some in zip(tracked.recording.markers, filled.any(axis=0).tolist(), strict=True) if some]
+    names = [name for name, some in zip(tracked.recording.markers, _any(filled), strict=True) if some]
     values = tuple(found)
 
     def emptied(times: Array, table: Array, _: tuple[str, ...]) -> tuple[Array, Array]:
@@ -90,19 +90,17 @@ def _frozen(tracked: Tracked) -> Mistake | None:
         return None
     steps = np.diff(places, axis=0)
     still, moved = (steps == 0).all(axis=-1), np.linalg.norm(steps, axis=-1)
-    with np.errstate(all="ignore"):
-        usual = np.nanmedian(np.where(still | ~np.isfinite(moved), np.nan, moved), axis=1)
-    usual = np.where(np.isfinite(usual), usual, 0.0)
+    usual = _usual(np.where(still, np.nan, moved))
     held = _runs(still, usual, MOVED * tracked.wing.span)
     if not held.any() or still.mean() > 0.5:
         return None
-    names = [name for name, some in zip(tracked.recording.markers, held.any(axis=0).tolist(), strict=True) if some]
+    names = [name for name, some in zip(tracked.recording.markers, _any(held), strict=True) if some]
     limit, span = HELD, tracked.wing.span
 
     def emptied(times: Array, table: Array, _: tuple[str, ...]) -> tuple[Array, Array]:
         positions = table.reshape(len(table), -1, 3)
         one = np.diff(positions, axis=0)
-        sizes = np.nan_to_num(np.nanmedian(np.linalg.norm(one, axis=-1), axis=1))
+        sizes = _usual(np.linalg.norm(one, axis=-1))
         repeated = _runs((one == 0).all(axis=-1), sizes, MOVED * span)
         first = repeated.all(axis=0)  # held throughout: no frame shows the marker
         gone = np.vstack([first, repeated])
@@ -124,6 +122,14 @@ def _frozen(tracked: Tracked) -> Mistake | None:
     )
 
 
+def _usual(steps: Array) -> Array:
+    """Median [T] over the markers of the lengths ``steps`` [T, M] (m) of their moves; 0 where none was seen."""
+    seen = np.isfinite(steps).any(axis=1)
+    out = np.zeros(len(steps))
+    out[seen] = np.nanmedian(steps[seen], axis=1)
+    return out
+
+
 def _runs(still: Mask, usual: Array, least: float) -> Mask:
     """Mask [T - 1, M] of steps in runs of at least HELD that are ``still`` while the others move ``least`` (m)."""
     held = np.zeros_like(still)
@@ -139,9 +145,10 @@ def _runs(still: Mask, usual: Array, least: float) -> Mask:
 def _exchanged(tracked: Tracked) -> Mistake | None:
     """Markers whose places along chord and span, which flapping hardly changes, are those of others at rest."""
     own = _outline(tracked.rest - tracked.hinge)
-    with np.errstate(all="ignore"):
-        now = np.nanmedian(_outline(tracked.positions - tracked.hinge), axis=0)
-    seen = np.flatnonzero(np.isfinite(now).all(axis=1))
+    places = _outline(tracked.positions - tracked.hinge)
+    seen = np.flatnonzero(np.isfinite(places).all(axis=2).any(axis=0))
+    now = np.full(own.shape, np.nan)
+    now[seen] = np.nanmedian(places[:, seen], axis=0)
     if len(seen) < 3:
         return None
     distances = np.linalg.norm(now[seen][:, None] - own[seen][None], axis=2)
@@ -194,7 +201,7 @@ def _jumps(tracked: Tracked) -> Mistake | None:
     jumped = far > max(JUMP * tracked.wing.span, 12 * usual)
     if jumped.sum() < 1 or jumped.mean() > 0.1 or usual > 0.03 * tracked.wing.span:
         return None
-    names = [name for name, some in zip(tracked.recording.markers, jumped.any(axis=0).tolist(), strict=True) if some]
+    names = [name for name, some in zip(tracked.recording.markers, _any(jumped), strict=True) if some]
     frame = int(np.flatnonzero(jumped.any(axis=1))[0])
     return Mistake(
         "jumps",
@@ -205,6 +212,11 @@ def _jumps(tracked: Tracked) -> Mistake | None:
         "the tracker followed something else, or exchanged markers for some frames",
         f"recordings/{tracked.recording.name}.csv: empty these cells, or track the frames again",
     )
+
+
+def _any(mask: Mask) -> list[bool]:
+    """Whether each column of ``mask`` [T, M] has an entry."""
+    return [bool(column.any()) for column in mask.T]
 
 
 def _names(names: list[str]) -> str:

@@ -12,6 +12,7 @@ from wingfit.checks.mistake import Mistake
 from wingfit.records import AnyDataset, AnyRecording, Dataset, Recording
 from wingfit.records.array_types import Array
 
+WHOLE = 0.85  # beats: of less, a recording is remarked on
 UNSTEADY = 0.45  # amplitude in one part of a recording over that in another
 PARTS, HARMONICS = 8, 4
 
@@ -73,8 +74,9 @@ def _constant(recording: AnyRecording) -> Iterator[Mistake]:
 
 
 def _single_beat(recording: Recording) -> Mistake | None:
-    beats = recording.condition.flap_frequency * float(np.ptp(recording.times))
-    if beats >= 0.85:
+    step = float(np.median(np.diff(recording.times)))
+    beats = recording.condition.flap_frequency * (float(np.ptp(recording.times)) + step)
+    if beats >= WHOLE:
         return None
     return Mistake(
         "cut",

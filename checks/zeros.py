@@ -10,7 +10,7 @@ from wingfit.records import Recording
 from wingfit.records.array_types import Array
 
 REPEATED = 4  # samples with exactly the same value on all axes
-OFF = 5.0  # median distance of the harmonics from it, in standard deviations of the noise
+OFF = 2.0  # distance of the harmonics from it (root mean square), in standard deviations of the noise
 
 
 def check_zero_forces(recording: Recording) -> Mistake | None:
@@ -24,7 +24,7 @@ def check_zero_forces(recording: Recording) -> Mistake | None:
     waves = fit(recording.times, rest, recording.condition.flap_frequency, 4)
     expected = waves.at(recording.times[filled], recording.condition.flap_frequency)
     off = np.linalg.norm(expected - value, axis=1)
-    if np.median(off) < OFF * float(np.linalg.norm(waves.sigma)):
+    if float(np.sqrt(np.mean(off**2))) < OFF * float(np.linalg.norm(waves.sigma)):
         return None
 
     def emptied(times: Array, table: Array, _: tuple[str, ...]) -> tuple[Array, Array]:

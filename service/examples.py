@@ -43,6 +43,7 @@ _DATASET: Dataset = {
     "markers": 49,
     "rig": None,
     "recordings": [_RECORDING],
+    "warnings": [],
 }
 _JOB: Job = {
     "id": "run_5c1e07a94bd83f26",

@@ -28,7 +28,7 @@ from wingfit.records.files.folder import contents
 
 KINDS = (*of_wings.KINDS, *of_vehicles.KINDS)
 WINGS, VEHICLES = 34, 26  # good datasets
-TRIED = 3  # datasets on which each kind is tried
+TRIED = 2  # datasets on which each kind is tried
 
 
 def main() -> None:
