@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wingfit.records.array_types import Array
+from wingfit.records.array_types import Array, Index, Mask
 from wingfit.tracking.alignment.candidates import assigned
 
 _SURE = 0.7  # of the gate: farther tracks are no marker's
@@ -33,7 +33,7 @@ class Exchange:
     frames: int
 
 
-def whole_tracks(points: Array, model: Array, gate: float) -> tuple[Array, Array, Array]:
+def whole_tracks(points: Array, model: Array, gate: float) -> tuple[Index, Array, Mask]:
     """Assign whole tracks to markers by their distance over the recording.
 
     Args:

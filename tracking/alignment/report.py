@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wingfit.records.array_types import Array
+from wingfit.records.array_types import Array, Index
 from wingfit.records.wing import Wing
 from wingfit.tracking.alignment.fit import Fit
 from wingfit.tracking.alignment.flapping import Flapping, half_range
@@ -37,8 +37,8 @@ def aligned(
     wing: Wing,
     final: Fit,
     frame: Frame,
-    used: Array,
-    shown: Array,
+    used: Index,
+    shown: Index,
     mine: Array,
     changed: Sequence[Exchange],
     dropped: Sequence[DroppedTrack],
