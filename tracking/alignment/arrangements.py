@@ -87,12 +87,23 @@ class Search:
                 kept.append(one)
         return kept[:_MOST]
 
+    def _exchangeable(self, marker: Index, here: Fit, named: Index) -> Mask:
+        """Return the tracks [K] whose labels could be exchanged at little cost, but for those named so."""
+        which = marker[marker >= 0]
+        squares = ((here.rest[:, None] - self.described[which][None]) ** 2).sum(axis=-1) / here.scatter**2
+        own = np.diag(squares)
+        cost = squares + squares.T - own[:, None] - own[None]
+        np.fill_diagonal(cost, np.inf)
+        found = np.zeros(len(marker), dtype=bool)
+        found[marker >= 0] = (cost < DISTINCT).any(axis=1)
+        return np.asarray(found & (named != marker))
+
     def _fitted(self, here: Fit, marker: Index, rest: Array, steps: int) -> Fit:
         which = marker[marker >= 0]
         begun, tracks = with_all(here, rest[which]), self.tracks[:, marker >= 0]
         return fit(self.strip, self.described[which], tracks, self.mean, self.shaking, begun, steps=steps)
 
-    def arranged(self, candidate: Candidate, right: bool, given: Index) -> Arrangement | None:
+    def arranged(self, candidate: Candidate, right: bool, given: Index, named: Index) -> Arrangement | None:
         """Return the fit that starts from ``candidate``, relabelled until labels and fit agree; None without fit."""
         here = start_of(candidate, self.layout, self.motion, right, self.described, self.strip)
         marker, rest, gate = candidate.marker, self.described.copy(), gate_of(self.described[:, :2])
@@ -102,7 +113,8 @@ class Search:
             here = self._fitted(here, marker, rest, _FIRST_STEPS if round_ == 0 else _STEPS)
             rest = self.described.copy()
             rest[marker[marker >= 0]] = here.rest
-            model = positions(self.strip, rest, here.states, here.line)[0]
+            # Described rest positions: estimated ones would confirm wrong labels.
+            model = positions(self.strip, self.described, here.states, here.line)[0]
             model += shaken(model, here.jitter)
             found, away, doubtful = whole_tracks(here.coordinates(self.tracks), model, gate)
             found = _with_given(found, given)
@@ -113,6 +125,7 @@ class Search:
             if (marker >= 0).sum() < _LEAST_MARKERS:
                 return None
             here = self._fitted(here, marker, rest, _STEPS)
+        doubtful = doubtful | self._exchangeable(marker, here, named)
         return Arrangement(marker, doubtful, away, here, np.isfinite(self.tracks[..., 0]).sum(axis=0))
 
 

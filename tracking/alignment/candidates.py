@@ -165,7 +165,7 @@ def assigned(away: Array, gate: float, given: Index | None = None) -> Index:
     return np.where(columns < M, columns, -1)
 
 
-def _registered(points: Array, rest: Array, marker: Array, weight: Array) -> tuple[float, Array]:
+def _registered(points: Array, rest: Array, marker: Index, weight: Array) -> tuple[float, Array]:
     hit = (marker >= 0) & np.isfinite(points[:, 0])
     w = np.maximum(weight[hit], 1e-3)
     a, b = points[hit], rest[marker[hit]]

@@ -63,7 +63,7 @@ def align(tracks: Tracks, wing: Wing, known: Known) -> AlignedTracks:
 def described_of(wing: Wing) -> Array:
     """Return the described rest positions [M, 3] of the markers in hinge coordinates, m."""
     rest: Array = np.array([marker.position for marker in wing.markers])
-    return rest - np.array([0.0, wing.hinge.y, wing.hinge.z])
+    return np.asarray(rest - np.array([0.0, wing.hinge.y, wing.hinge.z]))
 
 
 def _prepared(tracks: Tracks, wing: Wing, known: Known) -> _Prepared:
@@ -131,7 +131,7 @@ def _arranged(
     up, every = known.up_vector(), list[Arrangement]()
     for candidate in search.candidates(named):
         for right in sides:
-            one = search.arranged(candidate, right, stated)
+            one = search.arranged(candidate, right, stated, named)
             if one is None or (up is not None and _up(one.fit, up) < 0):
                 continue
             if not any(other.fit.right == right and np.array_equal(other.marker, one.marker) for other in every):
