@@ -13,7 +13,7 @@ from wingfit.tracking.alignment.request import Tracks
 from wingfit.tracking.alignment.rigid_motion import RigidMotion, rigid_motion
 from wingfit.tracking.rigid_body import poses
 
-_BODY_MISFIT = 0.05  # RMS over the extent of the body markers above which they are not rigid
+_BODY_MISFIT = 0.02  # RMS over the extent of the body markers above which they are not rigid
 _MOST_ORDER = 3
 _SETTLED = 1e-4
 _ROUNDS = 10  # as the body's motion and the wing's do not add up, but multiply
