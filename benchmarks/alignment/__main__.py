@@ -1,7 +1,7 @@
 """Proves the alignment of tracks: ``python -m benchmarks.alignment [--json] [--trials N] [--seed N]``.
 
-Wings of two independent plants (bodies and springs, a continuous rod), in three sizes and proportions, are filmed with
-noise and gaps from random camera poses, left and right, on bodies that rest, drift and fly; labels are missing, mixed up
+Wings of two independent plants (bodies and springs, a continuous rod), of three sizes and proportions, are filmed with
+noise and gaps in random camera axes, left and right, on bodies that rest, drift and fly; labels are missing, mixed up
 or swapped for a while, and spurious tracks are added. The alignment gets tracks and an inexact description. Cases that
 nobody can settle must be refused. The last line is one JSON object.
 """
@@ -95,7 +95,8 @@ def main() -> None:
         try:
             scores.append(score(trial, aligned(trial)))
             one = scores[-1]
-            text = f"{one.rotation:.2f} deg {one.offset:.2f} mm, labels {100 * one.right:.1f} %, kept {100 * one.kept:.1f} %"
+            parts = f"labels {100 * one.right:.1f} %, kept {100 * one.kept:.1f} %"
+            text = f"{one.rotation:.2f} deg {one.offset:.2f} mm, {parts}"
             text += "" if one.side else " WRONG SIDE"
         except DatasetError as error:
             refused.append(f"{given.seed + number} {trial.label}: {error}")

@@ -99,11 +99,12 @@ def make(seed: int) -> Trial:
     seen = recording.values.reshape(len(recording.times), -1, 3)
     left = bool(rng.integers(2))
     body: Body = ("rests", "rests", "drifts", "flies")[int(rng.integers(4))]
-    return _mixed(seed, f"{rig} {plant}", wing, recording.times, recording.markers, seen, left, body, filming.noise.level, rng)
+    return _mixed(
+        f"{rig} {plant}", wing, recording.times, recording.markers, seen, left, body, filming.noise.level, rng
+    )
 
 
 def _mixed(
-    seed: int,
     label: str,
     wing: Wing,
     times: Array,
@@ -145,7 +146,9 @@ def _mixed(
     shown = [tracks, extra] + ([filmed(points)] if body == "flies" else [])
     every = np.concatenate(shown, axis=1)
     named = bool(rng.integers(2))
-    names = [*markers, *(f"extra{k}" for k in range(spurious))] if named else [f"t{k:02d}" for k in range(every.shape[1])]
+    names = (
+        [*markers, *(f"extra{k}" for k in range(spurious))] if named else [f"t{k:02d}" for k in range(every.shape[1])]
+    )
     names = names[: len(markers) + spurious]
     held = [f"body{k}" for k in range(len(_BODY_POINTS))] if body == "flies" else []
     if not named:

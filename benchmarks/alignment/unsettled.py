@@ -28,7 +28,7 @@ class Unsettled:
 
 
 def grid_wing(across: int, *, flat: bool, symmetric: bool) -> Wing:
-    """Return a wing of 0.3 m with a grid of markers; ``flat``: in the plane of the hinge; ``symmetric``: fore and aft."""
+    """Return a wing with a grid of markers; ``flat``: in the plane of the hinge; ``symmetric``: fore and aft."""
     x = np.linspace(-0.05, 0.05, across) if symmetric else np.array([-0.05, -0.028, 0.004, 0.05, 0.061])[:across]
     y = (0.05, 0.11, 0.16, 0.22, 0.29)
     markers = tuple(

@@ -15,15 +15,15 @@ from wingfit.client.transport import WingfitError
 def align(
     tracks: Annotated[Path, typer.Argument(metavar="TRACKS", help="Tracks: what wingfit import writes, or reads.")],
     wing: Annotated[Path, typer.Option(help="Description of the wing: dataset.yaml, or the keys of a wing alone.")],
-    output: Annotated[Path | None, new_file("Write the tracks in the wing's frame: FILE.csv.", "--output", "-o")] = None,
+    output: Annotated[
+        Path | None, new_file("Write the tracks in the wing's frame: FILE.csv.", "--output", "-o")
+    ] = None,
     axes: Annotated[
         Literal["wing", "body"],
         typer.Option(help="Of what is written: 'wing' for a dataset; 'body' (x nose, y right, z down) for kinematics."),
     ] = "wing",
     force: Annotated[bool, typer.Option("--force", help="Overwrite tracks that were written before.")] = False,
-    side: Annotated[
-        Literal["left", "right"] | None, typer.Option(help="Side of the wing; default: estimated.")
-    ] = None,
+    side: Annotated[Literal["left", "right"] | None, typer.Option(help="Side of the wing; default: estimated.")] = None,
     up: Annotated[
         str | None, typer.Option(help="Axis of the tracks that is up: x, y, z, -x, -y or -z; default: estimated.")
     ] = None,

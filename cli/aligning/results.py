@@ -14,7 +14,9 @@ def show(found: AlignedTracks) -> None:
     frames = f"{len(found.times)} frames, {len(found.markers)} markers"
     say(f"{found.file}: {found.side} wing, {frames}, residual {mm(1e3 * found.noise)} mm")
     turned = np.degrees(found.rotation_error)
-    rows = [[f"wing {axis}", *(f"{value:.5f}" for value in row)] for axis, row in zip("xyz", found.rotation, strict=True)]
+    rows = [
+        [f"wing {axis}", *(f"{value:.5f}" for value in row)] for axis, row in zip("xyz", found.rotation, strict=True)
+    ]
     rows = [[*row, f"{error:.2f}"] for row, error in zip(rows, turned, strict=True)]
     table(["axis", ">track x", ">track y", ">track z", ">error deg"], rows)
     origin = ", ".join(f"{1e3 * value:.2f}" for value in found.origin)

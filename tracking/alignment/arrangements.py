@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wingfit.records.array_types import Array
+from wingfit.records.array_types import Array, Index, Mask
 from wingfit.tracking.alignment.candidates import Candidate, Layout, candidates, gate_of, start_of, with_all
 from wingfit.tracking.alignment.fit import Fit, fit, shaken
 from wingfit.tracking.alignment.identity import whole_tracks
@@ -37,14 +37,14 @@ class Arrangement:
         samples: [K] count of the frames that show each track.
     """
 
-    marker: Array
-    doubtful: Array
+    marker: Index
+    doubtful: Mask
     away: Array
     fit: Fit
-    samples: Array
+    samples: Index
 
-    def cost(self, described: Array, noise: float, memory: float, span: float, every: Array) -> float:
-        """Minus twice the log-likelihood of the tracks ``every`` [K] (a mask) under a common ``noise`` (m) and ``memory``.
+    def cost(self, described: Array, noise: float, memory: float, span: float, every: Mask) -> float:
+        """Minus twice the log-likelihood of the tracks in ``every`` [K] under a common ``noise`` (m) and ``memory``.
 
         A sample costs at most what one that fits no marker costs. So do all those of tracks that are no marker.
         """
@@ -69,8 +69,8 @@ class Search:
     mean: Array
     shaking: Array
 
-    def candidates(self, given: Array) -> list[Candidate]:
-        """Return the candidates that deserve a fit, best first; ``given`` [K] are markers of named tracks (-1: none)."""
+    def candidates(self, given: Index) -> list[Candidate]:
+        """Return the candidates to fit, best first; ``given`` [K] are markers of named tracks (-1: none)."""
         flat = self.described[:, :2]
         found = candidates(self.layout, flat, self.strip.span, None)
         if (given >= 0).sum() >= 3:
@@ -79,17 +79,32 @@ class Search:
         kept = list[Candidate]()
         for one in sorted(found, key=lambda one: one.misfit):
             alike = any(np.array_equal(one.marker, other.marker) and one.sense == other.sense for other in kept)
-            if one.misfit <= _NEAR * best + 1e-3 * self.strip.span and not alike and (one.marker >= 0).sum() >= _LEAST_MARKERS:
+            if (
+                one.misfit <= _NEAR * best + 1e-3 * self.strip.span
+                and not alike
+                and (one.marker >= 0).sum() >= _LEAST_MARKERS
+            ):
                 kept.append(one)
         return kept[:_MOST]
 
-    def _fitted(self, here: Fit, marker: Array, rest: Array, steps: int) -> Fit:
+    def _exchangeable(self, marker: Index, here: Fit, named: Index) -> Mask:
+        """Return the tracks [K] whose labels could be exchanged at little cost, but for those named so."""
+        which = marker[marker >= 0]
+        squares = ((here.rest[:, None] - self.described[which][None]) ** 2).sum(axis=-1) / here.scatter**2
+        own = np.diag(squares)
+        cost = squares + squares.T - own[:, None] - own[None]
+        np.fill_diagonal(cost, np.inf)
+        found = np.zeros(len(marker), dtype=bool)
+        found[marker >= 0] = (cost < DISTINCT).any(axis=1)
+        return np.asarray(found & (named != marker))
+
+    def _fitted(self, here: Fit, marker: Index, rest: Array, steps: int) -> Fit:
         which = marker[marker >= 0]
         begun, tracks = with_all(here, rest[which]), self.tracks[:, marker >= 0]
         return fit(self.strip, self.described[which], tracks, self.mean, self.shaking, begun, steps=steps)
 
-    def arranged(self, candidate: Candidate, right: bool, given: Array) -> Arrangement | None:
-        """Return the fit that starts from ``candidate``, relabelled until labels and fit agree; None if it has no fit."""
+    def arranged(self, candidate: Candidate, right: bool, given: Index, named: Index) -> Arrangement | None:
+        """Return the fit that starts from ``candidate``, relabelled until labels and fit agree; None without fit."""
         here = start_of(candidate, self.layout, self.motion, right, self.described, self.strip)
         marker, rest, gate = candidate.marker, self.described.copy(), gate_of(self.described[:, :2])
         for round_ in range(_ROUNDS):
@@ -98,7 +113,8 @@ class Search:
             here = self._fitted(here, marker, rest, _FIRST_STEPS if round_ == 0 else _STEPS)
             rest = self.described.copy()
             rest[marker[marker >= 0]] = here.rest
-            model = positions(self.strip, rest, here.states, here.line)[0]
+            # Described rest positions: estimated ones would confirm wrong labels.
+            model = positions(self.strip, self.described, here.states, here.line)[0]
             model += shaken(model, here.jitter)
             found, away, doubtful = whole_tracks(here.coordinates(self.tracks), model, gate)
             found = _with_given(found, given)
@@ -109,10 +125,11 @@ class Search:
             if (marker >= 0).sum() < _LEAST_MARKERS:
                 return None
             here = self._fitted(here, marker, rest, _STEPS)
+        doubtful = doubtful | self._exchangeable(marker, here, named)
         return Arrangement(marker, doubtful, away, here, np.isfinite(self.tracks[..., 0]).sum(axis=0))
 
 
-def _with_given(marker: Array, given: Array) -> Array:
+def _with_given(marker: Index, given: Index) -> Index:
     found = marker.copy()
     for track in np.flatnonzero(given >= 0):
         found[(found == given[track])] = -1

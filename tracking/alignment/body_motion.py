@@ -13,7 +13,7 @@ from wingfit.tracking.alignment.request import Tracks
 from wingfit.tracking.alignment.rigid_motion import RigidMotion, rigid_motion
 from wingfit.tracking.rigid_body import poses
 
-_BODY_MISFIT = 0.05  # RMS over the extent of the body markers above which they are not rigid
+_BODY_MISFIT = 0.02  # RMS over the extent of the body markers above which they are not rigid
 _MOST_ORDER = 3
 _SETTLED = 1e-4
 _ROUNDS = 10  # as the body's motion and the wing's do not add up, but multiply
@@ -44,7 +44,7 @@ class BodyMotion:
 
 
 def by_markers(tracks: Tracks, names: tuple[str, ...]) -> BodyMotion:
-    """Return the motion of the body by its tracks ``names``; frames without a pose are NaN. DatasetError if not rigid."""
+    """Return the motion of the body by its tracks ``names``; NaN without a pose. DatasetError if they are not rigid."""
     points = tracks.positions[:, [tracks.names.index(name) for name in names]]
     seen = np.isfinite(points).all(axis=(1, 2))
     if not seen.any():
@@ -63,7 +63,9 @@ def by_markers(tracks: Tracks, names: tuple[str, ...]) -> BodyMotion:
     arms = found.shape - found.shape.mean(axis=0)
     noise = misfit * np.sqrt(3 * len(names) / (3 * len(names) - 6))
     turning = noise / np.sqrt(np.linalg.eigvalsh(arms.T @ arms)[:2].sum())
-    return BodyMotion(found.rotation, found.position, words, (float(turning), noise / np.sqrt(len(names))), found.shape.mean(axis=0))
+    return BodyMotion(
+        found.rotation, found.position, words, (float(turning), noise / np.sqrt(len(names))), found.shape.mean(axis=0)
+    )
 
 
 def slow(times: Array, motion: RigidMotion, flapping: Flapping, *, surely: bool = False) -> BodyMotion | None:
@@ -100,7 +102,9 @@ def slow(times: Array, motion: RigidMotion, flapping: Flapping, *, surely: bool 
     pivot = place.mean(axis=0)
     angle = np.degrees(np.arccos(np.clip((np.trace(relative, axis1=1, axis2=2) - 1) / 2, -1, 1))).max()
     way = 1e3 * np.linalg.norm(np.ptp(place, axis=0))
-    words = f"the hinge moves slowly, by {way:.3g} mm and {angle:.2g} deg; this motion, a polynomial over time, was removed"
+    words = (
+        f"the hinge moves slowly, by {way:.3g} mm and {angle:.2g} deg; this motion, a polynomial over time, was removed"
+    )
     return BodyMotion(relative, place - relative @ pivot, words, (0.0, 0.0), pivot)
 
 

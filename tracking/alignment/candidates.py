@@ -14,7 +14,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial import KDTree
 
-from wingfit.records.array_types import Array
+from wingfit.records.array_types import Array, Index
 from wingfit.tracking.alignment.fit import Fit
 from wingfit.tracking.alignment.rigid_motion import RigidMotion
 from wingfit.tracking.alignment.wing_model import STATES, Strip
@@ -56,7 +56,7 @@ class Candidate:
     """
 
     sense: int
-    marker: Array
+    marker: Index
     turn: float
     shift: Array
     misfit: float
@@ -79,7 +79,7 @@ def layout_of(motion: RigidMotion) -> Layout:
     return Layout(np.where(known[:, None], points, np.nan), axis, outboard, motion.pivot, weight)
 
 
-def candidates(layout: Layout, rest: Array, span: float, given: Array | None) -> list[Candidate]:
+def candidates(layout: Layout, rest: Array, span: float, given: Index | None) -> list[Candidate]:
     """Return the best candidates, best first, with at least one for each sense of x.
 
     ``rest`` [M, 2]: described x and Y of the markers, m. ``given`` [K]: markers that the tracks must be (-1: not
@@ -127,7 +127,7 @@ def _grid(points: Array, rest: Array, span: float, weight: Array) -> list[tuple[
 
 
 def _refined(
-    points: Array, rest: Array, turn: float, shift: Array, weight: Array, given: Array | None, sense: int
+    points: Array, rest: Array, turn: float, shift: Array, weight: Array, given: Index | None, sense: int
 ) -> Candidate:
     known, gate = np.isfinite(points[:, 0]), gate_of(rest)
     marker, misfit = np.full(len(points), -1), np.inf
@@ -146,8 +146,10 @@ def _refined(
     return Candidate(sense, marker, turn, shift, misfit)
 
 
-def assigned(away: Array, gate: float, given: Array | None = None) -> Array:
-    """Return the marker [K] of each track (-1: none) with the least sum of squares of ``away`` [K, M], at most ``gate``.
+def assigned(away: Array, gate: float, given: Index | None = None) -> Index:
+    """Return the marker [K] of each track (-1: none) with the least sum of squares of ``away`` [K, M].
+
+    Each is at most ``gate``, m.
 
     ``given`` [K] markers are fixed, whatever their distance.
     """
@@ -163,7 +165,7 @@ def assigned(away: Array, gate: float, given: Array | None = None) -> Array:
     return np.where(columns < M, columns, -1)
 
 
-def _registered(points: Array, rest: Array, marker: Array, weight: Array) -> tuple[float, Array]:
+def _registered(points: Array, rest: Array, marker: Index, weight: Array) -> tuple[float, Array]:
     hit = (marker >= 0) & np.isfinite(points[:, 0])
     w = np.maximum(weight[hit], 1e-3)
     a, b = points[hit], rest[marker[hit]]
@@ -209,7 +211,21 @@ def start_of(candidate: Candidate, layout: Layout, motion: RigidMotion, right: b
     states[:, 0] = np.interp(instants, instants[fitted], np.unwrap(angle))
     origin = (R @ hinge + p).mean(axis=0)
     empty = np.zeros((0, 0))
-    return Fit(np.stack([ex, ey, ez]), origin, states, np.zeros((len(states), 5)), np.array(strip.line), rest, 1.0, 1.0, 1.0, np.inf, 0.0, empty, empty)
+    return Fit(
+        np.stack([ex, ey, ez]),
+        origin,
+        states,
+        np.zeros((len(states), 5)),
+        np.array(strip.line),
+        rest,
+        1.0,
+        1.0,
+        1.0,
+        np.inf,
+        0.0,
+        empty,
+        empty,
+    )
 
 
 def with_all(start: Fit, rest: Array) -> Fit:

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from wingfit.records.array_types import Array
+from wingfit.records.array_types import Array, Mask
 from wingfit.records.blas_threads import one_blas_thread
 from wingfit.tracking.alignment.wing_model import BENDING, STATES, SWEEPING, TWISTING, Strip, positions
 
@@ -89,10 +89,10 @@ def fit(
     """Fit the frame of ``tracks`` [T, M, 3] (m; NaN where not seen) to ``described`` rest positions [M, 3], m.
 
     ``described`` are hinge coordinates; the tracks are in the order of the markers. ``mean`` [T]: weights of the frames
-    whose sum over a state is its mean over the beat. ``shaking`` [5]: standard deviations of the jitter of the body (rad,
-    m), in every frame anew. ``start`` is where to begin.
+    whose sum over a state is its mean over the beat. ``shaking`` [5]: deviations of the body's jitter (rad, m),
+    in every frame anew. ``start`` is where to begin.
     """
-    seen = np.isfinite(tracks).all(axis=-1)
+    seen: Mask = np.asarray(np.isfinite(tracks).all(axis=-1))
     problem = _Problem(strip, described, tracks, seen, mean, np.maximum(shaking, _STEADY))
     here = replace(start, residuals=problem.residuals(start), scatter=_FIRST_SCATTER * strip.span)
     here, damping = problem.scaled(here), 1e-4
@@ -120,7 +120,7 @@ class _Problem:
     strip: Strip
     described: Array
     tracks: Array
-    seen: Array
+    seen: Mask
     mean: Array
     shaking: Array
 
@@ -183,8 +183,8 @@ def _memory(residuals: Array, noise: float) -> float:
 class _Step:
     """Linearised problem at one point, with the states eliminated.
 
-    Unknowns of all frames: rotation, shift and line [7], rest positions [3 M], and the forces that restrict the means of the
-    elastic states [_MEANS] (dual variables, so that no frame is coupled to another).
+    Unknowns of all frames: rotation, shift and line [7], rest positions [3 M], and the forces that restrict the
+    means of the elastic states [_MEANS] (dual variables, so that no frame is coupled to another).
     """
 
     def __init__(self, problem: _Problem, at: Fit) -> None:
@@ -264,7 +264,7 @@ def states_of(strip: Strip, tracks: Array, at: Fit, shaking: Array, flap: Array)
     local = np.zeros((len(tracks), _LOCAL))
     local[:, 0] = flap
     prior = np.concatenate([_STATE_PRIOR, np.maximum(shaking, _STEADY)]) ** -2.0 / at.memory
-    seen = np.isfinite(tracks).all(axis=-1)
+    seen: Mask = np.asarray(np.isfinite(tracks).all(axis=-1))
     measured = at.coordinates(np.nan_to_num(tracks))
     for _ in range(_STATE_STEPS):
         q, J, _, _ = positions(strip, at.rest, local[:, :STATES], at.line)

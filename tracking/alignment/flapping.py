@@ -40,8 +40,8 @@ class Flapping:
 def flapping_of(times: Array, angle: Array, trend: int = 0, known: float | None = None) -> Flapping:
     """Return the flapping of the flap ``angle`` [T] (rad; NaN where unknown) at ``times`` [T], s.
 
-    ``trend``: order of a polynomial over time that is not part of the flapping, and is not in what is returned either. ``known``: frequency
-    (Hz) near which the right one is, by default searched.
+    ``trend``: order of a polynomial over time that is not part of the flapping, nor of the result. ``known``:
+    frequency (Hz) near which the right one is; by default all are tried.
     """
     seen = np.isfinite(angle)
     t, y = times[seen] - times[0], angle[seen]
@@ -76,14 +76,18 @@ def flapping_of(times: Array, angle: Array, trend: int = 0, known: float | None 
 def _near(t: Array, y: Array, powers: Array, frequency: float) -> float:
     width = 0.06 / float(t[-1])
     ends = (frequency - width, frequency + width)
-    found = minimize_scalar(lambda f: _left(t, y, powers, f), bounds=ends, method="bounded", options={"xatol": 1e-5 * width})
+    found = minimize_scalar(
+        lambda f: _left(t, y, powers, f), bounds=ends, method="bounded", options={"xatol": 1e-5 * width}
+    )
     return float(found.x)
 
 
 def basis(t: Array, frequency: float) -> Array:
     """Return the columns 1, cos, sin, cos 2, sin 2, ... [N, 9] of ``frequency`` (Hz) at times ``t`` [N], s."""
     turn = 2 * np.pi * frequency * t
-    return np.column_stack([np.ones_like(t), *(f(k * turn) for k in range(1, _HARMONICS + 1) for f in (np.cos, np.sin))])
+    return np.column_stack(
+        [np.ones_like(t), *(f(k * turn) for k in range(1, _HARMONICS + 1) for f in (np.cos, np.sin))]
+    )
 
 
 def _left(t: Array, y: Array, powers: Array, frequency: float) -> float:

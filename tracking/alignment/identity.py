@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wingfit.records.array_types import Array
+from wingfit.records.array_types import Array, Index, Mask
 from wingfit.tracking.alignment.candidates import assigned
 
 _SURE = 0.7  # of the gate: farther tracks are no marker's
@@ -33,7 +33,7 @@ class Exchange:
     frames: int
 
 
-def whole_tracks(points: Array, model: Array, gate: float) -> tuple[Array, Array, Array]:
+def whole_tracks(points: Array, model: Array, gate: float) -> tuple[Index, Array, Mask]:
     """Assign whole tracks to markers by their distance over the recording.
 
     Args:
@@ -61,7 +61,7 @@ def whole_tracks(points: Array, model: Array, gate: float) -> tuple[Array, Array
     return marker, away, doubtful & (marker >= 0)
 
 
-def frame_by_frame(points: Array, model: Array, marker: Array, noise: float, gate: float) -> Array:
+def frame_by_frame(points: Array, model: Array, marker: Index, noise: float, gate: float) -> Index:
     """Return the track [T, M] that shows each marker in each frame (-1: none).
 
     A sample near the marker of its track belongs to it. The others are assigned to markers that are free in that frame
@@ -88,7 +88,7 @@ def frame_by_frame(points: Array, model: Array, marker: Array, noise: float, gat
 
 
 def exchanges(
-    found: Array, marker: Array, times: Array, tracks: tuple[str, ...], markers: tuple[str, ...]
+    found: Index, marker: Index, times: Array, tracks: tuple[str, ...], markers: tuple[str, ...]
 ) -> list[Exchange]:
     """Return what :func:`frame_by_frame` changed against whole tracks, a line for each track and marker."""
     result = []
@@ -102,7 +102,7 @@ def exchanges(
     return sorted(result, key=lambda one: (one.start_s, one.track))
 
 
-def gathered(positions: Array, found: Array) -> Array:
+def gathered(positions: Array, found: Index) -> Array:
     """Return the positions [T, M, 3] of the markers from those of the tracks [T, K, 3] and ``found`` [T, M]."""
     taken = np.take_along_axis(positions, np.maximum(found, 0)[..., None], axis=1)
     return np.where(found[..., None] >= 0, taken, np.nan)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from wingfit.records.array_types import Array
+from wingfit.records.array_types import Array, Index
 from wingfit.records.errors import DatasetError, fail
 from wingfit.records.wing import Wing
 from wingfit.tracking.alignment.arrangements import DISTINCT, Arrangement, Search, ranked
@@ -39,7 +39,7 @@ class _Prepared:
     """Tracks without the motion of the body, and the first look at them."""
 
     tracks: Tracks
-    frames: Array
+    frames: Index
     motion: RigidMotion
     flapping: Flapping
     shaking: Array
@@ -62,7 +62,8 @@ def align(tracks: Tracks, wing: Wing, known: Known) -> AlignedTracks:
 
 def described_of(wing: Wing) -> Array:
     """Return the described rest positions [M, 3] of the markers in hinge coordinates, m."""
-    return np.array([marker.position for marker in wing.markers]) - np.array([0.0, wing.hinge.y, wing.hinge.z])
+    rest: Array = np.array([marker.position for marker in wing.markers])
+    return np.asarray(rest - np.array([0.0, wing.hinge.y, wing.hinge.z]))
 
 
 def _prepared(tracks: Tracks, wing: Wing, known: Known) -> _Prepared:
@@ -89,7 +90,9 @@ def _prepared(tracks: Tracks, wing: Wing, known: Known) -> _Prepared:
     _check_size(tracks, wing, motion)
     amplitude = float(np.nanmax(motion.angle) - np.nanmin(motion.angle)) / 2
     if amplitude < _LEAST_AMPLITUDE:
-        few = f"the wing turns by +-{np.degrees(amplitude):.2g} deg; at least {np.degrees(_LEAST_AMPLITUDE):.2g} deg are"
+        few = (
+            f"the wing turns by +-{np.degrees(amplitude):.2g} deg; at least {np.degrees(_LEAST_AMPLITUDE):.2g} deg are"
+        )
         raise fail(tracks.file, None, f"too little motion: {few} needed to see its hinge; align a recording that flaps")
     return _Prepared(tracks, frames, motion, flapping_of(tracks.times[frames], motion.angle), shaking, remarks)
 
@@ -100,13 +103,13 @@ def _check_size(tracks: Tracks, wing: Wing, motion: RigidMotion) -> None:
     ratio = float(np.sqrt(shape.var(axis=0).sum() / rest.var(axis=0).sum()))
     if not _SIZES[0] < ratio < _SIZES[1]:
         message = (
-            f"the tracks that move together spread {ratio:.3g} times as far as the described markers; the ratio must be "
-            f"within {_SIZES[0]:g} to {_SIZES[1]:g}: is the unit right, and is it the described wing?"
+            f"the tracks that move together spread {ratio:.3g} times as far as the described markers; the ratio must "
+            f"be within {_SIZES[0]:g} to {_SIZES[1]:g}: is the unit right, and is it the described wing?"
         )
         raise fail(tracks.file, f"{ratio:.3g}", message)
 
 
-def _given(found: _Prepared, wing: Wing, known: Known) -> tuple[Array, Array]:
+def _given(found: _Prepared, wing: Wing, known: Known) -> tuple[Index, Index]:
     """Markers [K] by the tracks' names, and those that the user stated; -1 for none."""
     number = {marker.name: m for m, marker in enumerate(wing.markers)}
     stated = np.array([number[known.labels[name]] if name in known.labels else -1 for name in found.tracks.names])
@@ -120,13 +123,15 @@ def _arranged(
     found: _Prepared, wing: Wing, strip: Strip, described: Array, known: Known
 ) -> tuple[Arrangement, float | None]:
     tracks, motion = found.tracks, found.motion
-    search = Search(strip, described, tracks.positions[found.frames], motion, layout_of(motion), found.flapping.mean, found.shaking)
+    search = Search(
+        strip, described, tracks.positions[found.frames], motion, layout_of(motion), found.flapping.mean, found.shaking
+    )
     named, stated = _given(found, wing, known)
     sides = [True, False] if known.side is None else [known.side == "right"]
     up, every = known.up_vector(), list[Arrangement]()
     for candidate in search.candidates(named):
         for right in sides:
-            one = search.arranged(candidate, right, stated)
+            one = search.arranged(candidate, right, stated, named)
             if one is None or (up is not None and _up(one.fit, up) < 0):
                 continue
             if not any(other.fit.right == right and np.array_equal(other.marker, one.marker) for other in every):
@@ -147,7 +152,7 @@ def _up(one: Fit, up: Array) -> float:
 
 
 def _best(
-    every: list[Arrangement], described: Array, named: Array, tracks: Tracks, wing: Wing
+    every: list[Arrangement], described: Array, named: Index, tracks: Tracks, wing: Wing
 ) -> tuple[Arrangement, float]:
     """Return the best arrangement, and the evidence for its side; DatasetError if another one is nearly as good."""
     order = ranked(every, described, wing.span)
@@ -170,22 +175,22 @@ def _best(
     return best, float(evidence)
 
 
-def _agrees(one: Arrangement, named: Array) -> bool:
+def _agrees(one: Arrangement, named: Index) -> bool:
     both = (named >= 0) & (one.marker >= 0)
     return bool((named[both] == one.marker[both]).all())
 
 
 def _side_open(file: str, cost: float) -> DatasetError:
     message = (
-        f"a left and a right wing explain the tracks nearly equally well (ln of the odds {cost / 2:.2g}, {DISTINCT / 2:g} "
-        "are needed), as the markers lie nearly in the plane of the hinge: add --side left or --side right, or the axis of "
-        "the tracks that is up, --up z"
+        f"a left and a right wing explain the tracks nearly equally well (ln of the odds {cost / 2:.2g}, "
+        f"{DISTINCT / 2:g} are needed), as the markers lie nearly in the plane of the hinge: add --side left or --side "
+        "right, or the axis of the tracks that is up, --up z"
     )
     return fail(file, None, message)
 
 
 def _labels_open(
-    tracks: Tracks, wing: Wing, best: Arrangement, other: Arrangement, labels: Array, cost: float
+    tracks: Tracks, wing: Wing, best: Arrangement, other: Arrangement, labels: Index, cost: float
 ) -> DatasetError:
     k = int(labels[np.argmax(np.linalg.norm(best.fit.rest, axis=1)[: len(labels)])]) if len(labels) else 0
     names = [wing.markers[one.marker[k]].name for one in (best, other)]
@@ -261,8 +266,8 @@ def _check_match(tracks: Tracks, best: Arrangement, motion: RigidMotion, strip: 
     matched = int(((best.marker >= 0) & moving).sum())
     if matched < _LEAST_MATCHED * moving.sum() or matched < LEAST_TRACKS:
         message = (
-            f"only {matched} of {int(moving.sum())} tracks that move with the wing are near a described marker; at least "
-            f"{100 * _LEAST_MATCHED:.0f} % and {LEAST_TRACKS} are needed: check the described positions"
+            f"only {matched} of {int(moving.sum())} tracks that move with the wing are near a described marker; at "
+            f"least {100 * _LEAST_MATCHED:.0f} % and {LEAST_TRACKS} are needed: check the described positions"
         )
         raise fail(tracks.file, matched, message)
     _check_fit(tracks.file, best.fit, strip)
@@ -278,8 +283,8 @@ def _check_fit(file: str, one: Fit, strip: Strip) -> None:
         raise fail(file, None, message)
     if one.scatter > _MOST_SCATTER * strip.span:
         message = (
-            f"the described rest positions differ from the tracks by {1e3 * one.scatter:.3g} mm or more; at most 1 % of the "
-            "span is accepted: measure the markers again, or check the labels"
+            f"the described rest positions differ by {1e3 * one.scatter:.3g} mm or more from the tracks; at most 1 % "
+            "of the span is accepted: measure the markers again, or check the labels"
         )
         raise fail(file, None, message)
 
@@ -295,12 +300,14 @@ def _zero(file: str, wing: Wing, flapping: Flapping, known: Known) -> float:
         raise fail(file, None, f"{share}, {100 * _LEAST_EXPLAINED:.0f} % are needed: {remedy}")
     measured, described = half_range(flapping.harmonics), half_range(series)
     if not _AMPLITUDES[0] < measured / max(described, 1e-9) < _AMPLITUDES[1]:
-        sizes = f"the wing flaps by +-{np.degrees(measured):.3g} deg, the described drive by +-{np.degrees(described):.3g}"
+        sizes = (
+            f"the wing flaps by +-{np.degrees(measured):.3g} deg, the described drive by +-{np.degrees(described):.3g}"
+        )
         raise fail(file, None, f"{sizes} deg: {remedy}")
     return float(series[0].real)
 
 
-def _dropped(tracks: Tracks, shown: Array, best: Arrangement, wing: Wing) -> list[DroppedTrack]:
+def _dropped(tracks: Tracks, shown: Index, best: Arrangement, wing: Wing) -> list[DroppedTrack]:
     result = list[DroppedTrack]()
     for k, name in enumerate(tracks.names):
         if (shown == k).any():
@@ -317,6 +324,6 @@ def _dropped(tracks: Tracks, shown: Array, best: Arrangement, wing: Wing) -> lis
     return result
 
 
-def _relabelled(tracks: Tracks, wing: Wing, named: Array, marker: Array) -> list[str]:
+def _relabelled(tracks: Tracks, wing: Wing, named: Index, marker: Index) -> list[str]:
     wrong = np.flatnonzero((named >= 0) & (marker >= 0) & (named != marker))
     return [f"track {tracks.names[k]!r} is marker {wing.markers[marker[k]].name!r}: its name is wrong" for k in wrong]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wingfit.records.array_types import Array
+from wingfit.records.array_types import Array, Index
 from wingfit.records.wing import Wing
 from wingfit.tracking.alignment.fit import Fit
 from wingfit.tracking.alignment.flapping import Flapping, half_range
@@ -16,7 +16,7 @@ from wingfit.tracking.alignment.request import Tracks
 from wingfit.tracking.alignment.result import AlignedTracks, DroppedTrack, MarkerResult
 
 _POSE = 7  # parameters before the rest positions in the covariance of a fit
-MODEL_ERROR = np.radians([0.2, 0.06, 0.1])
+MODEL_ERROR = np.radians([0.25, 0.06, 0.1])
 """Standard errors of rotations about x, y, z due to the kinematic model, rad (docs/alignment.md)."""
 SHIFT_ERROR = 3e-4  # standard error of the origin due to the model, spans
 
@@ -37,8 +37,8 @@ def aligned(
     wing: Wing,
     final: Fit,
     frame: Frame,
-    used: Array,
-    shown: Array,
+    used: Index,
+    shown: Index,
     mine: Array,
     changed: Sequence[Exchange],
     dropped: Sequence[DroppedTrack],

@@ -56,11 +56,26 @@ class Known:
 
     def check(self, tracks: Tracks, wing: Wing) -> None:
         """Raise DatasetError that lists statements which name unknown tracks, markers or directions."""
-        faults, markers = Faults(), [marker.name for marker in wing.markers]
+        faults = Faults()
+        self._check_names(tracks, wing, faults)
         if self.side not in (None, "left", "right"):
             faults.add("--side", self.side, f"is {self.side!r}; it must be left or right")
         if self.up is not None and self.up.lstrip("+-") not in ("x", "y", "z"):
             faults.add("--up", self.up, f"is {self.up!r}; it must be x, y, z, -x, -y or -z: an axis of the tracks")
+        if 0 < len(self.body) < 3:
+            faults.add(
+                "--body", len(self.body), f"names {len(self.body)} tracks; a body needs 3 that are not on a line"
+            )
+        if len(set(self.labels.values())) < len(self.labels):
+            faults.add("--label", None, "gives one marker to two tracks; a marker has one track")
+        if self.mean_flap_deg is not None and not abs(self.mean_flap_deg) < 90:
+            faults.add(
+                "--mean-flap-deg", self.mean_flap_deg, f"is {self.mean_flap_deg:g} deg; it must be within +-90 deg"
+            )
+        faults.raise_any()
+
+    def _check_names(self, tracks: Tracks, wing: Wing, faults: Faults) -> None:
+        markers = [marker.name for marker in wing.markers]
         for track, marker in self.labels.items():
             if track not in tracks.names:
                 faults.add("--label", track, f"there is no track {track!r}; {nearest(track, tracks.names)}")
@@ -69,13 +84,6 @@ class Known:
         for name in self.body:
             if name not in tracks.names:
                 faults.add("--body", name, f"there is no track {name!r}; {nearest(name, tracks.names)}")
-        if 0 < len(self.body) < 3:
-            faults.add("--body", len(self.body), f"names {len(self.body)} tracks; a body needs 3 that are not on a line")
-        if len(set(self.labels.values())) < len(self.labels):
-            faults.add("--label", None, "gives one marker to two tracks; a marker has one track")
-        if self.mean_flap_deg is not None and not abs(self.mean_flap_deg) < 90:
-            faults.add("--mean-flap-deg", self.mean_flap_deg, f"is {self.mean_flap_deg:g} deg; it must be within +-90 deg")
-        faults.raise_any()
 
     def up_vector(self) -> Array | None:
         """Return the unit vector [3] that is up in the axes of the tracks; None if it was not given."""
@@ -90,11 +98,15 @@ def checked(tracks: Tracks, wing: Wing) -> None:
     """Raise DatasetError for tracks that cannot be aligned to ``wing`` whatever they are."""
     T, K = tracks.positions.shape[:2]
     if len(tracks.times) != T or len(tracks.names) != K or not (np.diff(tracks.times) > 0).all():
-        raise fail(tracks.file, None, "times must increase, one for each row of positions, and names one for each track")
+        raise fail(
+            tracks.file, None, "times must increase, one for each row of positions, and names one for each track"
+        )
     if T < LEAST_FRAMES:
         raise fail(tracks.file, T, f"holds {T} frames; at least {LEAST_FRAMES} are needed: record a beat or more")
     if K < LEAST_TRACKS:
         raise fail(tracks.file, K, f"holds {K} tracks; at least {LEAST_TRACKS} are needed: track more markers")
     if len(wing.markers) < LEAST_TRACKS:
         count = len(wing.markers)
-        raise fail("wing.markers", count, f"describes {count} markers; at least {LEAST_TRACKS} are needed: describe more")
+        raise fail(
+            "wing.markers", count, f"describes {count} markers; at least {LEAST_TRACKS} are needed: describe more"
+        )

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wingfit.records.array_types import Array
+from wingfit.records.array_types import Array, Mask
 from wingfit.records.blas_threads import one_blas_thread
 
 _ROUNDS = 25
@@ -46,7 +46,7 @@ def rigid_motion(tracks: Array) -> RigidMotion:
     Generalised Procrustes analysis with weights for tracks and samples, so that tracks that do not belong to the wing
     and samples of swapped tracks count little.
     """
-    seen = np.isfinite(tracks).all(axis=-1)
+    seen: Mask = np.asarray(np.isfinite(tracks).all(axis=-1))
     first = int(np.argmax(seen.sum(axis=1)))
     if seen[first].sum() < 4:
         raise ValueError(f"at most {int(seen[first].sum())} tracks are seen at once; at least 4 are needed")
@@ -78,8 +78,8 @@ def rigid_motion(tracks: Array) -> RigidMotion:
     return RigidMotion(shape, R, p, misfit, track_weight, axis, pivot, every, steadiness)
 
 
-def _poses(shape: Array, P: Array, weight: Array) -> tuple[Array, Array, Array]:
-    """Weighted least-squares poses [T, 3, 3], [T, 3] of ``shape`` in ``P``, and the frames [T] in which there is one."""
+def _poses(shape: Array, P: Array, weight: Array) -> tuple[Array, Array, Mask]:
+    """Weighted least-squares poses [T, 3, 3], [T, 3] of ``shape`` in ``P``, and the frames [T] that have one."""
     count = np.maximum(weight.sum(axis=1), 1e-12)[:, None]
     b0 = np.einsum("tk,ki->ti", weight, shape) / count
     p0 = np.einsum("tk,tki->ti", weight, P) / count
@@ -92,7 +92,7 @@ def _poses(shape: Array, P: Array, weight: Array) -> tuple[Array, Array, Array]:
 
 
 def _hinge(R: Array, p: Array) -> tuple[Array, Array, Array, float]:
-    """Axis [3] and point [3] of the body that move least under poses ``R`` [T, 3, 3], ``p`` [T, 3]; turn [T]; motion."""
+    """Axis [3] and point [3] of the body that move least in poses ``R`` [T, 3, 3], ``p`` [T, 3]; turn [T]; motion."""
     dR, dp = R - R.mean(axis=0), p - p.mean(axis=0)
     values, vectors = np.linalg.eigh(np.einsum("tij,tik->jk", dR, dR))
     axis = vectors[:, 0]

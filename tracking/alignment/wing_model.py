@@ -1,4 +1,4 @@
-"""Kinematic model of a flapping elastic wing: a strip that is rigid along the chord, inextensible, and bends and twists.
+"""Kinematic model of a flapping elastic wing: a strip that is rigid along the chord and inextensible.
 
 The frame used here is the wing's frame with its origin moved to the hinge: x aft, Y = y - hinge.y outboard along the
 span, Z = z - hinge.z up. At the span position Y the strip has the slope B(Y) about x and the twist tau(Y) about its
@@ -127,8 +127,12 @@ def positions(strip: Strip, rest: Array, states: Array, line: Array) -> tuple[Ar
     twisted = twist @ (orders * scaled[:, None] ** (orders - 1) / strip.span).T
     slope = twisted * turned
     bent = angle @ _bending_slopes(strip, Y).T * out
-    by_line = np.stack([1 - ct, -sB * st, cB * st], axis=-1)[..., None] * np.stack([np.ones(M), scaled], axis=-1)[:, None]
-    by_rest[..., 0, 1] = sweep @ ends[:, 1 : 1 + SWEEPING].T + np.einsum("tmg,mg->tm", curve * tan, weights) + twisted * out
+    by_line = (
+        np.stack([1 - ct, -sB * st, cB * st], axis=-1)[..., None] * np.stack([np.ones(M), scaled], axis=-1)[:, None]
+    )
+    by_rest[..., 0, 1] = (
+        sweep @ ends[:, 1 : 1 + SWEEPING].T + np.einsum("tmg,mg->tm", curve * tan, weights) + twisted * out
+    )
     by_rest[..., 1, 1], by_rest[..., 2, 1] = cB - sB * slope - cB * bent, sB + cB * slope - sB * bent
     by_rest[..., 1] += by_line[..., 1] * line[1] / np.where(Y == 0, 1.0, Y)[:, None]
     return found, by_state, by_rest, by_line

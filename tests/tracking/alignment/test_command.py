@@ -51,7 +51,9 @@ def test_datasets_and_kinematics_read_what_import_and_align_write(wingfit: Wingf
     assert samples.markers == film.markers
     away = samples.values.reshape(film.true.shape) - film.true
     assert np.nanmax(np.abs(away)) < 6e-3
-    code, _, err = wingfit("align", imported, "--wing", ROBIRD / "dataset.yaml", "--axes", "body", "-o", body)
+    code, _, err = wingfit(
+        "align", imported, "--wing", ROBIRD / "dataset.yaml", "--side", "left", "--axes", "body", "-o", body
+    )
     assert code == 0, err
     edges = ("--leading-edge", "m08,m15,m22", "--chord", "m15,m20", "--wing", "upper-left", "--flap-hz", "0.0645")
     code, out, err = wingfit("kinematics", body, *edges, "-o", motion)
