@@ -369,6 +369,18 @@ def test_a_poor_fit_tells_no_gene_and_says_why(small: tuple[Dataset, Genome]) ->
     assert any(gene.identifiable for gene in good.genes)
 
 
+def test_a_misfit_beyond_a_fifth_of_the_span_points_to_the_checks(small: tuple[Dataset, Genome]) -> None:
+    """Tracks of a left wing: no discretisation and no effect brings the simulation near them."""
+    dataset, truth = small
+    left = tuple(
+        replace(one, values=(one.positions * [1.0, -1.0, 1.0]).reshape(one.values.shape)) for one in dataset.recordings
+    )
+    found = judge(SPEC, replace(dataset, recordings=left), Here(), truth.as_dict())
+    assert found.after > 0.2 * dataset.wing.span
+    assert any("likely disagree" in remark and "wingfit datasets check" in remark for remark in found.remarks)
+    assert not any("finer discretisation" in remark for remark in found.remarks)
+
+
 def test_a_gene_at_its_bound_is_not_told(small: tuple[Dataset, Genome]) -> None:
     from wingfit.calibration.result import _at_bound
 

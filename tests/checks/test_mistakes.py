@@ -9,9 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.mistakes import vehicles as of_vehicles
-from benchmarks.mistakes import wings as of_wings
 from tests.checks.samples import good_vehicle, good_wing
+from tests.oracles.mistakes import KINDS
 from wingfit.checks import DatasetWarning, check_dataset, examine, load_dataset
 from wingfit.checks.repair import repaired
 from wingfit.records import Dataset, DatasetError, save_dataset
@@ -19,7 +18,6 @@ from wingfit.records import load_dataset as read_dataset
 from wingfit.records.files.folder import contents
 
 GOOD = {"wing": good_wing(), "vehicle": good_vehicle()}
-KINDS = {f"{kind.rig}: {kind.name}": kind for kind in (*of_wings.KINDS, *of_vehicles.KINDS)}
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
 

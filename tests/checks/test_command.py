@@ -1,0 +1,42 @@
+"""``wingfit datasets check``: what it prints, how it ends, and the corrected copy."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from wingfit.cli import datasets
+from wingfit.client.transport import WingfitError
+from wingfit.service.runs.simulation_hints import with_remedy
+
+ROBIRD = Path(__file__).parents[2] / "examples" / "robird"
+
+
+def light(folder: Path) -> Path:
+    """The example with a foam that is lighter than air."""
+    shutil.copytree(ROBIRD, folder)
+    file = folder / "dataset.yaml"
+    file.write_text(file.read_text(encoding="utf-8").replace("foam_density_kg_m3: 30.0", "foam_density_kg_m3: 0.03"))
+    return folder
+
+
+def test_a_certain_mistake_is_an_error_and_names_the_copy(tmp_path: Path) -> None:
+    with pytest.raises(WingfitError) as raised:
+        datasets.check(light(tmp_path / "light"))
+    assert "--fix NEW_FOLDER" in str(raised.value)
+    assert "wing.materials.foam_density_kg_m3: 0.03 -> 30" in str(raised.value)
+
+
+def test_fix_writes_a_copy_that_passes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    datasets.check(light(tmp_path / "light"), tmp_path / "fixed")
+    assert "changed dataset.yaml, wing.materials.foam_density_kg_m3: 0.03 -> 30" in capsys.readouterr().out
+    datasets.check(tmp_path / "fixed")
+    assert "is valid" in capsys.readouterr().out
+    with pytest.raises(WingfitError, match="nothing is overwritten"):
+        datasets.check(tmp_path / "light", tmp_path / "fixed")
+
+
+def test_a_failed_simulation_points_to_the_checks() -> None:
+    assert "wingfit datasets check" in with_remedy("the reference markers never cross the hinge height")
