@@ -11,6 +11,7 @@ from typing import Annotated, Any, Generic, Literal, NotRequired, TypeVar
 from annotated_types import Len
 from typing_extensions import TypedDict
 
+from wingfit.client.importing.questions import ImportQuestion
 from wingfit.client.load_answers import Outputs
 
 State = Literal["QUEUED", "RUNNING", "PAUSED", "SUCCEEDED", "FAILED", "CANCELLED"]
@@ -42,19 +43,6 @@ class ErrorItem(TypedDict):
     where: str
     value: Any
     message: str
-
-
-class ImportQuestion(TypedDict):
-    """An option that the file does not state, and that must be given.
-
-    ``option``: name of the form field; ``message``: why it is needed; ``choices``: the values it may have, none for any
-    number or text; ``hint``: a fact that helps to choose.
-    """
-
-    option: str
-    message: str
-    choices: list[str]
-    hint: str
 
 
 class Problem(TypedDict):

@@ -7,7 +7,8 @@ from typing import Annotated, Literal
 from annotated_types import Len
 from typing_extensions import TypedDict
 
-from wingfit.client.answers import ImportQuestion, Point
+from wingfit.client.answers import Point
+from wingfit.client.importing.questions import ImportQuestion
 
 Coordinates = Annotated[list[float], Len(3, 3)]
 

@@ -11,9 +11,11 @@ from wingfit.diagnosis.evidence.fit import Fit
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.inference.noise.series import EXCEEDS, MEASURED_ERROR
 from wingfit.inference.noise.steadiness import steady_probability
+from wingfit.records.array_types import Array, Float
 
 UNEVEN = 3.0  # times the noise of quieter recordings
 QUIET = 0.25  # quantile of the recordings' noise that counts as quiet
+FAINT = 0.1  # standard error of the mean beat over its size
 LOUD = 3.0  # times the visible noise; first-order noise with a correlation of 0.8 has as much
 EXCEEDING = 1.5  # times the assumed noise: power of an octave that is compared between recordings and times
 BY_CHANCE = 1e-3  # probability that noise as assumed is so much smaller than its standard deviation
@@ -22,7 +24,7 @@ BY_CHANCE = 1e-3  # probability that noise as assumed is so much smaller than it
 def noise_may_hide(data: WhitenedData, nominal: Fit) -> bool:
     """Return whether missing physics may hide in the noise; ``nominal``: fit of the nominal model."""
     if data.kind != "series":
-        return bool(noisier(data))
+        return bool(noisier(data)) or faint(data)
     return overstated(data, nominal) or uncertain(data, nominal) or loud(data)
 
 
@@ -32,6 +34,25 @@ def noisier(data: WhitenedData) -> list[int]:
     Noise below the tolerance of any model hides nothing.
     """
     return np.flatnonzero(data.noise_of_recordings > max(UNEVEN * quiet_noise(data), data.tolerance)).tolist()
+
+
+def faint(data: WhitenedData) -> bool:
+    """Return whether the mean beats are known to no better than a tenth of their motion or force, FAINT.
+
+    Flaps of an animal differ from each other, and few of them are recorded; physics may hide in what differs.
+    """
+    return bool(np.median(uncertainty_of_beats(data)) > FAINT)
+
+
+def uncertainty_of_beats(data: WhitenedData) -> Float[Array, " R"]:
+    """Return the standard error of each recording's mean beat over its size, both RMS, of all but the mean value."""
+    found = list[float]()
+    for fit in data.beat_fits:
+        moving = (fit.order >= 1) & ~fit.trend
+        size = float((fit.coefficients[fit.used][:, moving] ** 2 * fit.weight[moving]).sum())
+        error = float((fit.variance[fit.used][:, moving] * fit.weight[moving]).sum())
+        found.append(np.sqrt(error / size) if size > 0.0 else np.inf)
+    return np.array(found)
 
 
 def quiet_noise(data: WhitenedData) -> float:

@@ -6,8 +6,8 @@ from typing import Any, cast
 
 import numpy as np
 
-from wingfit.client import answers as a
 from wingfit.client.importing import answers as i
+from wingfit.client.importing.questions import ImportQuestion
 from wingfit.importers.inspection import Inspection, preview_frames, ranges
 from wingfit.importers.raw import Raw
 from wingfit.importers.summary import as_json
@@ -29,7 +29,7 @@ def imported(found: Inspection) -> i.TrackImport:
     }
 
 
-def questions(found: Inspection) -> list[a.ImportQuestion]:
+def questions(found: Inspection) -> list[ImportQuestion]:
     """Return the options that the file does not state."""
     return [
         {"option": one.option, "message": one.message, "choices": [*one.choices], "hint": one.hint}

@@ -220,7 +220,7 @@ def test_what_the_simulator_gives_as_reason_has_a_remedy(dataset: Dataset) -> No
     assert isinstance(wing.drive, FourBarDrive)
     aloft = replace(wing, drive=replace(wing.drive, offset=wing.drive.offset + 1.0))
     reason = FlexibleWing(aloft, "4").observe(nominal[None], still).reasons[0] or ""
-    assert with_remedy(reason).endswith("or other reference markers")
+    assert "or other reference markers" in with_remedy(reason)
     assert with_remedy("something else") == "something else"
 
 
