@@ -156,6 +156,17 @@ class WhitenedData:
         return np.array([float(np.sqrt(np.mean(fit.noise[fit.used] ** 2))) for fit in self.beat_fits])
 
     @cached_property
+    def uncertainty_of_beats(self) -> Float[Array, " R"]:
+        """Return the RMS standard error of each recording's mean beat, over that beat's RMS; both without mean values."""
+        found = list[float]()
+        for fit in self.beat_fits:
+            moving = (fit.order >= 1) & ~fit.trend
+            size = float((fit.coefficients[fit.used][:, moving] ** 2 * fit.weight[moving]).sum())
+            error = float((fit.variance[fit.used][:, moving] * fit.weight[moving]).sum())
+            found.append(np.sqrt(error / size) if size > 0.0 else np.inf)
+        return np.array(found)
+
+    @cached_property
     def drift(self) -> Float[Array, " R"]:
         """Slow change of each recording [R] that noise does not explain, divided by its noise of a sample.
 

@@ -11,7 +11,6 @@ from wingfit.diagnosis.evidence.fit import Fit
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.inference.noise.series import EXCEEDS, MEASURED_ERROR
 from wingfit.inference.noise.steadiness import steady_probability
-from wingfit.records.array_types import Array, Float
 
 UNEVEN = 3.0  # times the noise of quieter recordings
 QUIET = 0.25  # quantile of the recordings' noise that counts as quiet
@@ -41,18 +40,7 @@ def faint(data: WhitenedData) -> bool:
 
     Flaps of an animal differ from each other, and few of them are recorded; physics may hide in what differs.
     """
-    return bool(np.median(uncertainty_of_beats(data)) > FAINT)
-
-
-def uncertainty_of_beats(data: WhitenedData) -> Float[Array, " R"]:
-    """Return the standard error of each recording's mean beat over its size, both RMS, of all but the mean value."""
-    found = list[float]()
-    for fit in data.beat_fits:
-        moving = (fit.order >= 1) & ~fit.trend
-        size = float((fit.coefficients[fit.used][:, moving] ** 2 * fit.weight[moving]).sum())
-        error = float((fit.variance[fit.used][:, moving] * fit.weight[moving]).sum())
-        found.append(np.sqrt(error / size) if size > 0.0 else np.inf)
-    return np.array(found)
+    return bool(np.median(data.uncertainty_of_beats) > FAINT)
 
 
 def quiet_noise(data: WhitenedData) -> float:

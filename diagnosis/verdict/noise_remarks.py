@@ -8,7 +8,7 @@ from wingfit.diagnosis.evidence.fit import Fit
 from wingfit.diagnosis.evidence.marker_errors import MarkerErrors, too_many
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.finding import amount
-from wingfit.diagnosis.verdict.noise_doubt import UNEVEN, faint, noisier, quiet_noise, uncertainty_of_beats
+from wingfit.diagnosis.verdict.noise_doubt import UNEVEN, faint, noisier, quiet_noise
 from wingfit.diagnosis.verdict.weigh_hypotheses import drifts
 from wingfit.inference.noise.drift import Drift
 from wingfit.inference.noise.harmonic import still_markers
@@ -91,7 +91,7 @@ def _uneven_noise_remarks(data: WhitenedData, unit: str) -> tuple[str, ...]:
 
 def _faint_remarks(data: WhitenedData) -> tuple[str, ...]:
     """Return a remark if the mean beats are not known well enough for a model to be called adequate; else nothing."""
-    part = 100.0 * float(np.median(uncertainty_of_beats(data)))
+    part = 100.0 * float(np.median(data.uncertainty_of_beats))
     remark = (
         f"the mean beat is known to only {part:.0f} % of its size, because beats differ or there are few of them: "
         "physics that changes the beat by less cannot be seen; record more beats, or beats that are alike"

@@ -13,7 +13,6 @@ from tests.diagnosis.pendulum_rig import GENES, PendulumRig, recorded
 from wingfit.diagnosis import DiagnosisSpec, Finding, diagnose_subject
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.policy import POLICY
-from wingfit.diagnosis.verdict.noise_doubt import uncertainty_of_beats
 from wingfit.diagnosis.verdict.noise_remarks import drift_sentence, noise_remarks
 from wingfit.diagnosis.verdict.weigh_hypotheses import drifts
 from wingfit.inference.noise.drift import Drift
@@ -173,7 +172,7 @@ def test_an_adequate_model_is_not_certain_where_no_mean_beat_is_known_well() -> 
     """Noise as large as the motion: the mean beat has an error of a quarter of it, so that much may be missing."""
     fitted = recorded({}, noise=4e-3, seed=1, frequencies=FREQUENCIES)
     data = WhitenedData.of(fitted)
-    assert 0.1 < np.median(uncertainty_of_beats(data)) < 0.5
+    assert 0.1 < np.median(data.uncertainty_of_beats) < 0.5
     *_, last = diagnose_subject(PendulumRig(), "faint", fitted, (), DiagnosisSpec(), InProcessEvaluator())
     assert last.finding is not None
     assert last.finding.verdict == "adequate"
