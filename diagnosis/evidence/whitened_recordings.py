@@ -157,7 +157,7 @@ class WhitenedData:
 
     @cached_property
     def uncertainty_of_beats(self) -> Float[Array, " R"]:
-        """Return the RMS standard error of each recording's mean beat, over that beat's RMS; both without mean values."""
+        """Standard error of each recording's mean beat [R], divided by that beat; RMS without mean values."""
         found = list[float]()
         for fit in self.beat_fits:
             moving = (fit.order >= 1) & ~fit.trend
