@@ -103,6 +103,10 @@ class Client(DiagnosisCalls, DriveCalls, ImportCalls, KeyCalls):
         """
         return self._file(f"/v1/datasets/{part(dataset_id)}/archive", Path(path), f"{dataset_id}.zip", on_bytes)
 
+    def drawing(self, dataset_id: str) -> str:
+        """Fetch a drawing of the wing that a dataset describes, seen from above and to scale, as the text of an SVG."""
+        return self._call("GET", f"/v1/datasets/{part(dataset_id)}/drawing").text
+
     def delete_dataset(self, dataset_id: str) -> None:
         """Delete a dataset; the server refuses this while runs or diagnoses of the dataset exist."""
         self._call("DELETE", f"/v1/datasets/{part(dataset_id)}")

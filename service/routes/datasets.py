@@ -16,6 +16,7 @@ from wingfit.checks import Mistake
 from wingfit.client import answers as a
 from wingfit.records import AnyDataset, SeriesDataset
 from wingfit.records.files.confined import ReaderError
+from wingfit.report.wing_drawing import wing_drawing
 from wingfit.service.auth.access import owner_of_new
 from wingfit.service.container import DOWNLOAD_SLOT, UPLOAD_SLOT, Service, ServiceDep
 from wingfit.service.datasets.parsed_datasets import Opened
@@ -28,6 +29,13 @@ from wingfit.service.storage.database import Database
 from wingfit.service.storage.tables import ArchiveRow, DatasetRow
 
 router = APIRouter(prefix="/v1/datasets", tags=["datasets"])
+DRAWING_TYPE = "image/svg+xml"
+# A drawing has its colours as attributes: it needs no styles, scripts or files.
+DRAWING_HEADERS = {
+    "Content-Security-Policy": (
+        "default-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'; sandbox"
+    )
+}
 MEDIA_TYPES = {".zip": "application/zip", ".nc": "application/x-netcdf"}
 OTHER_TYPE = "application/octet-stream"
 PIECE = 4 * 2**20
@@ -154,6 +162,18 @@ def fetch_series(
     except ValueError as error:
         raise invalid("there is no such recording", [error_item("query.recording", recording, str(error))]) from None
     return http.tagged(views.series_values(chosen), if_none_match)
+
+
+@router.get(
+    "/{dataset_id}/drawing",
+    response_class=Response,
+    responses={200: {"content": {DRAWING_TYPE: {"schema": {"type": "string"}}}}, **http.errors(404, 409)},
+    summary="Fetch a drawing of the described wing",
+)
+def fetch_drawing(service: ServiceDep, dataset_id: str, if_none_match: http.IfNoneMatch = None) -> Response:
+    """Return the described wing from above, to scale, as SVG: outline, flapping axis, rods and markers."""
+    drawing = wing_drawing(service.datasets.flapping(dataset_id).rig)
+    return http.marked(drawing.encode(), DRAWING_TYPE, if_none_match, DRAWING_HEADERS)
 
 
 @router.delete("/{dataset_id}", status_code=204, responses=http.errors(404, 409), summary="Delete a dataset")

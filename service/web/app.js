@@ -11,6 +11,7 @@ import { setUpImport, showImport } from "./importing/page.js";
 import { isSeries } from "./base/labels.js";
 import { refreshListing, setUpListing, showListing } from "./pages/table_page.js";
 import { drawDatasets, drawDiagnoses, drawRuns } from "./parts/sidebar.js";
+import { stored } from "./parts/warnings.js";
 import { redraw, selectRun, setUpRun } from "./pages/run.js";
 import { openSubmit, remove, setUpSubmit } from "./pages/submit.js";
 
@@ -154,7 +155,7 @@ setUpDataset({
 });
 setUpImport({
   onStored(dataset) {
-    toast(`Stored ${dataset.name}`);
+    toast(stored("Stored", dataset));
     go(dataset.id, "dataset");
     poll();
   },
@@ -167,7 +168,9 @@ setUpSubmit({
     poll();
   },
   onUploaded(dataset) {
-    poll().then(() => starting.onRun(dataset));
+    // Likely mistakes are looked at before anything is started.
+    if (dataset.warnings?.length) go(dataset.id, "dataset");
+    poll().then(() => !dataset.warnings?.length && starting.onRun(dataset));
   },
 });
 $("skip").addEventListener("click", (event) => {

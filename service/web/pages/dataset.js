@@ -2,9 +2,11 @@
 
 import { get, part, postJson } from "../base/api.js";
 import { $, el, plain, plural, significant, size, toast, when } from "../base/format.js";
+import { showDrawing } from "../parts/drawing.js";
 import { setUpSimulation, showSimulation } from "../parts/driving.js";
 import { hideSeries, redrawSeries, seriesRecordings, setUpSeries, showSeries } from "../parts/series.js";
 import { badge, runName } from "../parts/sidebar.js";
+import { showWarnings } from "../parts/warnings.js";
 import { axis, draw } from "../base/plots.js";
 import { randomKey, remove } from "./submit.js";
 import { isForces, isSeries, misfit } from "../base/labels.js";
@@ -49,11 +51,13 @@ export async function selectDataset(id) {
   }
   $("dataset").hidden = false;
   drawHead();
+  showWarnings(dataset);
   drawRecordings();
   const series = isSeries(dataset);
   $("series-part").hidden = !series;
   $("conditions-part").hidden = series;
-  await Promise.all([series ? showRig() : drawConditions(), listWork(id)]);
+  $("drawing-part").hidden = series;
+  await Promise.all([...(series ? [showRig()] : [drawConditions(), showDrawing(dataset)]), listWork(id)]);
 }
 
 async function showRig() {

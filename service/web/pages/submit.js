@@ -5,6 +5,7 @@ import { copy, curl, python } from "../base/copying.js";
 import { $, el, size, toast } from "../base/format.js";
 import { showErrors } from "../base/form_errors.js";
 import { isForces, isSeries, METHODS, MODES, PRESETS, setup, spoken } from "../base/labels.js";
+import { stored } from "../parts/warnings.js";
 
 const TYPED_MS = 350;
 const CHOICES = { ...METHODS, auto: "auto, recommended" };
@@ -199,7 +200,7 @@ async function upload(file, onUploaded) {
       state.textContent = fraction < 1 ? `Uploading ${file.name}, ${Math.round(100 * fraction)} %` : `Checking ${file.name}`;
     });
     state.textContent = "";
-    toast(`Uploaded ${dataset.name}`);
+    toast(stored("Uploaded", dataset));
     onUploaded(dataset);
   } catch (error) {
     state.className = "error";

@@ -57,6 +57,7 @@ def test_a_dataset_comes_back_as_it_was_sent(client: Client, source: Path, tmp_p
     assert dataset["name"] == "mine"
     assert client.dataset(dataset["id"]) == dataset
     assert dataset in client.datasets()
+    assert "toy, seen from above" in client.drawing(dataset["id"])
     assert client.download(dataset["id"], tmp_path / "back.zip").read_bytes() == source.read_bytes()
     assert client.download(dataset["id"], tmp_path).name == f"{dataset['id']}.zip"
     client.delete_dataset(dataset["id"])

@@ -48,6 +48,20 @@ def test_a_dataset_is_described_in_units_that_people_read(api: Api) -> None:
     assert recording["temperature_c"] == pytest.approx(20.0)
 
 
+def test_the_described_wing_is_drawn(api: Api) -> None:
+    address = f"/v1/datasets/{api.upload()['id']}/drawing"
+    answer = api.client.get(address)
+    assert (answer.status_code, answer.headers["Content-Type"]) == (200, "image/svg+xml")
+    policy = answer.headers["Content-Security-Policy"]
+    assert policy.startswith("default-src 'none';")
+    assert "sandbox" in policy
+    assert answer.text.count("<circle") == 2
+    assert "toy, seen from above" in answer.text
+    again = api.client.get(address, headers={"If-None-Match": answer.headers["ETag"]})
+    assert (again.status_code, again.content) == (304, b"")
+    assert api.client.get("/v1/datasets/none/drawing").status_code == 404
+
+
 def test_a_malformed_archive_is_a_422_that_says_where(api: Api) -> None:
     answer = api.client.post("/v1/datasets", files={"file": ("broken.zip", b"PK broken")})
     assert answer.status_code == 422

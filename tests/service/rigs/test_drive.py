@@ -308,6 +308,8 @@ def test_the_values_of_a_series_can_be_looked_at(api: Api) -> None:
     assert set(first["inputs"]) == {one["name"] for one in shown["rig"]["inputs"]}
     assert api.client.get(f"/v1/datasets/{dataset}/series?recording=none").status_code == 422
     assert api.client.get(f"/v1/datasets/{api.upload()['id']}/series").status_code == 409
+    undrawn = api.client.get(f"/v1/datasets/{dataset}/drawing")
+    assert (undrawn.status_code, "needs a wing or a vehicle" in undrawn.json()["detail"]) == (409, True)
     assert api.client.post("/v1/runs", json={"dataset_id": dataset}).status_code == 422
 
 
