@@ -89,7 +89,7 @@ function verticalOf(frame, up) {
   return match ? ["XYZ".indexOf(match[2]), match[1] === "-" ? -1 : 1] : [2, 1];
 }
 
-const fill = (width, height) => FILLED * Math.min(width, height * 1.2); // boxes are rarely as high as wide
+const fill = (width, height) => FILLED * Math.min(width, height); // boxes of any shape, turned anyhow, fit
 
 // A function from a position (mm) to [x, y] on the screen and a depth, larger ones are closer.
 function projection(width, height) {
