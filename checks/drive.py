@@ -24,6 +24,7 @@ ALIKE = 0.12  # relative scatter between recordings of a factor that is due to t
 MEAN = 0.3  # rad, between mean flap angle and that of the drive: beyond, a warning
 UPSIDE_DOWN, CLEARLY = 0.05, 0.35  # rad from the drive as given; of this, that of the drive upside down
 UP_TO_DOWN = np.array([1.0, 1.0, -1.0])
+MOST_UNSEEN = 0.25  # of the beat without a frame: harmonics that are not seen there could be anything
 LEAST_LAG = np.radians(2.0)  # of stated lags: their range that shows a trend
 # Measured lag of the markers per stated lag, of 34 plants 0.2 to 0.9: the foam takes up a part.
 LAG_SLOPE = (-0.1, 3.0)
@@ -48,8 +49,18 @@ def distance(tracked: Tracked) -> float:
 
 
 def _moves(tracked: Tracked) -> bool:
+    """Whether the tracks and the drive flap, and the frames show the beat well enough to compare the two."""
     waves = tracked.flap.waves
+    seen = tracked.times[np.isfinite(tracked.angle)]
+    if len(seen) < 2 * (2 * HARMONICS + 1) or _widest_gap(seen * tracked.frequency) > MOST_UNSEEN:
+        return False
     return bool(np.isfinite(waves).all() and abs(waves[0, 0]) > 1e-3 and abs(tracked.driven[1]) > 1e-6)
+
+
+def _widest_gap(beats: Array) -> float:
+    """Return the largest part of the beat, as a fraction, at whose phases there is no frame; ``beats`` [T]: times."""
+    phases = np.sort(beats % 1.0)
+    return float(np.diff(phases, append=phases[0] + 1.0).max())
 
 
 def _features(tracked: Tracked) -> Array:
@@ -218,6 +229,8 @@ def _lag(tracks: Sequence[Tracked], indices: Sequence[int]) -> Iterator[Mistake]
 
 def lag_of(tracked: Tracked) -> float:
     """Lag (rad) of the rear rod behind the front one at the inner third of the markers; NaN if it is not visible."""
+    if not tracked.wing.driven_rods:
+        return float("nan")
     rods = {rod.name: rod for rod in tracked.wing.rods}
     front, rear = (rods[name].x_root for name in tracked.wing.driven_rods)
     arms = tracked.rest - tracked.hinge

@@ -21,6 +21,8 @@ STEP = 0.2  # beats by which neighbouring trial frequencies differ over the reco
 # and a refusal. Drift, noise and play are left by both.
 DOUBTFUL, DOUBTFULLY = 0.004, 0.35
 REFUSED, REFUSABLY = 0.02, 0.12
+# Samples whose phase is seen in another beat, too, for a warning and a refusal: with fewer, nothing seems to repeat.
+OVERLAP, CERTAIN_OVERLAP = 0.5, 0.75
 SLIP = 0.06  # beats over the recording: smaller differences of frequencies are not remarked on
 APART = 0.004  # relative difference that is not remarked on: clocks of cameras and motors
 ABSENT = 1e-3  # of the variance, what odd harmonics hold where the motion has twice the stated frequency
@@ -95,7 +97,10 @@ def _by_scan(recording: Recording, index: int, times: Array, values: Array, give
     apart = abs(best.frequency - stated) * length >= SLIP and abs(best.frequency / stated - 1) >= APART
     if not apart or best.left > DOUBTFULLY * given.left:
         return []
-    certain = given.left > REFUSED and best.left < REFUSABLY * given.left
+    overlap = _overlap(times, best.frequency)
+    if overlap < OVERLAP:
+        return []
+    certain = given.left > REFUSED and best.left < REFUSABLY * given.left and overlap >= CERTAIN_OVERLAP
     samples = 1.0 / (stated * float(np.median(np.diff(recording.times))))
     strobe = recording.kind == "tracks" and samples < STROBE
     return [Candidate(best, _other(recording, index, given, best, strobe=strobe, certain=certain))]
@@ -142,7 +147,8 @@ def _by_ratio(recording: Recording, index: int, times: Array, values: Array, giv
             if not _only_even(times, values, given):
                 continue
         elif ratio == 60.0 and given.frequency * length < FEW_BEATS:
-            limit = 0.15  # of next to no beat, any harmonics explain all
+            # Of next to no beat, any harmonics explain all; and any samples, if a frame is taken in about each beat.
+            limit = 0.15 if given.frequency * length < 1.0 or wanted * step < 0.5 else limit
         elif ratio == 1e-3 and given.frequency * step > MANY_BEATS:
             limit = max(limit, 1.5 * given.left)
         elif given.left < (REFUSED if ratio == 0.5 else 0.2):
@@ -155,10 +161,23 @@ def _by_ratio(recording: Recording, index: int, times: Array, values: Array, giv
             found.append(Candidate(best, _time_unit(recording, given, best, cause, factor)))
             continue
         certain = recording.kind == "tracks" and (ratio != 0.5 or _slow(times, values, best.frequency))
+        certain &= _overlap(times, best.frequency) >= CERTAIN_OVERLAP
         exact = Repeat(best.frequency if abs(best.frequency / wanted - 1) > 0.01 else wanted, best.left)
         wrong = _other(recording, index, given, exact, strobe=False, certain=certain, cause=cause)
         found.append(Candidate(best, wrong))
     return found
+
+
+def _overlap(times: Float[Array, " T"], frequency: float) -> float:
+    """Return the fraction of samples near whose phase there is a sample of another beat of ``frequency`` (Hz).
+
+    Harmonics explain any motion whose phases are seen once: that of a bird that turns, in little more than a beat.
+    """
+    beats = (times - times[0]) * frequency
+    apart = beats[:, None] - beats[None, :]
+    other = np.abs(np.round(apart)) >= 1
+    near = np.abs(apart - np.round(apart)) < 1 / (4 * HARMONICS)
+    return float((other & near).any(axis=1).mean())
 
 
 def _only_even(times: Array, values: Array, given: Repeat) -> bool:

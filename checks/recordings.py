@@ -10,7 +10,7 @@ import numpy as np
 from wingfit.checks.harmonics import fit
 from wingfit.checks.mistake import Mistake
 from wingfit.records import AnyDataset, AnyRecording, Dataset, Recording
-from wingfit.records.array_types import Array
+from wingfit.records.array_types import Array, Mask
 
 WHOLE = 0.85  # beats: of less, a recording is remarked on
 UNSTEADY = 0.45  # amplitude in one part of a recording over that in another
@@ -100,16 +100,23 @@ def _unsteady(recording: Recording) -> Mistake | None:
     times = recording.times
     edges = np.linspace(times[0], times[-1], len(sizes) + 1)
     parts = [f"{edges[k]:.4g} to {edges[k + 1]:.4g} s" for k in np.flatnonzero(weak)[:3]]
-    strong = np.flatnonzero(~weak)
+    first, last = _longest(~weak)
     return Mistake(
         "unsteady",
         f"recording {recording.name!r}",
-        f"moves with {100 * np.nanmin(share):.0f} % of its usual amplitude in a part ({', '.join(parts)})",
+        f"moves with {100 * max(np.nanmin(share), 0.0):.0f} % of its usual amplitude in a part ({', '.join(parts)})",
         "the same beat throughout",
         "the rig starts, stops or glides there",
-        f"dataset.yaml, this recording: window_s: [{edges[strong[0]]:.6g}, {edges[strong[-1] + 1]:.6g}], the part in "
-        "which it flaps steadily",
+        f"dataset.yaml, this recording: window_s: [{edges[first]:.6g}, {edges[last + 1]:.6g}], the longest part "
+        "in which it flaps steadily",
     )
+
+
+def _longest(steady: Mask) -> tuple[int, int]:
+    """Return the first and the last place of the longest run of true values in ``steady`` [P], of which one is true."""
+    ends = np.flatnonzero(np.diff(np.concatenate([[0], steady.astype(np.int8), [0]])))
+    runs = [(int(start), int(end) - 1) for start, end in zip(ends[::2], ends[1::2], strict=True)]
+    return max(runs, key=lambda run: run[1] - run[0])
 
 
 def gains(recording: Recording) -> Array | None:

@@ -27,10 +27,15 @@ _DIGITS = 12  # significant: of a computed number, so that 0.49 does not become 
 def repaired(source: FilePath, target: FilePath, mistakes: Sequence[Mistake]) -> list[Edit]:
     """Write a copy of the dataset ``source`` to the new folder ``target`` with the edits of ``mistakes``; return these.
 
-    DatasetError if ``target`` exists and is not an empty folder, or if a key that is to be changed is not in the file.
+    DatasetError if ``target`` exists and is not an empty folder, is inside the source, or cannot be written, or if a
+    key that is to be changed is not in the file.
     """
     if target.exists() and (not target.is_dir() or any(target.iterdir())):
         raise fail(str(target), None, "exists and is not an empty folder; choose a new name: nothing is overwritten")
+    folder = source.parent if source.name == DESCRIPTION else source
+    if folder.resolve() in target.resolve().parents:
+        message = f"is inside {folder}, which stays as it is; choose a new name outside"
+        raise fail(str(target), None, message)
     files = _files(source)
     edits = [edit for mistake in mistakes for edit in mistake.edits]
     files[DESCRIPTION] = _described(files[DESCRIPTION], [edit for edit in edits if isinstance(edit, KeyEdit)])
@@ -38,10 +43,14 @@ def repaired(source: FilePath, target: FilePath, mistakes: Sequence[Mistake]) ->
         if isinstance(edit, TableEdit):
             name = f"{RECORDINGS}/{edit.recording}.csv"
             files[name] = _altered(files[name], edit)
-    for name, data in files.items():
-        place = target / name
-        place.parent.mkdir(parents=True, exist_ok=True)
-        place.write_bytes(data)
+    try:
+        for name, data in files.items():
+            place = target / name
+            place.parent.mkdir(parents=True, exist_ok=True)
+            place.write_bytes(data)
+    except OSError as error:
+        message = f"cannot be written: {error.strerror or error}; choose a folder that you may write to"
+        raise fail(str(target), None, message) from error
     return edits
 
 

@@ -103,13 +103,14 @@ def check(
 
     try:
         dataset, mistakes = check_dataset(path)
-        if fix is not None:
-            _fix(path, fix, mistakes)
-            return
     except ValueError as error:
-        faults = [vars(fault) for fault in getattr(error, "errors", [])]
-        detail = f"{len(faults)} errors" if faults else str(error)
-        raise WingfitError(f"{path} is not a valid dataset", detail, errors=faults) from error
+        raise _refused(f"{path} is not a valid dataset", error) from error
+    if fix is not None:
+        try:
+            _fix(path, fix, mistakes)
+        except ValueError as error:
+            raise _refused("no corrected copy was written", error) from error
+        return
     remarks((str(one) for one in mistakes if not one.certain), "warning")
     certain = [vars(one.fault) for one in mistakes if one.certain]
     if certain:
@@ -117,6 +118,15 @@ def check(
         hint = f"; for a corrected copy: wingfit datasets check {path} --fix NEW_FOLDER" if fixable else ""
         raise WingfitError(f"{path} has mistakes", f"{len(certain)} errors{hint}", errors=certain)
     _valid(path, dataset)
+
+
+def _refused(title: str, error: ValueError) -> WingfitError:
+    faults = [vars(fault) for fault in getattr(error, "errors", [])]
+    count = getattr(error, "count", len(faults))
+    detail = f"{count} errors" if faults else str(error)
+    return WingfitError(
+        title, detail + (f", of which {len(faults)} are listed" if count > len(faults) else ""), errors=faults
+    )
 
 
 def _fix(path: Path, target: Path, mistakes: Sequence[Mistake]) -> None:

@@ -103,6 +103,7 @@ def read_columns(
     ``names`` are those of all columns; the other arguments and DatasetError are as in read_samples.
     """
     numbers, lines, faults, blank, width = array("d"), array("q"), Faults(), 0, len(names)
+    left_out = 0
     for line, cells in rows:
         if not any(cells):
             blank = blank or line
@@ -115,6 +116,8 @@ def read_columns(
         elif keep is None or keep(cells):
             numbers.extend(_row(cells, wanted, names, source, line, decimal, faults))
             lines.append(line)
+        else:
+            left_out += 1
         if faults.full:
             break
         if len(lines) > MAX_ROWS or len(numbers) > MAX_TRACK_VALUES:
@@ -122,6 +125,9 @@ def read_columns(
             check_most(source.file, "has at least", len(numbers), MAX_TRACK_VALUES, "numbers", "export fewer markers")
     faults.raise_any()
     if not lines:
+        if left_out:
+            message = f"no row has these values ({left_out} rows were read); compare them with the cells of the file"
+            raise fail("--rows", 0, message)
         raise fail(source.file, 0, "has no frames: no line of numbers was read; export it again")
     return np.frombuffer(numbers, dtype=np.float64).reshape(len(lines), -1), np.array(lines, dtype=np.int64)
 
@@ -188,12 +194,12 @@ def number_of(cell: str, decimal: Decimal = "point") -> float:
 def _not_a_number(text: str, decimal: Decimal) -> str:
     """Return what is wrong with the cell ``text``, which is no number, with the remedy."""
     if _INFINITE.fullmatch(text):
-        return f"is {text!r}; it must be a finite number, or an empty cell where the marker was not seen"
+        return f"is {text!r}; it must be a finite number, or an empty cell where nothing was measured"
     if decimal == "comma" and _NUMBER.fullmatch(text):
         return f"is {shown(text)!r}, with a decimal point; leave --decimal comma out, or export the file again"
     if _THOUSANDS.fullmatch(text):
         return f"is {text!r}, with a separator of thousands; export the numbers without one"
-    return f"is {shown(text)!r}; it must be a number, or an empty cell where the marker was not seen"
+    return f"is {shown(text)!r}; it must be a number, or an empty cell where nothing was measured"
 
 
 def _ragged(cells: list[str], width: int) -> str:

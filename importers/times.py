@@ -16,6 +16,7 @@ from wingfit.records.errors import DatasetError, Faults, fail
 _SAME_RATE = 1e-4  # relative: "119.88" and 119.8801 are the same rate, 119.88 and 120 are not
 _MOST_DECIMALS = 9
 _ROUNDING = 0.51  # of the last decimal of a printed time
+_FURTHEST = 0.3  # frame intervals between a printed time and its frame; beyond, it may belong to the next frame
 _DRIFT = 1e-6  # relative: of times that a program computed in single precision
 
 
@@ -198,11 +199,15 @@ def _steps(printed: Array, hertz: float, raw: Raw) -> Array | None:
     if raw.frames is not None:
         steps = (raw.frames - raw.frames[0]).astype(np.float64)
     else:
-        steps = np.round(since * hertz)
+        nearest = np.round(since * hertz)
         consecutive = np.arange(len(printed), dtype=np.float64)
         # Times that are rounded so that they repeat: frames are consecutive if that fits as well.
-        steps = consecutive if (np.abs(since - consecutive / hertz) <= 2 * tolerance).all() else steps
+        in_order = bool((np.abs(since - consecutive / hertz) <= 2 * tolerance).all())
+        steps = consecutive if in_order else nearest
         if (np.diff(steps) <= 0).any() or np.gcd.reduce(np.diff(steps).astype(np.int64)) != 1:
+            return None
+        # Any time is near some multiple of a frame interval that is shorter than the rounding.
+        if not in_order and (np.abs(since * hertz - steps) > _FURTHEST).any():
             return None
     # The first printed time is rounded, too.
     return steps if (np.abs(since - steps / hertz) <= 2 * tolerance).all() else None

@@ -10,6 +10,7 @@ import numpy as np
 
 from wingfit.importers.axes import read_axes
 from wingfit.importers.forces.channels import FORCE_UNITS, Channels, force_unit
+from wingfit.importers.limits import MAX_FORCE
 from wingfit.importers.options import Given
 from wingfit.importers.raw import Raw
 from wingfit.importers.times import resolve_times
@@ -146,6 +147,8 @@ def resolve(channels: Channels, options: ForceOptions, file: str) -> ImportedFor
     newtons = {role: values * factors[role] for role, values in channels.values.items()}
     x, z, remarks = _body_axes(newtons, balance, options, file)
     found: list[tuple[ForceAxis, Array]] = [(axis, one) for axis, one in (("x", x), ("z", z)) if one is not None]  # type: ignore[misc]
+    _check_forces(newtons, channels, file)
+    _check_start(options.start_s, timing.times)
     times = timing.times - (options.start_s or 0.0)
     if options.start_s is None:
         remarks.append("time 0 of a dataset is the start of a beat; give it: --start-s, in seconds of the file")
@@ -305,6 +308,36 @@ def _body_axes(
     pitch = math.radians(options.body_pitch_deg or 0.0)
     c, s = math.cos(pitch), math.sin(pitch)
     return c * fore - s * down, s * fore + c * down, remarks
+
+
+def _check_forces(newtons: dict[str, Array], channels: Channels, file: str) -> None:
+    """Raise DatasetError for a force (N) that no balance for wings measures, or if all forces are exactly zero."""
+    faults = Faults()
+    for role, values in newtons.items():
+        far = np.flatnonzero(np.abs(values) > MAX_FORCE)
+        if len(far):
+            at, name = int(far[0]), channels.names[role]
+            message = f"is {values[at]:g} N; at most {MAX_FORCE:g} N are plausible: check the unit, or empty the cell"
+            faults.add(
+                f"{file}, {channels.line_word} {channels.lines[at]}, column {name!r}", f"{values[at]:g}", message
+            )
+    faults.raise_any()
+    if all((values[np.isfinite(values)] == 0).all() for values in newtons.values()):
+        message = (
+            "all forces are exactly 0 N: nothing was measured; choose other columns (--columns), or export it again"
+        )
+        raise fail(file, 0, message)
+
+
+def _check_start(start: float | None, times: Float[Array, " T"]) -> None:
+    """Raise DatasetError if the beat starts outside the recording: every beat does as well, so one inside is meant."""
+    first, last = float(times[0]), float(times[-1])
+    if start is not None and not first <= start <= last:
+        message = (
+            f"is {start:g} s; it must lie in [{first:g}, {last:g}] s, the times of the file: give seconds, and any "
+            "beat that starts inside"
+        )
+        raise fail("--start-s", start, message)
 
 
 def _check_even(times: Float[Array, " T"], channels: Channels, file: str) -> None:

@@ -80,7 +80,8 @@ def _header(source: Source, asked: dict[str, str] | None) -> tuple[int, str, lis
             if asked is not None and set(asked.values()) <= set(cells):
                 return line, separator, cells
     if asked is not None:
-        known = {cell for line in range(1, len(source.head) + 1) for cell in source.cells(line) if cell}
+        cells_of = (source.cells(line) for line in range(1, len(source.head) + 1))
+        known = {cell for cells in cells_of for cell in cells if cell and not _is_number(cell, "point")}
         missing = next((name for name in asked.values() if name not in known), next(iter(asked.values())))
         message = f"no line of the first {len(source.head)} has all columns {', '.join(asked.values())}"
         raise fail("--columns", missing, f"{message}; {missing!r}: {nearest(missing, sorted(known))}")

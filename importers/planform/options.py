@@ -105,8 +105,8 @@ class OutlineOptions:
             ("--accuracy", self.accuracy, LEAST_ACCURACY, MOST_ACCURACY, ""),
         ):
             if value is not None and not low <= value <= high:
-                limits = f"it must lie in [{low:g}, {high:g}] {unit}".rstrip()
-                faults.add(option, value, f"is {value:g} {unit}; {limits}")
+                found, limits = f"{value:g} {unit}".rstrip(), f"[{low:g}, {high:g}] {unit}".rstrip()
+                faults.add(option, value, f"is {found}; it must lie in {limits}")
         if self.structure not in (None, *get_args(Structure)):
             faults.add(
                 "--structure", self.structure, f"is {self.structure!r}; it must be sheet or rigid, or be left out"
@@ -117,4 +117,5 @@ class OutlineOptions:
         if self.origin is not None and not all(map(math.isfinite, self.origin)):
             faults.add("--origin", self.origin, "must be two finite numbers, such as 12.5,3")
         if self.marker_grid is not None and not all(1 <= count <= 100 for count in self.marker_grid):
-            faults.add("--marker-grid", self.marker_grid, "must be two numbers from 1 to 100, such as 4x3")
+            given = "x".join(map(str, self.marker_grid))
+            faults.add("--marker-grid", given, f"is {given}; it must be two numbers from 1 to 100, such as 4x3")

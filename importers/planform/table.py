@@ -104,7 +104,7 @@ def _numbers(
                     raise ValueError("is empty; an outline needs a number in each cell: remove the row, or fill it in")
                 row.append(value)
             except ValueError as error:
-                words = str(error).replace(", or an empty cell where the marker was not seen", "")
+                words = str(error).replace(", or an empty cell where nothing was measured", "")
                 faults.add(source.at(line, name), text, words)
         rows.append(row)
         check_most(source.file, "has at least", len(rows), MAX_POINTS, "points", "keep fewer")

@@ -43,7 +43,8 @@ def _problem(name: str, known: Sequence[str]) -> str | None:
     if match and match["marker"] in known:
         return None
     if match:
-        return f"no marker is called {match['marker']!r} in dataset.yaml; {nearest(match['marker'], known)}"
+        hint = f"{nearest(match['marker'], known)}; or remove the column"
+        return f"no marker is called {match['marker']!r} in dataset.yaml; {hint}"
     other = _OTHER_UNIT.fullmatch(name)
     if other and other["marker"] in known:
         wanted = f"{other['marker']}_{other['axis'].lower()}_m"

@@ -13,9 +13,10 @@ from tests.checks.samples import good_vehicle, good_wing
 from tests.oracles.mistakes import KINDS
 from wingfit.checks import DatasetWarning, check_dataset, examine, load_dataset
 from wingfit.checks.repair import repaired
-from wingfit.records import Dataset, DatasetError, save_dataset
+from wingfit.records import Dataset, DatasetError, Materials, save_dataset
 from wingfit.records import load_dataset as read_dataset
 from wingfit.records.files.folder import contents
+from wingfit.records.wing import Structure
 
 GOOD = {"wing": good_wing(), "vehicle": good_vehicle()}
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -36,6 +37,39 @@ def test_the_examples_have_no_mistake(name: str) -> None:
 @pytest.mark.parametrize("rig", ["wing", "vehicle"])
 def test_good_datasets_have_no_mistake(rig: str) -> None:
     assert examine(GOOD[rig]) == ()
+
+
+@pytest.mark.parametrize("structure", ["rigid", "sheet"])
+def test_a_wing_without_rods_is_checked(structure: Structure) -> None:
+    """It has no rear rod whose lag could be compared; all other checks hold for it as well."""
+    rods = good_wing()
+    plain = replace(rods.wing, structure=structure, rods=(), driven_rods=(), materials=Materials(0.0, 1.1))
+    unlagged = tuple(replace(one, condition=replace(one.condition, phase_lag=0.0)) for one in rods.recordings)
+    assert examine(Dataset("animal", plain, unlagged)) == ()
+    inches = tuple(replace(one, values=one.values / 0.0254) for one in unlagged)
+    assert {one.kind for one in examine(Dataset("animal", plain, inches))} == {"length unit"}
+
+
+def test_what_frames_do_not_show_is_not_compared_with_the_drive() -> None:
+    """Eight frames in a third of the beat fit any amplitude: even 1700 degrees, as if the drive were in radians."""
+    good = good_wing()
+    first = good.recordings[1]
+    few = replace(first, times=first.times[0] + np.arange(8) * 0.004, values=first.values[:8])
+    assert not {one.kind for one in examine(replace(good, recordings=(few,)))} & {"amplitude", "mean angle"}
+
+
+def test_the_longest_steady_part_is_proposed_as_window() -> None:
+    """A rig that glides twice: the window does not span the glides."""
+    good = good_wing()
+    first = good.recordings[0]
+    count = len(first.times)
+    still = np.zeros(count, dtype=bool)
+    still[count // 8 : count // 4] = True
+    mean = np.nanmean(first.values, axis=0)
+    glides = replace(first, values=np.where(still[:, None], mean, first.values))
+    remark = next(one for one in examine(replace(good, recordings=(glides,))) if one.kind == "unsteady")
+    start = float(remark.change.partition("window_s: [")[2].partition(",")[0])
+    assert start >= first.times[0] + 0.2 * np.ptp(first.times)
 
 
 CAUGHT = [

@@ -40,6 +40,20 @@ def test_a_multiple_of_the_rate_contradicts_times_without_numbers_of_frames() ->
     assert read(table(), rate_hz=100).rate_hz == pytest.approx(100)
 
 
+@pytest.mark.parametrize("rate", [33.0, 333.0, 70.0])
+def test_a_rate_does_not_fit_times_only_because_these_are_printed_coarsely(rate: float) -> None:
+    tenths = "".join(f"{t / 10},{t},1,2\n" for t in range(12))
+    message = refused("time_s,tip_x_mm,tip_y_mm,tip_z_mm\n" + tenths, rate_hz=rate)
+    assert f"is {rate:g} Hz, but file.dat states 10 Hz" in message
+
+
+def test_dropped_frames_are_found_in_rounded_times() -> None:
+    frames = [t for t in range(30) if t != 7]
+    rows = "".join(f"{t / 240:.3f},{t},1,2\n" for t in frames)
+    found = read("time_s,tip_x_mm,tip_y_mm,tip_z_mm\n" + rows, rate_hz=240)
+    assert found.times[-1] == pytest.approx(29 / 240, abs=1e-12)
+
+
 def test_frames_that_were_dropped_leave_a_step_in_time() -> None:
     lines = text_writers.vicon(flapping(rate=100.0), devices=False).splitlines(keepends=True)
     found = read("".join(lines[:10] + lines[13:]))

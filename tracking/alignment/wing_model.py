@@ -43,7 +43,8 @@ class Strip:
         span: from root to tip.
         chord: largest.
         plane: Z of the middle plane.
-        line: [2] e_0 and e_1 of the line along the front driven rod, near which a wing twists.
+        line: [2] e_0 and e_1 of the line near which a wing twists: along the front driven rod; of a wing without rods,
+            through the middles of the chords, which is where an even sheet twists.
     """
 
     root: float
@@ -55,11 +56,22 @@ class Strip:
 
 def strip_of(wing: Wing) -> Strip:
     """Return the strip of ``wing``."""
-    front = next(rod for rod in wing.rods if rod.name == wing.driven_rods[0])
-    slope = (front.x_tip - front.x_root) / (front.y_tip - front.y_root) if front.y_tip != front.y_root else 0.0
-    line = (front.x_root + slope * (wing.hinge.y - front.y_root), slope * wing.span)
+    y, x, slope = _twisted_about(wing)
+    line = (x + slope * (wing.hinge.y - y), slope * wing.span)
     chord = max(station.chord for station in wing.stations)
     return Strip(wing.stations[0].y - wing.hinge.y, wing.span, chord, -wing.hinge.z, line)
+
+
+def _twisted_about(wing: Wing) -> tuple[float, float, float]:
+    """Return a point y, x (m) of the line that the wing twists about, and its slope dx/dy."""
+    if not wing.driven_rods:
+        y = np.array([station.y for station in wing.stations])
+        middles = np.array([station.leading_edge + station.chord / 2 for station in wing.stations])
+        slope, start = np.polyfit(y, middles, 1)
+        return 0.0, float(start), float(slope)
+    front = next(rod for rod in wing.rods if rod.name == wing.driven_rods[0])
+    slope = (front.x_tip - front.x_root) / (front.y_tip - front.y_root) if front.y_tip != front.y_root else 0.0
+    return front.y_root, front.x_root, slope
 
 
 def positions(strip: Strip, rest: Array, states: Array, line: Array) -> tuple[Array, Array, Array, Array]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -12,6 +13,7 @@ from tests.oracles.alignment import Unsettled, grid_wing, rigid, tracks_of, unse
 from tests.tracking.alignment.recorded import Filmed, filmed, turned_by
 from wingfit import DatasetError
 from wingfit.records.array_types import Array
+from wingfit.records.wing import Structure
 from wingfit.tracking.alignment import AlignedTracks, Known, Tracks, align
 
 
@@ -142,6 +144,18 @@ def test_a_statement_settles_it() -> None:
     axis = int(np.argmax(np.abs(up)))
     direction = ("" if up[axis] > 0 else "-") + "xyz"[axis]
     assert align(tracks_of(positions), wing, Known(up=direction)).side == "right"
+
+
+@pytest.mark.parametrize("structure", ["rigid", "sheet"])
+def test_a_wing_without_rods_is_aligned(structure: Structure) -> None:
+    wing = grid_wing(4, flat=False, symmetric=False)
+    animal = replace(wing, structure=structure, rods=(), driven_rods=())
+    tracks = tracks_of(rigid(wing))
+    with_rods, without = align(tracks, wing, Known()), align(tracks, animal, Known())
+    assert without.side == with_rods.side == "right"
+    assert without.markers == with_rods.markers
+    assert np.abs(without.rotation - with_rods.rotation).max() < 0.002  # rad
+    assert np.abs(without.positions - with_rods.positions).max() < 5e-4  # m
 
 
 def test_wrong_statements_are_listed() -> None:
