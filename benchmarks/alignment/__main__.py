@@ -11,7 +11,9 @@ from __future__ import annotations
 import argparse
 import json
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -88,10 +90,18 @@ def main() -> None:
     parser.add_argument("--trials", type=int, default=TRIALS)
     parser.add_argument("--seed", type=int, default=0)
     given = parser.parse_args()
+    print(json.dumps(run((lambda _: None) if given.json else print, given.trials, given.seed)))
+
+
+def run(say: Callable[[str], None], trials: int = TRIALS, seed: int = 0) -> dict[str, Any]:
+    """Align ``trials`` recordings and try what nobody can align; return the JSON object.
+
+    ``say``: called with a line about each; ``seed``: of the first recording, the others follow.
+    """
     began = time.monotonic()
     scores, refused = list[Score](), list[str]()
-    for number in range(given.trials):
-        trial = make(given.seed + number)
+    for number in range(trials):
+        trial = make(seed + number)
         try:
             scores.append(score(trial, aligned(trial)))
             one = scores[-1]
@@ -99,16 +109,14 @@ def main() -> None:
             text = f"{one.rotation:.2f} deg {one.offset:.2f} mm, {parts}"
             text += "" if one.side else " WRONG SIDE"
         except DatasetError as error:
-            refused.append(f"{given.seed + number} {trial.label}: {error}")
+            refused.append(f"{seed + number} {trial.label}: {error}")
             text = f"refused: {error}"
-        if not given.json:
-            print(f"{given.seed + number:3d} {trial.label}: {text}", flush=True)
-        show_count("alignment", number + 1, given.trials, began)
+        say(f"{seed + number:3d} {trial.label}: {text}")
+        show_count("alignment", number + 1, trials, began)
     sure = [(case, answer) for case in unsettled() if (answer := _answer(case)) is not None]
-    if not given.json:
-        for case, answer in sure:
-            print(f"not refused: {case.name}: {answer}")
-    print(json.dumps(_summary(scores, refused, len(sure), given.trials, time.monotonic() - began)))
+    for case, answer in sure:
+        say(f"not refused: {case.name}: {answer}")
+    return _summary(scores, refused, len(sure), trials, time.monotonic() - began)
 
 
 def _answer(case: Unsettled) -> str | None:
@@ -120,7 +128,7 @@ def _answer(case: Unsettled) -> str | None:
     return f"{found.side} wing, {len(found.markers)} markers"
 
 
-def _summary(scores: list[Score], refused: list[str], sure: int, trials: int, seconds: float) -> dict[str, object]:
+def _summary(scores: list[Score], refused: list[str], sure: int, trials: int, seconds: float) -> dict[str, Any]:
     rotation, offset = (np.array([getattr(one, name) for one in scores]) for name in ("rotation", "offset"))
     z = np.array([one.z for one in scores])
     summary = {

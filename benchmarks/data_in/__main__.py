@@ -1,179 +1,90 @@
-"""Proves the importers: ``python -m benchmarks.data_in [--json] [--seeds N] [--mutations N] [--only FORMAT]``.
+"""Proves what reads and judges the data of a user: ``python -m benchmarks.data_in [--json] [--only-formats]``.
 
-1. For every format, files are written by code that shares nothing with the importers (vendors' layouts, h5py, ezc3d
-   where it is installed) and read again: names, times, gaps and positions must be those that were written.
-2. Files that do not state unit or rate, and options that contradict the file, must be refused with a message that names
-   the option. Each that is accepted counts as a silent guess.
-3. Files are changed at random. Whatever happens other than tracks (complete, finite, with increasing times) or a
-   DatasetError with a remedy, counts as a crash.
-4. C3D files are cut off at random: how many are read without a word about missing frames, here and by ezc3d.
+Three parts, of which ``--parts`` chooses some. ``formats``: files of other programs, intact and damaged
+(benchmarks/data_in/formats.py). ``mistakes``: deliberate mistakes in datasets, and good datasets
+(benchmarks/mistakes). ``alignment``: tracks in any camera axes (benchmarks/alignment). Together they take 20 minutes.
 
-The last line is one JSON object.
+The last line is one JSON object with the keys of all parts that ran. The exit status is 1 if a file is read wrongly, is
+guessed or crashes an importer, if a good dataset has a finding, or if an alignment is falsely sure.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
-import random
-import resource
 import sys
 import time
-import traceback
-import warnings
-from collections import Counter
-from dataclasses import replace
+from collections.abc import Callable
 from typing import Any
 
-import numpy as np
+from benchmarks.data_in import formats
 
-from benchmarks.data_in.binary_writers import have_ezc3d
-from benchmarks.data_in.cases import Case, cases, refusals
-from benchmarks.data_in.cut_off import read_without_a_word
-from benchmarks.data_in.mutate import mutated
-from wingfit.importers import Given, ImportedTracks, import_bytes
-from wingfit.records import DatasetError
-
-MISLEADING = "recording.dat"  # a name from which no format follows
-SEEDS, MUTATIONS = 6, 1500
-SLOW_S = 60.0
-SLEAP_SHARE = 0.04  # of the changed files: each starts a process
+Say = Callable[[str], None]
 
 
-def measure(case: Case) -> float:
-    """Return the largest error of a position, mm; infinity if names, gaps, times or format differ."""
-    found = import_bytes(case.raw, MISLEADING, Given(**case.options))
-    truth = case.truth
-    names = truth.names if case.named else found.markers
-    times = case.start_s + np.arange(truth.frames) / truth.rate
-    same = found.format == case.format and set(found.markers) == set(names) and len(found.times) == truth.frames
-    if not same or np.abs(found.times - times).max() > 1e-6:
-        return float("inf")
-    positions = found.positions[:, [found.markers.index(name) for name in names]]
-    gaps = np.isnan(truth.mm)
-    if not np.array_equal(np.isnan(positions), gaps) or found.gaps.total != int(gaps.any(axis=2).sum()):
-        return float("inf")
-    return float(np.abs(positions * 1e3 - truth.mm)[~gaps].max())
+def of_formats(options: argparse.Namespace, say: Say) -> tuple[dict[str, Any], bool]:
+    """Return the measurements of the formats, and whether all went well."""
+    result, notes = formats.run(options.seeds, options.mutations, options.only)
+    for note in notes:
+        print(note, file=sys.stderr)
+    for row in result["formats"]:
+        guesses = f"{row['silent_guesses']} silent guesses in {row['must_refuse']}"
+        say(f"{row['format']:<14}{row['files']:>4} files, error {row['max_error_mm']:.1e} mm, {guesses}")
+    return result, not notes
 
 
-def guessed(seed: int, only: str | None) -> tuple[Counter[str], Counter[str], list[str]]:
-    """Return counts by format of the files that must be refused, of those that were not, and what went wrong."""
-    tried, silent, notes = Counter[str](), Counter[str](), []
-    for refusal in refusals(seed):
-        if only and refusal.format != only:
-            continue
-        tried[refusal.format] += 1
-        try:
-            import_bytes(refusal.raw, MISLEADING, Given(**refusal.options))
-            silent[refusal.format] += 1
-            notes.append(f"{refusal.format} {refusal.options} was accepted; it should name {refusal.words}")
-        except DatasetError as error:
-            missing = [word for word in refusal.words if word not in str(error)]
-            if missing:
-                silent[refusal.format] += 1
-                notes.append(f"{refusal.format} {refusal.options}: {missing} is not in the message: {error}")
-    return tried, silent, notes
+def of_mistakes(options: argparse.Namespace, say: Say) -> tuple[dict[str, Any], bool]:
+    """Return how many mistakes are caught, and whether there is no false alarm."""
+    from benchmarks.mistakes import __main__ as mistakes  # simulators, which do not belong to the importers' memory
+
+    good = (options.good or mistakes.WINGS, options.good or mistakes.VEHICLES)
+    result = mistakes.run(say, tried=options.tried or mistakes.TRIED, only=options.kind, good=good)
+    return result, result["false_alarms"] == 0
 
 
-def outcome(raw: bytes, given: Given) -> str:
-    """Return "read", "refused", or what went wrong."""
-    started = time.monotonic()
-    warnings.simplefilter("error")  # a warning that nobody expected is a fault, too
-    try:
-        found = import_bytes(raw, MISLEADING, given)
-        bad = _wrong(found)
-    except DatasetError as error:
-        bad = "" if all(one.where and one.message for one in error.errors) else "an error without place or message"
-        return bad or ("refused" if time.monotonic() - started < SLOW_S else "slow")
-    except Exception:
-        return traceback.format_exc()
-    return bad or ("read" if time.monotonic() - started < SLOW_S else "slow")
+def of_alignment(options: argparse.Namespace, say: Say) -> tuple[dict[str, Any], bool]:
+    """Return how well tracks are aligned, and whether no alignment is falsely sure."""
+    from benchmarks.alignment import __main__ as alignment
+
+    result = alignment.run(say, options.trials or alignment.TRIALS)
+    return result, result["alignment"]["falsely_sure"] == 0
 
 
-def _wrong(found: ImportedTracks) -> str:
-    whole = np.isfinite(found.positions).all(axis=2) | np.isnan(found.positions).all(axis=2)
-    fine = whole.all() and np.isfinite(found.times).all() and (np.diff(found.times) > 0).all()
-    return "" if fine and len(set(found.markers)) == len(found.markers) else "tracks that break the contract"
-
-
-def fuzz(count: int, seed: int, only: str | None) -> tuple[Counter[str], list[str]]:
-    """Change ``count`` files at random; return counts of outcomes, and descriptions of crashes."""
-    dice = random.Random(seed)  # noqa: S311  # no secret
-    bases = [case for case in cases(seed) if not only or case.format == only]
-    raws = [case.raw for case in bases]
-    text = [case for case in bases if case.format != "sleap"] or bases
-    sleap = [case for case in bases if case.format == "sleap"] or bases
-    outcomes, crashes = Counter[str](), []
-    for number in range(count):
-        case = dice.choice(sleap if dice.random() < SLEAP_SHARE else text)
-        raw = mutated(case.raw, raws, dice)
-        given = Given(**case.options)
-        if dice.random() < 0.3:  # without options, and with other ones
-            given = replace(given, unit=None, rate_hz=None, keep_zeros=True, keep_unlabelled=True, incomplete=True)
-        result = outcome(raw, given)
-        outcomes[result if result in ("read", "refused") else "crash"] += 1
-        if result not in ("read", "refused"):
-            crashes.append(f"{case.format}, file {number} of seed {seed}: {result}")
-    return outcomes, crashes
-
-
-def run(seeds: int, mutations: int, only: str | None) -> tuple[dict[str, Any], list[str]]:
-    """Return the measurements, and lines about everything that went wrong."""
-    notes, errors, files = list[str](), dict[str, float](), Counter[str]()
-    tried, silent = Counter[str](), Counter[str]()
-    for seed in range(seeds):
-        for case in cases(seed):
-            if only and case.format != only:
-                continue
-            files[case.format] += 1
-            try:
-                error = measure(case)
-            except DatasetError as refused:
-                error = float("inf")
-                notes.append(f"{case.format} {case.options}: {refused}")
-            errors[case.format] = max(errors.get(case.format, 0.0), error)
-    tried, silent, wrong = guessed(0, only)
-    outcomes, crashes = fuzz(mutations, 1, only)
-    formats = [
-        {
-            "format": name,
-            "files": files[name],
-            "max_error_mm": errors[name],
-            "must_refuse": tried[name],
-            "silent_guesses": silent[name],
-        }
-        for name in files
-    ]
-    result = {
-        "formats": formats,
-        "mutated_files": sum(outcomes.values()),
-        "mutated_read": outcomes["read"],
-        "mutated_refused": outcomes["refused"],
-        "crashes": outcomes["crash"],
-        "c3d_cut_off": read_without_a_word(),
-        "c3d_written_by": "ezc3d and by hand" if have_ezc3d() else "by hand; ezc3d is not installed",
-        "peak_memory_mib": round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024),
-    }
-    return result, [*notes, *wrong, *crashes]
+PARTS = {"formats": of_formats, "mistakes": of_mistakes, "alignment": of_alignment}
 
 
 def main() -> None:
-    """Measure, print what went wrong, a table, and one JSON object; exit with 1 if anything is wrong."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    """Measure, print what went wrong, tables, and one JSON object; exit with 1 if anything is wrong."""
+    options = _options()
+    say: Say = (lambda _: None) if options.json else print
+    whole, seconds, fine = dict[str, Any](), dict[str, float](), True
+    for part in options.parts:
+        began = time.monotonic()
+        result, well = PARTS[part](options, say)
+        whole, fine = {**whole, **result}, fine and well
+        seconds[part] = round(time.monotonic() - began, 1)
+    print(json.dumps({**whole, "seconds": seconds}))
+    sys.exit(0 if fine else 1)
+
+
+def _options() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.data_in", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--json", action="store_true", help="print the JSON object only")
-    parser.add_argument("--seeds", type=int, default=SEEDS, help="sets of files of every format")
-    parser.add_argument("--mutations", type=int, default=MUTATIONS, help="files that are changed at random")
-    parser.add_argument("--only", help="only this format")
+    parser.add_argument("--parts", nargs="+", choices=PARTS, default=list(PARTS), help="leave out the other parts")
+    parser.add_argument("--only-formats", dest="parts", action="store_const", const=["formats"], help="--parts formats")
+    parser.add_argument("--seeds", type=int, default=formats.SEEDS, help="sets of files of every format")
+    parser.add_argument("--mutations", type=int, default=formats.MUTATIONS, help="files that are changed at random")
+    parser.add_argument("--only", metavar="FORMAT", help="only files of this format")
+    parser.add_argument("--tried", type=int, help="datasets on which each mistake is tried")
+    parser.add_argument("--kind", help="only mistakes whose name contains this")
+    parser.add_argument("--good", type=int, help="good datasets of wings, and as many of vehicles")
+    parser.add_argument("--trials", type=int, help="recordings that are aligned")
     options = parser.parse_args()
-    result, notes = run(options.seeds, options.mutations, options.only)
-    for note in notes:
-        print(note, file=sys.stderr)
-    if not options.json:
-        for row in result["formats"]:
-            print(f"{row['format']:<14}{row['files']:>4} files, error {row['max_error_mm']:.1e} mm, ", end="")
-            print(f"{row['silent_guesses']} silent guesses in {row['must_refuse']}")
-    print(json.dumps(result))
-    sys.exit(1 if notes else 0)
+    if options.only:
+        options.parts = [part for part in options.parts if part == "formats"]
+    return options
 
 
 if __name__ == "__main__":

@@ -12,8 +12,9 @@ import json
 import sys
 import tempfile
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -28,6 +29,7 @@ from wingfit.records.files.folder import contents
 
 KINDS = (*of_wings.KINDS, *of_vehicles.KINDS)
 WINGS, VEHICLES = 34, 26  # good datasets
+SEED = 11
 TRIED = 2  # datasets on which each kind is tried
 
 
@@ -35,31 +37,47 @@ def main() -> None:
     """Run the benchmark as the command line requests."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.mistakes", description=__doc__)
     parser.add_argument("--json", action="store_true", help="print one JSON object as the last line")
-    parser.add_argument("--seed", type=int, default=11, help="of the good datasets")
+    parser.add_argument("--seed", type=int, default=SEED, help="of the good datasets")
     parser.add_argument("--tried", type=int, default=TRIED, help="datasets on which each kind is tried")
     parser.add_argument("--only", help="only kinds whose name contains this")
     arguments = parser.parse_args()
+    answer = run(print, arguments.seed, arguments.tried, arguments.only)
+    if arguments.json:
+        print(json.dumps(answer))
+
+
+def run(
+    say: Callable[[str], None],
+    seed: int = SEED,
+    tried: int = TRIED,
+    only: str | None = None,
+    good: tuple[int, int] = (WINGS, VEHICLES),
+) -> dict[str, Any]:
+    """Try each kind of mistake on ``tried`` datasets, and return the counts of the JSON object.
+
+    ``say``: called with each line of the table; ``seed``: of the good datasets; ``only``: only kinds whose name
+    contains it; ``good``: numbers of good datasets of wings and of vehicles.
+    """
     start = time.perf_counter()
-    good = {"wing": list(wings(WINGS, arguments.seed)), "vehicle": list(vehicles(VEHICLES, arguments.seed))}
-    alarms = list(_alarms(one for each in good.values() for one in each))
-    chosen = [kind for kind in KINDS if not arguments.only or arguments.only in kind.name]
-    rows = {f"{kind.rig}: {kind.name}": _tried(kind, good[kind.rig], arguments.tried) for kind in chosen}
+    examples = {"wing": list(wings(good[0], seed)), "vehicle": list(vehicles(good[1], seed))}
+    alarms = list(_alarms(one for each in examples.values() for one in each))
+    chosen = [kind for kind in KINDS if not only or only in kind.name]
+    rows = {f"{kind.rig}: {kind.name}": _tried(kind, examples[kind.rig], tried) for kind in chosen}
     for name, row in rows.items():
-        print(f"{name:50} caught {row['caught']} of {row['n']}, cause {row['right_cause']}, fixed {row['fixed_right']}")
+        say(f"{name:50} caught {row['caught']} of {row['n']}, cause {row['right_cause']}, fixed {row['fixed_right']}")
     whole = {key: sum(row[key] == row["n"] > 0 for row in rows.values()) for key in ("caught", "right_cause")}
     fixed = sum(row["fixed_right"] == row["n"] > 0 for row in rows.values())
     answer = {
         "mistakes": {"n": len(rows), **whole, "fixed_right": fixed, "by_kind": rows},
         "false_alarms": len(alarms),
-        "good": sum(map(len, good.values())),
+        "good": sum(map(len, examples.values())),
         "seconds": round(time.perf_counter() - start, 1),
     }
-    print("; ".join(f"{key}: {value}" for key, value in answer.items() if key != "mistakes"))
-    print(
+    say("; ".join(f"{key}: {value}" for key, value in answer.items() if key != "mistakes"))
+    say(
         f"{whole['caught']} of {len(rows)} kinds caught, {whole['right_cause']} with the right cause, {fixed} corrected"
     )
-    if arguments.json:
-        print(json.dumps(answer))
+    return answer
 
 
 def _alarms(good: Iterable[Good]) -> Iterable[str]:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from benchmarks.data_in import binary_writers, text_writers
-from benchmarks.data_in.__main__ import fuzz, guessed, measure
 from benchmarks.data_in.cases import Case, cases, refusals
+from benchmarks.data_in.formats import fuzz, guessed, measure
 from benchmarks.data_in.truth import Truth, flapping
 
 __all__ = [
