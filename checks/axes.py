@@ -8,6 +8,7 @@ square).
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import permutations, product
 
 import numpy as np
@@ -21,6 +22,7 @@ FEW = 4  # with fewer markers other axes can fit by chance: they are warned abou
 # In spans, of the misfit of the axes as given: warned about, refused. No elastic wing that flaps is so far from its
 # shape at rest, root mean square over all markers and a whole beat.
 DOUBTFUL, REFUSED = 0.08, 0.15
+ELSEWHERE = 0.5  # spans of that misfit: tracks of something else, such as a person who walks, or in another frame
 BETTER = 0.35  # of that misfit, residual with other axes at most
 UNITS = ((1000.0, "millimetres"), (100.0, "centimetres"), (39.3701, "inches"), (3.28084, "feet"), (0.001, "kilometres"))
 NEAR_UNIT = 1.12  # factor between a measured scale and that of a unit
@@ -41,7 +43,21 @@ def check_shape(tracked: Tracked) -> Mistake | None:
     """Return the likeliest mistake in unit, axes or origin of a recording; None if its shape fits."""
     if not np.isfinite(tracked.positions).any():
         return None
-    return _unit(tracked) or _axes(tracked) or _origin(tracked)
+    found = _unit(tracked) or _axes(tracked) or _origin(tracked)
+    if len(tracked.rest) < FEW or tracked.misfit <= ELSEWHERE * tracked.wing.span:
+        return found
+    return replace(found or _elsewhere(tracked), certain=True)
+
+
+def _elsewhere(tracked: Tracked) -> Mistake:
+    return Mistake(
+        "origin",
+        f"recording {tracked.recording.name!r}",
+        f"the tracks are {tracked.misfit:.3g} m (root mean square) from the rest positions turned about the hinge",
+        f"less than {ELSEWHERE * tracked.wing.span:.3g} m, half of the span; tracks of this wing are within a tenth",
+        "the tracks are those of something else, or in a frame that moves",
+        f"recordings/{tracked.recording.name}.csv: positions of the described markers in the frame of the rig",
+    )
 
 
 def oriented(positions: Float[Array, "... 3"], axes: Axes) -> Array:

@@ -106,3 +106,18 @@ def test_few_markers_are_warned_about_not_refused() -> None:
 
 def test_oriented_takes_columns_with_their_signs() -> None:
     np.testing.assert_array_equal(oriented(np.array([1.0, 2.0, 3.0]), ((2, 0, 1), (1, -1, 1))), [3.0, -1.0, 2.0])
+
+
+def test_tracks_of_something_else_are_refused() -> None:
+    """Markers on a person who walks past the origin: no turn about the hinge brings the wing near to them."""
+    steps = np.linspace(-2.0, 2.0, len(RECORDED[0].times))
+    path = np.stack([0 * steps, steps, 0.3 + 0.05 * np.sin(40 * steps)], axis=1)
+    rest = np.array([marker.position for marker in WING.markers if marker.name in RECORDED[0].markers])
+    upright = rest[:, [0, 2, 1]]
+    walked = replace(RECORDED[0], values=(path[:, None] + upright).reshape(RECORDED[0].values.shape))
+    found = examine(replace(GOOD, recordings=(walked,)))[0]
+    assert (found.kind, found.certain) == ("origin", True)
+    assert "tracks are those of something else" in str(found)
+    few = tuple(RECORDED[0].markers[:3])
+    part = replace(walked, markers=few, values=walked.values.reshape(len(steps), -1, 3)[:, :3].reshape(len(steps), -1))
+    assert not any(one.certain for one in examine(replace(GOOD, recordings=(part,))))
