@@ -217,7 +217,9 @@ def _lag(tracks: Sequence[Tracked], indices: Sequence[int]) -> Iterator[Mistake]
 
 
 def lag_of(tracked: Tracked) -> float:
-    """Lag (rad) of the rear rod behind the front one at the inner third of the markers; NaN if it is not visible."""
+    """Lag (rad) of the rear rod behind the front one at the inner third of the markers; NaN if none can be seen."""
+    if not tracked.wing.driven_rods:
+        return float("nan")
     rods = {rod.name: rod for rod in tracked.wing.rods}
     front, rear = (rods[name].x_root for name in tracked.wing.driven_rods)
     arms = tracked.rest - tracked.hinge

@@ -16,6 +16,7 @@ from wingfit.checks.repair import repaired
 from wingfit.records import Dataset, DatasetError, save_dataset
 from wingfit.records import load_dataset as read_dataset
 from wingfit.records.files.folder import contents
+from wingfit.records.wing import Structure
 
 GOOD = {"wing": good_wing(), "vehicle": good_vehicle()}
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -36,6 +37,16 @@ def test_the_examples_have_no_mistake(name: str) -> None:
 @pytest.mark.parametrize("rig", ["wing", "vehicle"])
 def test_good_datasets_have_no_mistake(rig: str) -> None:
     assert examine(GOOD[rig]) == ()
+
+
+@pytest.mark.parametrize("structure", ["rigid", "sheet"])
+def test_a_wing_without_rods_is_checked_too(structure: Structure) -> None:
+    """It has no rods between which a lag could be seen; everything else is compared."""
+    bare = replace(GOOD["wing"].wing, structure=structure, rods=(), driven_rods=())
+    dataset = replace(GOOD["wing"], rig=bare)
+    assert examine(dataset) == ()
+    first = replace(dataset.recordings[0], values=1e3 * dataset.recordings[0].values)
+    assert "length unit" in {one.kind for one in examine(replace(dataset, recordings=(first,)))}
 
 
 CAUGHT = [
