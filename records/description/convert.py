@@ -127,9 +127,14 @@ def _data(values: Mapping[str, object], model: type[BaseModel]) -> dict[str, obj
     data = dict[str, object]()
     for key, field in model.model_fields.items():
         attribute, unit = _attribute(key, values)
-        if attribute and values[attribute] not in (None, {}, ()):
+        if attribute and not _is_empty(values[attribute]):
             data[key] = _plain(values[attribute], list(models_in(field.annotation)), unit)
     return data
+
+
+def _is_empty(value: object) -> bool:
+    """Return whether ``value`` is None, or a mapping or tuple without items; an array is not compared with them."""
+    return value is None or (isinstance(value, Mapping | tuple) and not value)
 
 
 def _plain(value: Any, models: Sequence[type[BaseModel]], unit: Unit) -> object:
@@ -139,7 +144,7 @@ def _plain(value: Any, models: Sequence[type[BaseModel]], unit: Unit) -> object:
         return to_data(value, next(model for model in models if tag_of(model) == kind))
     if isinstance(value, Mapping):
         return {name: _plain(item, models, unit) for name, item in value.items()}
-    if isinstance(value, (list, tuple)):
+    if isinstance(value, (list, tuple, np.ndarray)):
         return [_plain(item, models, unit) for item in value]
     if (isinstance(value, int) and unit == SI) or not isinstance(value, numbers.Real):
         return value

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from wingfit import DatasetError, load_dataset
+from wingfit import DatasetError, load_dataset, save_dataset
+from wingfit.records import FourierDrive, load_archive, wing_or_vehicle
 from wingfit.records.description.wing_description import read_wing
 
 ROBIRD = Path(__file__).parents[2] / "examples" / "robird"
@@ -39,3 +42,13 @@ def test_errors_have_line_value_and_remedy(tmp_path: Path) -> None:
             read_wing(path)
     with pytest.raises(DatasetError, match="cannot be read"):
         read_wing(tmp_path / "none.yaml")
+
+
+def test_a_drive_of_arrays_is_written(tmp_path: Path) -> None:
+    """A wing that is made in Python may have arrays of harmonics."""
+    whole = wing_or_vehicle(load_dataset(ROBIRD))
+    drive = FourierDrive(0.1, np.array([-0.5, 0.02]), np.array([0.0, 0.1]))  # type: ignore[arg-type]
+    save_dataset(replace(whole, rig=replace(whole.wing, drive=drive)), tmp_path / "arrays.zip")
+    found = wing_or_vehicle(load_archive((tmp_path / "arrays.zip").read_bytes(), "arrays.zip")).wing.drive
+    assert isinstance(found, FourierDrive)
+    np.testing.assert_allclose(found.cosine, (-0.5, 0.02))
