@@ -150,7 +150,7 @@ def _best(tracked: Tracked, close: Sequence[Axes]) -> float:
 
 
 def _against_drive(tracked: Tracked, axes: Axes) -> float:
-    """Distance (rad) of the tracks' flap angle from the drive's, which tells up from down."""
+    """Distance (rad) of the tracks' flap angle from the drive's, which distinguishes up from down."""
     from wingfit.checks.drive import distance  # both modules need each other
 
     return distance(tracked.moved(oriented(tracked.positions, axes)))

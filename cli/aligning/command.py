@@ -41,8 +41,8 @@ def align(
 ) -> None:
     """Find the frame of a wing in tracks of any camera axes, name its markers, and write the tracks in that frame.
 
-    Estimates the hinge from the motion, tells a left wing from a right one, assigns tracks to the described markers,
-    repairs swapped labels, and refuses where the answer is not certain.
+    Estimates the hinge from the motion, distinguishes a left wing from a right one, assigns tracks to the described
+    markers, repairs swapped labels, and refuses where the answer is not certain.
 
     Example: wingfit align trial.csv --wing dataset.yaml -o aligned.csv
     """

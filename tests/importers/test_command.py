@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 import typer
-from typer.testing import CliRunner
 
+from tests.command_line import Wingfit, in_process
 from tests.oracles.track_files import flapping, text_writers
 from wingfit.cli.importing.command import import_
-from wingfit.client.client import WingfitError
 from wingfit.records.files.tracks import read_tracks
 from wingfit.tracking.tables import read_table
-
-Wingfit = Callable[..., tuple[int, str, str]]
 
 
 @pytest.fixture
@@ -25,13 +21,7 @@ def wingfit() -> Wingfit:
     app = typer.Typer()
     app.command()(import_)
 
-    def run(*words: object) -> tuple[int, str, str]:
-        result = CliRunner().invoke(app, [str(word) for word in words])
-        if isinstance(result.exception, WingfitError):
-            return 1, result.stdout, str(result.exception)
-        return result.exit_code, result.stdout, result.stderr
-
-    return run
+    return in_process(app)
 
 
 @pytest.fixture

@@ -9,13 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 import typer
-from typer.testing import CliRunner
 
+from tests.command_line import Wingfit, in_process
 from tests.oracles.wing_kinematics import noise, passive_pitch, split_cycle, wing_markers
 from tests.tracking.test_free_flight import CENTRE, MARKERS, pitched, seen_from, times
 from wingfit.cli.forces.free_flight import forces
 from wingfit.cli.forces.kinematics import kinematics
-from wingfit.client.client import WingfitError
 from wingfit.records import FourierFlap, PassivePitch, Vehicle, WingMotion
 from wingfit.records.description.convert import to_dataclass
 from wingfit.records.description.vehicle_file import VehicleFile
@@ -24,7 +23,6 @@ from wingfit.records.files.forces import read_forces
 
 FREQUENCY = 12.5
 NAMES = ("nose", "trailing", "left", "right", "fin", "belly")
-Wingfit = Callable[..., tuple[int, str, str]]
 
 
 @pytest.fixture
@@ -33,13 +31,7 @@ def wingfit() -> Wingfit:
     app.command()(kinematics)
     app.command()(forces)
 
-    def run(*words: object) -> tuple[int, str, str]:
-        result = CliRunner().invoke(app, [str(word) for word in words])
-        if isinstance(result.exception, WingfitError):
-            return 1, result.stdout, str(result.exception)
-        return result.exit_code, result.stdout, result.stderr
-
-    return run
+    return in_process(app)
 
 
 def write(path: Path, header: list[str], rows: np.ndarray) -> Path:

@@ -100,8 +100,8 @@ class Search:
 
     def _fitted(self, here: Fit, marker: Index, rest: Array, steps: int) -> Fit:
         which = marker[marker >= 0]
-        begun, tracks = with_all(here, rest[which]), self.tracks[:, marker >= 0]
-        return fit(self.strip, self.described[which], tracks, self.mean, self.shaking, begun, steps=steps)
+        start, tracks = with_all(here, rest[which]), self.tracks[:, marker >= 0]
+        return fit(self.strip, self.described[which], tracks, self.mean, self.shaking, start, steps=steps)
 
     def arranged(self, candidate: Candidate, right: bool, given: Index, named: Index) -> Arrangement | None:
         """Return the fit that starts from ``candidate``, relabelled until labels and fit agree; None without fit."""

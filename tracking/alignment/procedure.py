@@ -231,8 +231,8 @@ def _finished(
     shown[:, (shown >= 0).sum(axis=0) < _LEAST_SAMPLES] = -1
     used = np.flatnonzero((shown >= 0).any(axis=0))
     mine = gathered(tracks.positions, shown[:, used])
-    begun = with_all(best.fit, rest[used])
-    final = fit(strip, described[used], mine[found.frames], found.flapping.mean, found.shaking, begun)
+    initial = with_all(best.fit, rest[used])
+    final = fit(strip, described[used], mine[found.frames], found.flapping.mean, found.shaking, initial)
     _check_fit(tracks.file, final, strip)
     if known.body:
         mine = _steadied(mine, strip, final, found)

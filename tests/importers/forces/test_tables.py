@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import typer
-from typer.testing import CliRunner
 
+from tests.command_line import Wingfit, in_process
 from tests.importers.forces.balance_files import BODY, DOWN, FORE, RATE, TIMES, agrees, read, refused, table
 from wingfit.cli.importing.forces import import_forces as command
-from wingfit.client.client import WingfitError
 from wingfit.importers.forces.channels import FORCE_UNITS, force_unit, role_of
 from wingfit.records.files.forces import read_forces
 
@@ -168,20 +166,14 @@ def test_what_is_refused(tmp_path: Path, text: str | bytes, options: dict[str, A
 
 
 @pytest.fixture
-def wingfit() -> Callable[..., tuple[int, str, str]]:
+def wingfit() -> Wingfit:
     app = typer.Typer()
     app.command()(command)
 
-    def run(*words: object) -> tuple[int, str, str]:
-        result = CliRunner().invoke(app, [str(word) for word in words])
-        if isinstance(result.exception, WingfitError):
-            return 1, result.stdout, str(result.exception)
-        return result.exit_code, result.stdout, result.stderr
-
-    return run
+    return in_process(app)
 
 
-def test_the_command(wingfit: Callable[..., tuple[int, str, str]], tmp_path: Path) -> None:
+def test_the_command(wingfit: Wingfit, tmp_path: Path) -> None:
     source, target = tmp_path / "run.csv", tmp_path / "out.csv"
     source.write_text(PLAIN)
     stated = ("--axes", "x nose, y right, z down", "--balance", "body")

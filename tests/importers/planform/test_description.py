@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -13,14 +12,13 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 import typer
-from typer.testing import CliRunner
 
+from tests.command_line import Wingfit, in_process
 from tests.importers.planform.outlines import described, polygon, refused, svg
 from tests.records.samples import falcon_wing
 from tests.records.vehicles import delfly
 from wingfit.cli.importing.template import wing_drawing as drawing_command
 from wingfit.cli.importing.template import wing_template as template_command
-from wingfit.client.client import WingfitError
 from wingfit.records import DatasetError, load_dataset, wing_or_vehicle
 from wingfit.records.description.wing_plan import read_plan
 from wingfit.report.wing_drawing import wing_drawing
@@ -126,21 +124,15 @@ def test_wings_and_vehicles_are_drawn() -> None:
 
 
 @pytest.fixture
-def wingfit() -> Callable[..., tuple[int, str, str]]:
+def wingfit() -> Wingfit:
     app = typer.Typer()
     app.command("template")(template_command)
     app.command("drawing")(drawing_command)
 
-    def run(*words: object) -> tuple[int, str, str]:
-        result = CliRunner().invoke(app, [str(word) for word in words])
-        if isinstance(result.exception, WingfitError):
-            return 1, result.stdout, str(result.exception)
-        return result.exit_code, result.stdout, result.stderr
-
-    return run
+    return in_process(app)
 
 
-def test_the_commands(wingfit: Callable[..., tuple[int, str, str]], tmp_path: Path) -> None:
+def test_the_commands(wingfit: Wingfit, tmp_path: Path) -> None:
     source, target, picture = (tmp_path / name for name in ("w.svg", "wing.yaml", "wing.svg"))
     source.write_text(SWEPT)
     stated = ("--root", "left", "--leading-edge", "top", "--span-mm", "200", "--hinge-mm", "15")

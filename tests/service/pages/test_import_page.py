@@ -141,9 +141,9 @@ def test_from_a_file_to_a_dataset(seen: Seen, api: Api, tmp_path: Path) -> None:
     seen.page.fill("#import-recording [name=name]", "vacuum-3hz")
     seen.page.fill("#import-recording [name=flap_frequency_hz]", "fast")
     seen.page.click("#import-recording [type=submit]")
-    told = seen.page.inner_text("#import-recording-errors")
-    assert "Pressure, mbar: is empty" in told
-    assert "“fast” is no number" in told
+    shown = seen.page.inner_text("#import-recording-errors")
+    assert "Pressure, mbar: is empty" in shown
+    assert "“fast” is no number" in shown
     assert seen.page.get_attribute("#import-recording [name=rig]", "aria-invalid") == "true"
     add(seen)
     seen.wait(f"{TEXT.format('import-recordings')}.includes('vacuum-3hz')")
@@ -177,9 +177,9 @@ def test_errors_of_the_upload_are_shown_with_the_lines_of_the_description(seen: 
     seen.page.fill("#import-dataset [name=name]", "new")
     seen.page.click("#import-dataset [type=submit]")
     seen.page.wait_for_selector("#import-dataset-errors li")
-    told = seen.page.inner_text("#import-dataset-errors")
-    assert f"dataset.yaml, line {line}, column" in told
-    assert "wing.stations[1].chord_m: is 70.0 m; it must lie in [0.0001, 5] m" in told
+    shown = seen.page.inner_text("#import-dataset-errors")
+    assert f"dataset.yaml, line {line}, column" in shown
+    assert "wing.stations[1].chord_m: is 70.0 m; it must lie in [0.0001, 5] m" in shown
     seen.errors.clear()  # the browser reports the refusal
     with seen.page.expect_download() as download:
         seen.page.click("#import-archive")

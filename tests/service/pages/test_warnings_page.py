@@ -50,10 +50,10 @@ def test_a_likely_mistake_is_shown_after_the_upload(browser: Browser, api: Api, 
     assert "it has 1 likely mistake" in seen.page.inner_text("#toast")
     assert not seen.page.is_visible("#submit-dialog"), "nothing is started before the mistake has been looked at"
     assert seen.page.inner_text("#warnings-title") == "1 likely mistake in this dataset"
-    told = seen.page.evaluate("[...document.querySelectorAll('#warnings dd')].map((node) => node.textContent)")
-    assert told[0] == "recording 'wt-08.5ms-lag3-2.0hz'"
-    assert told[1].startswith("pressure_mbar is 101.325")
-    assert told[2:] == ["600 to 1085 mbar", "the pressure is in kPa", CHANGE]
+    shown = seen.page.evaluate("[...document.querySelectorAll('#warnings dd')].map((node) => node.textContent)")
+    assert shown[0] == "recording 'wt-08.5ms-lag3-2.0hz'"
+    assert shown[1].startswith("pressure_mbar is 101.325")
+    assert shown[2:] == ["600 to 1085 mbar", "the pressure is in kPa", CHANGE]
     assert seen.page.inner_text("#warnings .copyable code") == "wingfit datasets check FOLDER --fix NEW_FOLDER"
     drawn = {name: seen.page.locator(f"#drawing svg {name}").count() for name in ("path.hinge", "path.rod", "circle")}
     assert drawn == {"path.hinge": 1, "path.rod": 2, "circle": 49}

@@ -3,31 +3,21 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
+from tests.command_line import Wingfit, in_process
 from tests.tracking.alignment.recorded import ROBIRD, filmed
 from wingfit.cli.main import app
-from wingfit.client.client import WingfitError
 from wingfit.records.files.table import write_table
 from wingfit.records.files.tracks import read_tracks
-
-Wingfit = Callable[..., tuple[int, str, str]]
 
 
 @pytest.fixture
 def wingfit() -> Wingfit:
-    def run(*words: object) -> tuple[int, str, str]:
-        result = CliRunner().invoke(app, [str(word) for word in words])
-        if isinstance(result.exception, WingfitError):
-            return 1, result.stdout, str(result.exception)
-        return result.exit_code, result.stdout, result.stderr
-
-    return run
+    return in_process(app)
 
 
 @pytest.fixture(scope="module")
