@@ -26,6 +26,25 @@ def test_a_stiff_wing_swings_so_much_further() -> None:
     np.testing.assert_allclose(tracks, turned(robird(), wider, X, np.zeros(3)), atol=1e-4)
 
 
+@pytest.mark.parametrize(("linkage", "length", "angle"), [(1.0, np.tan, np.arctan), (-0.5, np.sin, np.arcsin)])
+def test_a_longer_lever_or_crank_makes_the_stroke_larger(linkage: float, length: np.ufunc, angle: np.ufunc) -> None:
+    """The tangent or the sine of the stroke grows by a small part; to third order in the stroke, so does the law's."""
+    part, psi = 1e-3, 2 * np.pi * np.arange(64) / 64
+    described, larger = (
+        scene_of("stroke_amplitude", robird(), part=size, linkage=linkage).rods.angles(psi)[:, :, 0, 0]
+        for size in (0.0, part)
+    )
+    stroke = described - described.mean(axis=0)
+    change = angle((1 + part) * length(stroke)) - stroke
+    assert abs(larger - described - change).max() < 0.15 * abs(part * stroke - change).max()
+
+
+@pytest.mark.parametrize("linkage", [-0.5, 1.0])
+def test_linkage_does_nothing_to_a_stroke_as_described(linkage: float) -> None:
+    with_, without = (scene_of("stroke_amplitude", robird(), part=0.0, linkage=x).rods.series for x in (linkage, 0.0))
+    np.testing.assert_array_equal(with_, without)
+
+
 @pytest.mark.parametrize("end", [-0.3, 0.3])
 def test_the_work_of_the_motors_closes_the_ledger(end: float) -> None:
     assert ledger(beat_of("stroke_amplitude", AIR, 96, part=end), AIR.flap_frequency) < 1e-4
