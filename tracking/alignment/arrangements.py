@@ -11,6 +11,7 @@ from wingfit.records.array_types import Array, Index, Mask
 from wingfit.tracking.alignment.candidates import Candidate, Layout, candidates, gate_of, start_of, with_all
 from wingfit.tracking.alignment.fit import Fit, fit, shaken
 from wingfit.tracking.alignment.identity import whole_tracks
+from wingfit.tracking.alignment.pose_error import PoseError
 from wingfit.tracking.alignment.rigid_motion import RigidMotion
 from wingfit.tracking.alignment.wing_model import Strip, positions
 
@@ -67,7 +68,7 @@ class Search:
     motion: RigidMotion
     layout: Layout
     mean: Array
-    shaking: Array
+    shaking: PoseError
 
     def candidates(self, given: Index) -> list[Candidate]:
         """Return the candidates to fit, best first; ``given`` [K] are markers of named tracks (-1: none)."""

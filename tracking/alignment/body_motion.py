@@ -9,12 +9,14 @@ import numpy as np
 from wingfit.records.array_types import Array
 from wingfit.records.errors import fail
 from wingfit.tracking.alignment.flapping import Flapping, basis, flapping_of
+from wingfit.tracking.alignment.pose_error import STEADY, PoseError
 from wingfit.tracking.alignment.request import Tracks
 from wingfit.tracking.alignment.rigid_motion import RigidMotion, rigid_motion
-from wingfit.tracking.rigid_body import poses
+from wingfit.tracking.rigid_body import Poses, poses
 
 _BODY_MISFIT = 0.02  # RMS over the extent of the body markers above which they are not rigid
 _MOST_ORDER = 3
+_MOST_CORRELATION = 0.95  # of consecutive residuals of the body's markers
 _SETTLED = 1e-4
 _ROUNDS = 10  # as the body's motion and the wing's do not add up, but multiply
 _LEAST_TURN, _LEAST_WAY = 0.01, 0.015  # RMS of slow motion below which there is none: rad, and of the tracks' extent
@@ -28,15 +30,13 @@ class BodyMotion:
     Attributes:
         rotation, shift: [T, 3, 3], [T, 3] (m); a point that rests on the body is at rotation @ point + shift.
         words: what it is.
-        error: standard deviations of its rotation (rad), about any axis, and of its position (m) in a frame.
-        middle: [3] where the position has this error, m.
+        error: of its pose in each frame.
     """
 
     rotation: Array
     shift: Array
     words: str
-    error: tuple[float, float]
-    middle: Array
+    error: PoseError
 
     def removed(self, positions: Array) -> Array:
         """Return ``positions`` [T, K, 3] as seen from the body."""
@@ -60,11 +60,22 @@ def by_markers(tracks: Tracks, names: tuple[str, ...]) -> BodyMotion:
         raise fail("--body", ", ".join(names), f"{', '.join(names)} {message}; name tracks on the body")
     path = np.linalg.norm(np.ptp(found.position[np.isfinite(found.position[:, 0])], axis=0))
     words = f"motion of the body removed by {len(names)} tracks on it, {100 * path:.3g} cm of way"
+    return BodyMotion(found.rotation, found.position, words, _error_of(found))
+
+
+def _error_of(found: Poses) -> PoseError:
+    """Return the error of poses by the residuals of the markers, which also have the noise of the poses."""
+    count, seen = len(found.shape), np.isfinite(found.residuals)
+    noise = float(np.sqrt((found.residuals[seen] ** 2).mean() * 3 * count / (3 * count - 6)))
     arms = found.shape - found.shape.mean(axis=0)
-    noise = misfit * np.sqrt(3 * len(names) / (3 * len(names) - 6))
-    turning = noise / np.sqrt(np.linalg.eigvalsh(arms.T @ arms)[:2].sum())
-    return BodyMotion(
-        found.rotation, found.position, words, (float(turning), noise / np.sqrt(len(names))), found.shape.mean(axis=0)
+    turning = np.trace(arms.T @ arms) * np.eye(3) - arms.T @ arms
+    now, then = found.residuals[1:], found.residuals[:-1]
+    both = np.isfinite(now) & np.isfinite(then)
+    r = float((now[both] * then[both]).sum() / max((now[both] ** 2).sum(), 1e-300))
+    r = min(max(r, 0.0), _MOST_CORRELATION)
+    memory = (1 + r) / (1 - r)
+    return PoseError(
+        noise**2 * np.linalg.inv(turning), noise / float(np.sqrt(count)), found.shape.mean(axis=0), memory
     )
 
 
@@ -105,7 +116,7 @@ def slow(times: Array, motion: RigidMotion, flapping: Flapping, *, surely: bool 
     words = (
         f"the hinge moves slowly, by {way:.3g} mm and {angle:.2g} deg; this motion, a polynomial over time, was removed"
     )
-    return BodyMotion(relative, place - relative @ pivot, words, (0.0, 0.0), pivot)
+    return BodyMotion(relative, place - relative @ pivot, words, STEADY)
 
 
 def _nearest(matrices: Array) -> Array:

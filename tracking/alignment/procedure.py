@@ -16,6 +16,7 @@ from wingfit.tracking.alignment.candidates import gate_of, layout_of, with_all
 from wingfit.tracking.alignment.fit import Fit, fit, shaken, states_of
 from wingfit.tracking.alignment.flapping import Flapping, drive_series, flapping_of, half_range
 from wingfit.tracking.alignment.identity import exchanges, frame_by_frame, gathered
+from wingfit.tracking.alignment.pose_error import STEADY, PoseError
 from wingfit.tracking.alignment.report import Frame, aligned
 from wingfit.tracking.alignment.request import LEAST_TRACKS, Known, Tracks, checked
 from wingfit.tracking.alignment.result import AlignedTracks, DroppedTrack
@@ -42,7 +43,7 @@ class _Prepared:
     frames: Index
     motion: RigidMotion
     flapping: Flapping
-    shaking: Array
+    shaking: PoseError
     remarks: list[str]
 
 
@@ -68,15 +69,13 @@ def described_of(wing: Wing) -> Array:
 
 def _prepared(tracks: Tracks, wing: Wing, known: Known) -> _Prepared:
     remarks = list[str]()
-    shaking = np.zeros(5)
+    shaking = STEADY
     if known.body:
         body = by_markers(tracks, known.body)
         tracks = tracks.only(np.array([name not in known.body for name in tracks.names]))
         tracks = Tracks(tracks.file, tracks.times, tracks.names, body.removed(tracks.positions))
         remarks.append(body.words)
-        hinge = np.nanmean(tracks.positions, axis=(0, 1)) - body.middle
-        way = np.hypot(body.error[1], body.error[0] * np.linalg.norm(hinge))
-        shaking[:2], shaking[2:] = body.error[0], way
+        shaking = body.error
     usable = np.flatnonzero(np.isfinite(tracks.positions[..., 0]).sum(axis=1) >= LEAST_TRACKS)
     if len(usable) < LEAST_TRACKS:
         few = f"{len(usable)} frames show {LEAST_TRACKS} or more tracks; track more markers at a time"
