@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wingfit.records.array_types import Array
+from wingfit.records.array_types import Array, Index
 from wingfit.records.errors import fail
-from wingfit.tracking.alignment.flapping import Flapping, basis, flapping_of
+from wingfit.tracking.alignment.flapping import MOST_FRAMES, Flapping, basis, flapping_of, strongest
 from wingfit.tracking.alignment.pose_error import STEADY, PoseError
 from wingfit.tracking.alignment.request import Tracks
 from wingfit.tracking.alignment.rigid_motion import RigidMotion, rigid_motion
@@ -79,12 +79,15 @@ def _error_of(found: Poses) -> PoseError:
     )
 
 
-def slow(times: Array, motion: RigidMotion, flapping: Flapping, *, surely: bool = False) -> BodyMotion | None:
+def slow(
+    times: Array, frames: Index, motion: RigidMotion, flapping: Flapping, *, surely: bool = False
+) -> BodyMotion | None:
     """Return the slow motion that is common to the wing's tracks, a polynomial over time; None if there is none.
 
     With ``surely``, it is known that there is one.
 
-    The pose of the wing as a rigid body is a polynomial, the body's motion, plus harmonics of the flapping.
+    ``motion`` is that of the ``frames`` [F] of all ``times`` [T]; the result is that of all. The pose of the wing as a
+    rigid body is a polynomial, the body's motion, plus harmonics of the flapping.
     """
     fitted = np.isfinite(motion.rotation[:, 0, 0])
     t = times - times[0]
@@ -94,7 +97,7 @@ def slow(times: Array, motion: RigidMotion, flapping: Flapping, *, surely: bool 
     s = 2 * t / t[-1] - 1
     powers = np.polynomial.legendre.legvander(s, order)
     turns = basis(t, flapping.frequency)[:, 1:]
-    X = np.column_stack([powers, turns])
+    X = np.column_stack([powers, turns])[frames]
     hinge = np.einsum("tij,j->ti", motion.rotation, motion.pivot) + motion.shift
     y = np.column_stack([motion.rotation.reshape(-1, 9), hinge])[fitted]
     c, *_ = np.linalg.lstsq(X[fitted], y, rcond=None)
@@ -126,12 +129,17 @@ def _nearest(matrices: Array) -> Array:
     return np.asarray(U @ Vt)
 
 
-def without_slow_motion(times: Array, positions: Array) -> tuple[Array, list[str]]:
-    """Return ``positions`` [T, K, 3] without slow common motion, and what was removed in words."""
+def without_slow_motion(times: Array, positions: Array, frames: Index) -> tuple[Array, list[str]]:
+    """Return ``positions`` [T, K, 3] without slow common motion, and what was removed in words.
+
+    The motion is estimated from ``frames`` [F].
+    """
     words = list[str]()
     for _ in range(_ROUNDS):
-        motion = rigid_motion(positions)
-        found = slow(times, motion, flapping_of(times, motion.angle, trend=2), surely=bool(words))
+        motion = rigid_motion(positions[frames])
+        frequency = strongest(times, motion.angles_of(positions)) if len(times) > MOST_FRAMES else None
+        flapping = flapping_of(times[frames], motion.angle, trend=2, known=frequency)
+        found = slow(times, frames, motion, flapping, surely=bool(words))
         if found is None:
             break
         positions, words = found.removed(positions), words or [found.words]
