@@ -74,9 +74,7 @@ def _error_of(found: Poses) -> PoseError:
     r = float((now[both] * then[both]).sum() / max((now[both] ** 2).sum(), 1e-300))
     r = min(max(r, 0.0), _MOST_CORRELATION)
     memory = (1 + r) / (1 - r)
-    return PoseError(
-        noise**2 * np.linalg.inv(turning), noise / float(np.sqrt(count)), found.shape.mean(axis=0), memory
-    )
+    return PoseError(noise**2 * np.linalg.inv(turning), noise / float(np.sqrt(count)), found.shape.mean(axis=0), memory)
 
 
 def slow(

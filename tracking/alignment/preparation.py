@@ -17,6 +17,7 @@ from wingfit.tracking.alignment.rigid_motion import RigidMotion, distance_change
 
 _LEAST_AMPLITUDE = np.radians(4.0)
 _SIZES = (0.6, 1.7)  # ratio of the tracks' extent to that of the described markers
+_FLAT = 0.02  # least spread of the tracks across the line along which they spread most
 _MOST_CHANGE = 0.01  # of the distances between tracks, spans; wings of benchmarks.alignment have up to 0.0017
 
 
@@ -72,6 +73,7 @@ def prepared(tracks: Tracks, wing: Wing, known: Known) -> Prepared:
     if len(usable) < LEAST_TRACKS:
         few = f"{len(usable)} frames show {LEAST_TRACKS} or more tracks; track more markers at a time"
         raise fail(tracks.file, len(usable), few)
+    _check_extent(tracks, usable)
     frames = _spread(usable)
     _check_distances(tracks, wing, frames)
     if not known.body:
@@ -101,6 +103,19 @@ def _spread(usable: Index) -> Index:
         return usable
     within = np.random.default_rng(0).uniform(size=MOST_FRAMES)
     return usable[((np.arange(MOST_FRAMES) + within) * len(usable) / MOST_FRAMES).astype(int)]
+
+
+def _check_extent(tracks: Tracks, usable: Index) -> None:
+    """Raise DatasetError if the tracks lie in one place or on one line, so that they have no pose."""
+    frame = tracks.positions[usable[np.argmax(np.isfinite(tracks.positions[usable, :, 0]).sum(axis=1))]]
+    points = frame[np.isfinite(frame[:, 0])]
+    along, across = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)[:2] / np.sqrt(len(points))
+    if across <= _FLAT * along:
+        message = (
+            f"the tracks lie on one line: they spread by {1e3 * along:.3g} mm along it and {1e3 * across:.3g} mm "
+            f"across; at least {100 * _FLAT:g} % of the length are needed: track markers along the span and the chord"
+        )
+        raise fail(tracks.file, None, message)
 
 
 def _check_distances(tracks: Tracks, wing: Wing, frames: Index) -> None:

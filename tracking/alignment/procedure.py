@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 from wingfit.records.array_types import Array, Index
 from wingfit.records.errors import DatasetError, fail
 from wingfit.records.wing import Wing
-from wingfit.tracking.alignment.arrangements import DISTINCT, Arrangement, Search, ranked
+from wingfit.tracking.alignment.arrangements import DISTINCT, LEAST_MARKERS, Arrangement, Search, ranked
 from wingfit.tracking.alignment.candidates import gate_of, layout_of, with_all
 from wingfit.tracking.alignment.fit import Fit, fit, shaken, states_of
 from wingfit.tracking.alignment.flapping import Flapping, drive_series, flapping_of, half_range
@@ -61,20 +61,41 @@ def _arranged(
         strip, described, tracks.positions[found.frames], motion, layout_of(motion), found.flapping.mean, found.shaking
     )
     named, stated = _given(found, wing, known)
-    sides = [True, False] if known.side is None else [known.side == "right"]
-    up, every = known.up_vector(), list[Arrangement]()
-    for candidate in search.candidates(named):
-        for right in sides:
+    up, every, excluded = known.up_vector(), list[Arrangement](), list[Arrangement]()
+    tried = search.candidates(named)
+    for candidate in tried:
+        for right in (True, False):
             one = search.arranged(candidate, right, stated, named)
-            if one is None or (up is not None and _up(one.fit, up) < 0):
+            if one is None:
                 continue
-            if not any(other.fit.right == right and np.array_equal(other.marker, one.marker) for other in every):
-                every.append(one)
+            allowed = known.side in (None, "right" if right else "left") and (up is None or _up(one.fit, up) > 0)
+            group = every if allowed else excluded
+            if not any(other.fit.right == right and np.array_equal(other.marker, one.marker) for other in group):
+                group.append(one)
     if not every:
         remedy = "check the described positions and the unit, or the directions that you gave"
-        raise fail(tracks.file, None, f"no arrangement of the described markers fits the tracks; {remedy}")
+        near = max(((one.marker >= 0).sum() for one in tried), default=0)
+        message = (
+            f"no arrangement of the described markers fits the tracks: at most {near} of {len(tracks.names)} are near"
+        )
+        raise fail(tracks.file, None, f"{message} one at a time, and after a fit fewer than {LEAST_MARKERS}; {remedy}")
     best, evidence = _best(every, described, named, tracks, wing)
+    _check_stated(best, excluded, described, wing, known)
     return best, evidence if known.side is None and up is None else None
+
+
+def _check_stated(best: Arrangement, excluded: list[Arrangement], described: Array, wing: Wing, known: Known) -> None:
+    """Raise DatasetError if what the user said about the side contradicts the tracks."""
+    costs = {id(one): cost for cost, one in ranked([best, *excluded], described, wing.span)}
+    worse = max((costs[id(best)] - costs[id(one)] for one in excluded), default=0.0)
+    if worse > DISTINCT:
+        stated, value = ("--side", known.side) if known.side else ("--up", known.up)
+        message = (
+            f"the tracks are those of a {'left' if best.fit.right else 'right'} wing: ln of the odds against "
+            f"{stated} {value} is {worse / 2:.3g}, and at most {DISTINCT / 2:g} is accepted. Leave {stated} away; if "
+            "it is right, the axes of the tracks are left-handed, or z of the described markers has the wrong sign"
+        )
+        raise fail(stated, value, message)
 
 
 def _up(one: Fit, up: Array) -> float:
