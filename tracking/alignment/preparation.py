@@ -51,7 +51,7 @@ class Prepared:
         found = start + slope * self.angle
         found[self.frames] = some
         known = np.isfinite(found)
-        return np.interp(np.arange(len(found)), np.flatnonzero(known), found[known])
+        return np.asarray(np.interp(np.arange(len(found)), np.flatnonzero(known), found[known]))
 
 
 def described_of(wing: Wing) -> Array:
@@ -102,7 +102,7 @@ def _spread(usable: Index) -> Index:
     if len(usable) <= MOST_FRAMES:
         return usable
     within = np.random.default_rng(0).uniform(size=MOST_FRAMES)
-    return usable[((np.arange(MOST_FRAMES) + within) * len(usable) / MOST_FRAMES).astype(int)]
+    return np.asarray(usable[((np.arange(MOST_FRAMES) + within) * len(usable) / MOST_FRAMES).astype(int)])
 
 
 def _check_extent(tracks: Tracks, usable: Index) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -21,6 +23,7 @@ from wingfit.tracking.alignment.rigid_motion import RigidMotion
 from wingfit.tracking.alignment.wing_model import Strip, positions, strip_of
 
 _CHUNK = 2000
+_PREPARED, _SEARCHED = 0.2, 0.8  # parts of the work, about
 _AMPLITUDES = (0.6, 1.7)  # ratio of the flap amplitude to that of the drive
 _LEAST_EXPLAINED = 0.8  # of the variance of the flap angle, by one period
 _MOST_NOISE, _MOST_SCATTER = 0.015, 0.0099  # spans
@@ -29,8 +32,12 @@ _LEAST_SAMPLES = 8
 _LEAST_UP = 0.2
 
 
-def align(tracks: Tracks, wing: Wing, known: Known) -> AlignedTracks:
+def align(
+    tracks: Tracks, wing: Wing, known: Known, report: Callable[[float], object] = lambda _: None
+) -> AlignedTracks:
     """Align ``tracks`` of ``wing`` to its frame, with what the user states, ``known``.
+
+    ``report`` is called with the part of the work that is done, from 0 to 1.
 
     Raises DatasetError, with what would settle it, if the tracks cannot be those of the wing, or if the frame, the side
     or the labels are not certain.
@@ -39,7 +46,9 @@ def align(tracks: Tracks, wing: Wing, known: Known) -> AlignedTracks:
     known.check(tracks, wing)
     found = prepared(tracks, wing, known)
     strip, described = strip_of(wing), described_of(wing)
-    best, evidence = _arranged(found, wing, strip, described, known)
+    report(_PREPARED)
+    best, evidence = _arranged(found, wing, strip, described, known, report)
+    report(_SEARCHED)
     return _finished(found, wing, strip, described, best, evidence, known)
 
 
@@ -54,7 +63,7 @@ def _given(found: Prepared, wing: Wing, known: Known) -> tuple[Index, Index]:
 
 
 def _arranged(
-    found: Prepared, wing: Wing, strip: Strip, described: Array, known: Known
+    found: Prepared, wing: Wing, strip: Strip, described: Array, known: Known, report: Callable[[float], object]
 ) -> tuple[Arrangement, float | None]:
     tracks, motion = found.tracks, found.motion
     search = Search(
@@ -63,7 +72,8 @@ def _arranged(
     named, stated = _given(found, wing, known)
     up, every, excluded = known.up_vector(), list[Arrangement](), list[Arrangement]()
     tried = search.candidates(named)
-    for candidate in tried:
+    for done, candidate in enumerate(tried):
+        report(_PREPARED + (_SEARCHED - _PREPARED) * done / len(tried))
         for right in (True, False):
             one = search.arranged(candidate, right, stated, named)
             if one is None:

@@ -44,7 +44,7 @@ class RigidMotion:
     @one_blas_thread
     def angles_of(self, tracks: Array) -> Array:
         """Return the turn [N] (rad) about the axis in frames of ``tracks`` [N, K, 3], m; NaN where too few are seen."""
-        seen = np.isfinite(tracks).all(axis=-1)
+        seen: Mask = np.asarray(np.isfinite(tracks).all(axis=-1))
         known = np.isfinite(self.shape[:, 0])
         P = np.where(seen[..., None], tracks, 0.0)
         R, _, fitted = _poses(np.nan_to_num(self.shape), P, seen * np.where(known, self.weight, 0.0))
@@ -129,7 +129,7 @@ def distance_changes(tracks: Array) -> Array:
 
 def _sizes(away: Array) -> tuple[Array, Array]:
     """Root mean square and median [K] of the distances ``away`` [T, K]; infinite for tracks without any."""
-    some = np.isfinite(away).any(axis=0)
+    some: Mask = np.asarray(np.isfinite(away).any(axis=0))
     misfit, typical = np.full(len(some), np.inf), np.full(len(some), np.inf)
     misfit[some] = np.sqrt(np.nanmean(away[:, some] ** 2, axis=0))
     typical[some] = np.nanmedian(away[:, some], axis=0)
