@@ -47,7 +47,8 @@ class RigidMotion:
         seen: Mask = np.asarray(np.isfinite(tracks).all(axis=-1))
         known = np.isfinite(self.shape[:, 0])
         P = np.where(seen[..., None], tracks, 0.0)
-        R, _, fitted = _poses(np.nan_to_num(self.shape), P, seen * np.where(known, self.weight, 0.0))
+        weight: Array = seen.astype(float) * np.where(known, self.weight, 0.0)
+        R, _, fitted = _poses(np.nan_to_num(self.shape), P, weight)
         some = self.rotation[np.isfinite(self.angle)]
         found = _turns(R, some.mean(axis=0), self.axis)
         middle = float(np.mean(_turns(some, some.mean(axis=0), self.axis)))
