@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from os import PathLike
 from typing import Literal
 
@@ -22,6 +22,7 @@ def align_tracks(
     ignore_names: bool = False,
     body: Sequence[str] = (),
     mean_flap_deg: float | None = None,
+    report: Callable[[float], object] | None = None,
 ) -> AlignedTracks:
     """Align tracks in any camera axes to the frame of a described wing, and name its markers.
 
@@ -34,6 +35,7 @@ def align_tracks(
         ignore_names: names of tracks say nothing about markers.
         body: tracks on the body that carries the hinge, three or more; its motion is removed.
         mean_flap_deg: mean flap angle over the beat; by default that of the described drive.
+        report: called with the part of the work that is done, from 0 to 1.
 
     Returns:
         The tracks in the wing's frame, the frame, the labels, residuals, and rest positions with standard errors.
@@ -45,4 +47,5 @@ def align_tracks(
     found = tracks if isinstance(tracks, ImportedTracks) else import_tracks(tracks)
     described = wing if isinstance(wing, Wing) else read_wing(wing)
     known = Known(side, up, dict(labels or {}), ignore_names, tuple(body), mean_flap_deg)
-    return align(Tracks(found.file, found.times, found.markers, found.positions), described, known)
+    given = Tracks(found.file, found.times, found.markers, found.positions)
+    return align(given, described, known, report or (lambda _: None))

@@ -26,6 +26,7 @@ from wingfit.tracking.alignment import AlignedTracks, Known, Tracks, align
 
 TRIALS = 60
 WITHIN_DEG, WITHIN_MM = 0.5, 1.0
+NINETY = 1.6449  # standard errors of the stated 90 % interval
 GROSS_DEG, GROSS_SPANS, GROSS_LABELS = 2.0, 0.02, 0.02
 
 
@@ -139,12 +140,21 @@ def _summary(scores: list[Score], refused: list[str], sure: int, trials: int, se
         "samples_kept_percent": round(100 * float(np.mean([one.kept for one in scores])), 2),
         "within_percent": round(100 * sum(one.within for one in scores) / trials, 1),
         "rms_of_error_over_standard_error": [round(float(v), 2) for v in np.sqrt(np.mean(z**2, axis=0))],
+        "within_stated_90_percent_interval": _shares(np.abs(z) < NINETY),
+        "accepted_percent": round(100 * len(scores) / trials, 1),
         "refused": len(refused),
         "refusals": refused,
         "unsettled": len(unsettled()),
         "falsely_sure": sum(one.false for one in scores) + sure,
     }
     return {"alignment": summary, "seconds": round(seconds, 1)}
+
+
+def _shares(inside: np.ndarray) -> dict[str, Any]:
+    """Return how many percent of the errors [N, 6] are inside their intervals: all, and each of the six."""
+    names = ("rotation_x", "rotation_y", "rotation_z", "position_x", "position_y", "position_z")
+    each = dict(zip(names, np.round(100 * inside.mean(axis=0), 1).tolist(), strict=True))
+    return {"all": round(100 * float(inside.mean()), 1), **each}
 
 
 def _at(values: np.ndarray, percent: float) -> float:

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 import typer
 
 from wingfit.cli.base.files import new_file, write_text
-from wingfit.cli.base.output import note, print_json
+from wingfit.cli.base.output import late_progress, note, print_json
 from wingfit.client.transport import WingfitError
 
 
@@ -52,16 +52,18 @@ def align(
 
     _check_output(output, tracks, force=force)
     try:
-        found = align_tracks(
-            tracks,
-            wing,
-            side=side,
-            up=up,
-            labels=_labels(label or []),
-            ignore_names=ignore_names,
-            body=tuple(name.strip() for name in body.split(",") if name.strip()),
-            mean_flap_deg=mean_flap_deg,
-        )
+        with late_progress("aligning") as report:
+            found = align_tracks(
+                tracks,
+                wing,
+                side=side,
+                up=up,
+                labels=_labels(label or []),
+                ignore_names=ignore_names,
+                body=tuple(name.strip() for name in body.split(",") if name.strip()),
+                mean_flap_deg=mean_flap_deg,
+                report=report,
+            )
     except DatasetError as error:
         count = f"{error.count} error{'s' if error.count > 1 else ''}"
         raise WingfitError("the tracks were not aligned", count, errors=[vars(one) for one in error.errors]) from error

@@ -7,7 +7,7 @@ import sys
 import time
 import unicodedata
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from operator import itemgetter
 from typing import Any, TypeVar
 
@@ -19,6 +19,7 @@ from rich.text import Text
 # A pipe has no width: wide enough that no id is cut off in a table that a script reads.
 PIPE_WIDTH = 160
 PLAIN_EVERY_S = 5.0
+LATE_S = 2.0
 WHOLE_BELOW = 1e6
 REVERSING = ("LRE", "RLE", "PDF", "LRO", "RLO", "LRI", "RLI", "FSI", "PDI")
 
@@ -186,6 +187,21 @@ def progress(title: str) -> Iterator[Report]:
         def show(fraction: float | None, eta_s: float | None = None, note: str = "") -> None:
             total = None if fraction is None else 1.0
             bars.update(task, total=total, completed=fraction, left=left(fraction, eta_s), note=note)
+
+        yield show
+
+
+@contextmanager
+def late_progress(title: str) -> Iterator[Report]:
+    """Show progress as :func:`progress` does, but only of work that has taken LATE_S; that of short work is noise."""
+    started, shown = time.monotonic(), list[Report]()
+    with ExitStack() as stack:
+
+        def show(fraction: float | None, eta_s: float | None = None, note: str = "") -> None:
+            if not shown and time.monotonic() - started > LATE_S:
+                shown.append(stack.enter_context(progress(title)))
+            if shown:
+                shown[0](fraction, eta_s, note)
 
         yield show
 

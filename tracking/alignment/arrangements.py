@@ -11,6 +11,7 @@ from wingfit.records.array_types import Array, Index, Mask
 from wingfit.tracking.alignment.candidates import Candidate, Layout, candidates, gate_of, start_of, with_all
 from wingfit.tracking.alignment.fit import Fit, fit, shaken
 from wingfit.tracking.alignment.identity import whole_tracks
+from wingfit.tracking.alignment.pose_error import PoseError
 from wingfit.tracking.alignment.rigid_motion import RigidMotion
 from wingfit.tracking.alignment.wing_model import Strip, positions
 
@@ -22,7 +23,7 @@ _CUT = 9.0 * np.log1p(100.0 / 9.0)  # cost of a sample that fits no marker, 10 s
 _LARGEST_SCATTER = 0.01  # of rest positions, spans
 _ROUNDS = 4  # of relabelling
 _FIRST_STEPS, _STEPS = 8, 40
-_LEAST_MARKERS = 4
+LEAST_MARKERS = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +68,7 @@ class Search:
     motion: RigidMotion
     layout: Layout
     mean: Array
-    shaking: Array
+    shaking: PoseError
 
     def candidates(self, given: Index) -> list[Candidate]:
         """Return the candidates to fit, best first; ``given`` [K] are markers of named tracks (-1: none)."""
@@ -82,7 +83,7 @@ class Search:
             if (
                 one.misfit <= _NEAR * best + 1e-3 * self.strip.span
                 and not alike
-                and (one.marker >= 0).sum() >= _LEAST_MARKERS
+                and (one.marker >= 0).sum() >= LEAST_MARKERS
             ):
                 kept.append(one)
         return kept[:_MOST]
@@ -108,7 +109,7 @@ class Search:
         here = start_of(candidate, self.layout, self.motion, right, self.described, self.strip)
         marker, rest, gate = candidate.marker, self.described.copy(), gate_of(self.described[:, :2])
         for round_ in range(_ROUNDS):
-            if (marker >= 0).sum() < _LEAST_MARKERS:
+            if (marker >= 0).sum() < LEAST_MARKERS:
                 return None
             here = self._fitted(here, marker, rest, _FIRST_STEPS if round_ == 0 else _STEPS)
             rest = self.described.copy()
@@ -122,7 +123,7 @@ class Search:
                 break
             marker = found
         else:
-            if (marker >= 0).sum() < _LEAST_MARKERS:
+            if (marker >= 0).sum() < LEAST_MARKERS:
                 return None
             here = self._fitted(here, marker, rest, _STEPS)
         doubtful = doubtful | self._exchangeable(marker, here, named)

@@ -6,15 +6,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wingfit.records.array_types import Array
+from wingfit.records.array_types import Array, Index
 from wingfit.records.errors import fail
-from wingfit.tracking.alignment.flapping import Flapping, basis, flapping_of
+from wingfit.tracking.alignment.flapping import MOST_FRAMES, Flapping, basis, flapping_of, strongest
+from wingfit.tracking.alignment.pose_error import STEADY, PoseError
 from wingfit.tracking.alignment.request import Tracks
 from wingfit.tracking.alignment.rigid_motion import RigidMotion, rigid_motion
-from wingfit.tracking.rigid_body import poses
+from wingfit.tracking.rigid_body import Poses, poses
 
 _BODY_MISFIT = 0.02  # RMS over the extent of the body markers above which they are not rigid
 _MOST_ORDER = 3
+_MOST_CORRELATION = 0.95  # of consecutive residuals of the body's markers
 _SETTLED = 1e-4
 _ROUNDS = 10  # as the body's motion and the wing's do not add up, but multiply
 _LEAST_TURN, _LEAST_WAY = 0.01, 0.015  # RMS of slow motion below which there is none: rad, and of the tracks' extent
@@ -28,15 +30,13 @@ class BodyMotion:
     Attributes:
         rotation, shift: [T, 3, 3], [T, 3] (m); a point that rests on the body is at rotation @ point + shift.
         words: what it is.
-        error: standard deviations of its rotation (rad), about any axis, and of its position (m) in a frame.
-        middle: [3] where the position has this error, m.
+        error: of its pose in each frame.
     """
 
     rotation: Array
     shift: Array
     words: str
-    error: tuple[float, float]
-    middle: Array
+    error: PoseError
 
     def removed(self, positions: Array) -> Array:
         """Return ``positions`` [T, K, 3] as seen from the body."""
@@ -60,20 +60,32 @@ def by_markers(tracks: Tracks, names: tuple[str, ...]) -> BodyMotion:
         raise fail("--body", ", ".join(names), f"{', '.join(names)} {message}; name tracks on the body")
     path = np.linalg.norm(np.ptp(found.position[np.isfinite(found.position[:, 0])], axis=0))
     words = f"motion of the body removed by {len(names)} tracks on it, {100 * path:.3g} cm of way"
+    return BodyMotion(found.rotation, found.position, words, _error_of(found))
+
+
+def _error_of(found: Poses) -> PoseError:
+    """Return the error of poses by the residuals of the markers, which also have the noise of the poses."""
+    count, seen = len(found.shape), np.isfinite(found.residuals)
+    noise = float(np.sqrt((found.residuals[seen] ** 2).mean() * 3 * count / (3 * count - 6)))
     arms = found.shape - found.shape.mean(axis=0)
-    noise = misfit * np.sqrt(3 * len(names) / (3 * len(names) - 6))
-    turning = noise / np.sqrt(np.linalg.eigvalsh(arms.T @ arms)[:2].sum())
-    return BodyMotion(
-        found.rotation, found.position, words, (float(turning), noise / np.sqrt(len(names))), found.shape.mean(axis=0)
-    )
+    turning = np.trace(arms.T @ arms) * np.eye(3) - arms.T @ arms
+    now, then = found.residuals[1:], found.residuals[:-1]
+    both = np.isfinite(now) & np.isfinite(then)
+    r = float((now[both] * then[both]).sum() / max((now[both] ** 2).sum(), 1e-300))
+    r = min(max(r, 0.0), _MOST_CORRELATION)
+    memory = (1 + r) / (1 - r)
+    return PoseError(noise**2 * np.linalg.inv(turning), noise / float(np.sqrt(count)), found.shape.mean(axis=0), memory)
 
 
-def slow(times: Array, motion: RigidMotion, flapping: Flapping, *, surely: bool = False) -> BodyMotion | None:
+def slow(
+    times: Array, frames: Index, motion: RigidMotion, flapping: Flapping, *, surely: bool = False
+) -> BodyMotion | None:
     """Return the slow motion that is common to the wing's tracks, a polynomial over time; None if there is none.
 
     With ``surely``, it is known that there is one.
 
-    The pose of the wing as a rigid body is a polynomial, the body's motion, plus harmonics of the flapping.
+    ``motion`` is that of the ``frames`` [F] of all ``times`` [T]; the result is that of all. The pose of the wing as a
+    rigid body is a polynomial, the body's motion, plus harmonics of the flapping.
     """
     fitted = np.isfinite(motion.rotation[:, 0, 0])
     t = times - times[0]
@@ -83,7 +95,7 @@ def slow(times: Array, motion: RigidMotion, flapping: Flapping, *, surely: bool 
     s = 2 * t / t[-1] - 1
     powers = np.polynomial.legendre.legvander(s, order)
     turns = basis(t, flapping.frequency)[:, 1:]
-    X = np.column_stack([powers, turns])
+    X = np.column_stack([powers, turns])[frames]
     hinge = np.einsum("tij,j->ti", motion.rotation, motion.pivot) + motion.shift
     y = np.column_stack([motion.rotation.reshape(-1, 9), hinge])[fitted]
     c, *_ = np.linalg.lstsq(X[fitted], y, rcond=None)
@@ -105,7 +117,7 @@ def slow(times: Array, motion: RigidMotion, flapping: Flapping, *, surely: bool 
     words = (
         f"the hinge moves slowly, by {way:.3g} mm and {angle:.2g} deg; this motion, a polynomial over time, was removed"
     )
-    return BodyMotion(relative, place - relative @ pivot, words, (0.0, 0.0), pivot)
+    return BodyMotion(relative, place - relative @ pivot, words, STEADY)
 
 
 def _nearest(matrices: Array) -> Array:
@@ -115,12 +127,17 @@ def _nearest(matrices: Array) -> Array:
     return np.asarray(U @ Vt)
 
 
-def without_slow_motion(times: Array, positions: Array) -> tuple[Array, list[str]]:
-    """Return ``positions`` [T, K, 3] without slow common motion, and what was removed in words."""
+def without_slow_motion(times: Array, positions: Array, frames: Index) -> tuple[Array, list[str]]:
+    """Return ``positions`` [T, K, 3] without slow common motion, and what was removed in words.
+
+    The motion is estimated from ``frames`` [F].
+    """
     words = list[str]()
     for _ in range(_ROUNDS):
-        motion = rigid_motion(positions)
-        found = slow(times, motion, flapping_of(times, motion.angle, trend=2), surely=bool(words))
+        motion = rigid_motion(positions[frames])
+        frequency = strongest(times, motion.angles_of(positions)) if len(times) > MOST_FRAMES else None
+        flapping = flapping_of(times[frames], motion.angle, trend=2, known=frequency)
+        found = slow(times, frames, motion, flapping, surely=bool(words))
         if found is None:
             break
         positions, words = found.removed(positions), words or [found.words]

@@ -15,19 +15,35 @@ from scipy.spatial.transform import Rotation
 
 from wingfit.records.array_types import Array, Mask
 from wingfit.records.blas_threads import one_blas_thread
+from wingfit.tracking.alignment.pose_error import PoseError
 from wingfit.tracking.alignment.wing_model import BENDING, STATES, SWEEPING, TWISTING, Strip, positions
 
 # Prior standard deviations of the states, rad: none for the flap angle; bending, twist and sweep are hardly restricted.
 _STATE_PRIOR = np.array([1e3] + [0.35] * BENDING + [0.45] * TWISTING + [0.025] * SWEEPING)
-# Of their means over the beat: loads of a beat nearly cancel, and what bends the wing at rest is in the rest positions.
-_MEAN_PRIOR = np.radians([0.4] * BENDING + [0.8] * TWISTING + [0.12] * SWEEPING)
+# Of their means over the beat: mean loads bend and twist a wing as they do a cantilever, whose slope is
+# c (s - s^2 + s^3 / 3); what bends it at rest is in the rest positions.
+_CANTILEVER = np.array([1.0, -1.0, 1.0 / 3.0])
+_MEAN_LOADS = np.radians([1.6, 3.0])  # standard deviations of c: bending, twist
+_MEAN_OTHER = np.radians([0.3] * BENDING + [0.8] * TWISTING + [0.12] * SWEEPING)
 _ELASTIC = slice(1, STATES)
 _MEANS = STATES - 1
+
+
+def _mean_prior() -> Array:
+    """Covariance [_MEANS, _MEANS] of the means of the elastic states, rad^2."""
+    found = np.diag(_MEAN_OTHER**2)
+    for first, deviation in zip((0, BENDING), _MEAN_LOADS, strict=True):
+        part = slice(first, first + len(_CANTILEVER))
+        found[part, part] += deviation**2 * np.outer(_CANTILEVER, _CANTILEVER)
+    return found
+
+
+_MEAN_PRIOR = _mean_prior()
+_MEAN_PRECISION = np.linalg.inv(_MEAN_PRIOR)
 _JITTER = 5
 _LOCAL = STATES + _JITTER
 _LINE_PRIOR = 0.15  # standard deviation of the line that a wing twists about, chords
 _FRAME = 7  # small rotation about y and z, a shift, and the line: rotation about x is the zero of phi
-_STEADY = 1e-7  # standard deviation of jitter where there is none
 _STEPS = 40
 _STATE_STEPS = 10
 _SETTLED = 3e-5  # change of the pose in radians and in spans at which the iteration ends
@@ -84,16 +100,16 @@ class Fit:
 
 @one_blas_thread
 def fit(
-    strip: Strip, described: Array, tracks: Array, mean: Array, shaking: Array, start: Fit, *, steps: int = _STEPS
+    strip: Strip, described: Array, tracks: Array, mean: Array, shaking: PoseError, start: Fit, *, steps: int = _STEPS
 ) -> Fit:
     """Fit the frame of ``tracks`` [T, M, 3] (m; NaN where not seen) to ``described`` rest positions [M, 3], m.
 
     ``described`` are hinge coordinates; the tracks are in the order of the markers. ``mean`` [T]: weights of the frames
-    whose sum over a state is its mean over the beat. ``shaking`` [5]: deviations of the body's jitter (rad, m),
-    in every frame anew. ``start`` is where to begin.
+    whose sum over a state is its mean over the beat. ``shaking``: errors of the body's pose, in every frame anew.
+    ``start`` is where to begin.
     """
     seen: Mask = np.asarray(np.isfinite(tracks).all(axis=-1))
-    problem = _Problem(strip, described, tracks, seen, mean, np.maximum(shaking, _STEADY))
+    problem = _Problem(strip, described, tracks, seen, mean, shaking.precision(start.turn, start.hinge))
     here = replace(start, residuals=problem.residuals(start), scatter=_FIRST_SCATTER * strip.span)
     here, damping = problem.scaled(here), 1e-4
     for _ in range(steps):
@@ -122,7 +138,7 @@ class _Problem:
     tracks: Array
     seen: Mask
     mean: Array
-    shaking: Array
+    steady: Array
 
     def residuals(self, at: Fit) -> Array:
         model = positions(self.strip, at.rest, at.states, at.line)[0]
@@ -134,9 +150,10 @@ class _Problem:
         data = _CAUCHY**2 * np.log1p(squares / at.noise**2 / _CAUCHY**2).sum() + 6 * len(squares) * np.log(at.noise)
         moves = ((at.rest - self.described) ** 2).sum() / at.scatter**2 + 2 * at.rest.size * np.log(at.scatter)
         states = ((at.states / _STATE_PRIOR) ** 2).sum() / at.memory
-        means = (((self.mean @ at.states[:, _ELASTIC]) / _MEAN_PRIOR) ** 2).sum()
+        means = self.mean @ at.states[:, _ELASTIC]
+        means = means @ _MEAN_PRECISION @ means
         line = (((at.line - self.strip.line) / (_LINE_PRIOR * self.strip.chord)) ** 2).sum()
-        jitter = ((at.jitter / self.shaking) ** 2).sum() / at.memory
+        jitter = np.einsum("ta,ab,tb->", at.jitter, self.steady, at.jitter)
         return replace(at, cost=float(data / at.memory + moves + states + jitter + means + line))
 
     def scaled(self, at: Fit) -> Fit:
@@ -151,6 +168,13 @@ class _Problem:
             scatter = float(np.sqrt(np.mean(moves + np.diag(at.covariance)[_FRAME:])))
         scatter = min(max(scatter, _LEAST_REST * self.strip.span), _MOST_REST * self.strip.span)
         return self.weighed(replace(at, scatter=scatter))
+
+
+def _local_prior(memory: float, steady: Array) -> Array:
+    """Precision [_LOCAL, _LOCAL] of the states and the jitter of a frame; ``steady`` [5, 5]: that of the jitter."""
+    found = np.diag(np.concatenate([_STATE_PRIOR**-2.0 / memory, np.zeros(_JITTER)]))
+    found[STATES:, STATES:] = steady
+    return found
 
 
 def by_pose(q: Array) -> Array:
@@ -196,9 +220,9 @@ class _Step:
         by_frame = np.concatenate([by_pose(q), by_line], axis=-1)
         by_state = np.concatenate([by_state, by_frame[..., :_JITTER]], axis=-1)
         J, free = weight[..., None, None] * by_state, _FRAME + 3 * M
-        prior = np.concatenate([_STATE_PRIOR, problem.shaking]) ** -2.0 / at.memory
-        self.A = np.einsum("tmia,tmib->tab", J, by_state) + np.diag(prior)
-        self.a = np.einsum("tmia,tmi->ta", J, r) - np.hstack([at.states, at.jitter]) * prior
+        prior = _local_prior(at.memory, problem.steady)
+        self.A = np.einsum("tmia,tmib->tab", J, by_state) + prior
+        self.a = np.einsum("tmia,tmi->ta", J, r) - np.hstack([at.states, at.jitter]) @ prior
         self.B = np.zeros((T, free + _MEANS, _LOCAL))
         self.B[:, :_FRAME] = np.einsum("tmia,tmib->tab", by_frame, J)
         self.B[:, _FRAME:free] = np.einsum("tmia,tmib->tmab", by_rest, J).reshape(T, 3 * M, _LOCAL)
@@ -212,7 +236,7 @@ class _Step:
         for m in range(M):
             here = slice(_FRAME + 3 * m, _FRAME + 3 * m + 3)
             C[here, here] = blocks[m]
-        C[free:, free:] = -np.diag(_MEAN_PRIOR**2)
+        C[free:, free:] = -_MEAN_PRIOR
         self.C = C
         by_all = np.einsum("tmia,tmi->ma", weighted, r) - (at.rest - problem.described) / at.scatter**2
         restricted = np.diag([0.0] * 5 + [(_LINE_PRIOR * problem.strip.chord) ** -2.0] * 2)
@@ -256,14 +280,14 @@ class _Step:
         return np.asarray(whole[:-_MEANS, :-_MEANS]), float(np.sqrt(max(variance, 0.0)))
 
 
-def states_of(strip: Strip, tracks: Array, at: Fit, shaking: Array, flap: Array) -> tuple[Array, Array]:
+def states_of(strip: Strip, tracks: Array, at: Fit, shaking: PoseError, flap: Array) -> tuple[Array, Array]:
     """Return states [T, STATES] and jitter [T, 5] of ``tracks`` [T, M, 3] (m) with the rest as in the fit ``at``.
 
     ``flap`` [T]: where the flap angle begins, rad. The tracks are in the order of the fit's rest positions.
     """
     local = np.zeros((len(tracks), _LOCAL))
     local[:, 0] = flap
-    prior = np.concatenate([_STATE_PRIOR, np.maximum(shaking, _STEADY)]) ** -2.0 / at.memory
+    prior = _local_prior(at.memory, shaking.precision(at.turn, at.hinge))
     seen: Mask = np.asarray(np.isfinite(tracks).all(axis=-1))
     measured = at.coordinates(np.nan_to_num(tracks))
     for _ in range(_STATE_STEPS):
@@ -271,7 +295,7 @@ def states_of(strip: Strip, tracks: Array, at: Fit, shaking: Array, flap: Array)
         r = np.where(seen[..., None], measured - q - shaken(q, local[:, STATES:]), 0.0)
         J = np.concatenate([J, by_pose(q)], axis=-1)
         weight = seen / (at.memory * at.noise**2 * (1 + (r**2).sum(-1) / (_CAUCHY * at.noise) ** 2))
-        A = np.einsum("tm,tmia,tmib->tab", weight, J, J, optimize=True) + np.diag(prior)
-        a = np.einsum("tm,tmia,tmi->ta", weight, J, r, optimize=True) - local * prior
+        A = np.einsum("tm,tmia,tmib->tab", weight, J, J, optimize=True) + prior
+        a = np.einsum("tm,tmia,tmi->ta", weight, J, r, optimize=True) - local @ prior
         local += np.linalg.solve(A, a[..., None])[..., 0]
     return local[:, :STATES], local[:, STATES:]

@@ -11,6 +11,7 @@ from wingfit.records.array_types import Array
 from wingfit.records.drive import Drive, FourBarDrive, FourierSeries
 from wingfit.tracking.noise import products
 
+MOST_FRAMES = 300  # of which every period is tried
 _HARMONICS = 4
 _LEAST_EXPLAINED = 0.8
 _LEAST_BEATS = 0.9  # in the recording
@@ -71,6 +72,23 @@ def flapping_of(times: Array, angle: Array, trend: int = 0, known: float | None 
     c = inverse @ (X.T @ y)
     harmonics = np.array([c[0], *(c[1 + 2 * k] - 1j * c[2 + 2 * k] for k in range(_HARMONICS))])
     return Flapping(best, 1 - _left(t, y, powers, best) / max(float(y.var()), 1e-300), weights, harmonics)
+
+
+def strongest(times: Array, angle: Array) -> float:
+    """Return the apparent frequency (Hz) of the flap ``angle`` [T] (rad; NaN where unknown) at ``times`` [T], s.
+
+    For recordings that are too long to try every period: the largest line of the spectrum, refined.
+    """
+    seen = np.isfinite(angle)
+    t, y = times[seen] - times[seen][0], angle[seen]
+    even = np.linspace(0.0, float(t[-1]), len(t))
+    spectrum = np.abs(np.fft.rfft(np.interp(even, t, y - np.polyval(np.polyfit(t, y, 2), t))))
+    line = (1 + int(np.argmax(spectrum[1:]))) / float(t[-1])
+    powers = np.polynomial.legendre.legvander(2 * t / t[-1] - 1, 2)[:, 1:]
+    grid = line + np.arange(-1.0, 1.0, 0.1) / float(t[-1])
+    grid = grid[grid * t[-1] > _LEAST_BEATS]
+    best = min(grid.tolist(), key=lambda f: _left(t, y, powers, f), default=_LEAST_BEATS / float(t[-1]))
+    return _near(t, y, powers, best)
 
 
 def _near(t: Array, y: Array, powers: Array, frequency: float) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -10,22 +10,20 @@ from scipy.spatial.transform import Rotation
 from wingfit.records.array_types import Array, Index
 from wingfit.records.errors import DatasetError, fail
 from wingfit.records.wing import Wing
-from wingfit.tracking.alignment.arrangements import DISTINCT, Arrangement, Search, ranked
-from wingfit.tracking.alignment.body_motion import by_markers, without_slow_motion
+from wingfit.tracking.alignment.arrangements import DISTINCT, LEAST_MARKERS, Arrangement, Search, ranked
 from wingfit.tracking.alignment.candidates import gate_of, layout_of, with_all
 from wingfit.tracking.alignment.fit import Fit, fit, shaken, states_of
 from wingfit.tracking.alignment.flapping import Flapping, drive_series, flapping_of, half_range
 from wingfit.tracking.alignment.identity import exchanges, frame_by_frame, gathered
+from wingfit.tracking.alignment.preparation import Prepared, described_of, prepared
 from wingfit.tracking.alignment.report import Frame, aligned
 from wingfit.tracking.alignment.request import LEAST_TRACKS, Known, Tracks, checked
 from wingfit.tracking.alignment.result import AlignedTracks, DroppedTrack
-from wingfit.tracking.alignment.rigid_motion import RigidMotion, rigid_motion
+from wingfit.tracking.alignment.rigid_motion import RigidMotion
 from wingfit.tracking.alignment.wing_model import Strip, positions, strip_of
 
-MOST_FRAMES = 400  # from which the frame is estimated; all are aligned
 _CHUNK = 2000
-_LEAST_AMPLITUDE = np.radians(4.0)
-_SIZES = (0.6, 1.7)  # ratio of the tracks' extent to that of the described markers
+_PREPARED, _SEARCHED = 0.2, 0.8  # parts of the work, about
 _AMPLITUDES = (0.6, 1.7)  # ratio of the flap amplitude to that of the drive
 _LEAST_EXPLAINED = 0.8  # of the variance of the flap angle, by one period
 _MOST_NOISE, _MOST_SCATTER = 0.015, 0.0099  # spans
@@ -34,82 +32,27 @@ _LEAST_SAMPLES = 8
 _LEAST_UP = 0.2
 
 
-@dataclass(frozen=True, eq=False)
-class _Prepared:
-    """Tracks without the motion of the body, and the first look at them."""
-
-    tracks: Tracks
-    frames: Index
-    motion: RigidMotion
-    flapping: Flapping
-    shaking: Array
-    remarks: list[str]
-
-
-def align(tracks: Tracks, wing: Wing, known: Known) -> AlignedTracks:
+def align(
+    tracks: Tracks, wing: Wing, known: Known, report: Callable[[float], object] = lambda _: None
+) -> AlignedTracks:
     """Align ``tracks`` of ``wing`` to its frame, with what the user states, ``known``.
+
+    ``report`` is called with the part of the work that is done, from 0 to 1.
 
     Raises DatasetError, with what would settle it, if the tracks cannot be those of the wing, or if the frame, the side
     or the labels are not certain.
     """
     checked(tracks, wing)
     known.check(tracks, wing)
-    found = _prepared(tracks, wing, known)
+    found = prepared(tracks, wing, known)
     strip, described = strip_of(wing), described_of(wing)
-    best, evidence = _arranged(found, wing, strip, described, known)
+    report(_PREPARED)
+    best, evidence = _arranged(found, wing, strip, described, known, report)
+    report(_SEARCHED)
     return _finished(found, wing, strip, described, best, evidence, known)
 
 
-def described_of(wing: Wing) -> Array:
-    """Return the described rest positions [M, 3] of the markers in hinge coordinates, m."""
-    rest: Array = np.array([marker.position for marker in wing.markers])
-    return np.asarray(rest - np.array([0.0, wing.hinge.y, wing.hinge.z]))
-
-
-def _prepared(tracks: Tracks, wing: Wing, known: Known) -> _Prepared:
-    remarks = list[str]()
-    shaking = np.zeros(5)
-    if known.body:
-        body = by_markers(tracks, known.body)
-        tracks = tracks.only(np.array([name not in known.body for name in tracks.names]))
-        tracks = Tracks(tracks.file, tracks.times, tracks.names, body.removed(tracks.positions))
-        remarks.append(body.words)
-        hinge = np.nanmean(tracks.positions, axis=(0, 1)) - body.middle
-        way = np.hypot(body.error[1], body.error[0] * np.linalg.norm(hinge))
-        shaking[:2], shaking[2:] = body.error[0], way
-    usable = np.flatnonzero(np.isfinite(tracks.positions[..., 0]).sum(axis=1) >= LEAST_TRACKS)
-    if len(usable) < LEAST_TRACKS:
-        few = f"{len(usable)} frames show {LEAST_TRACKS} or more tracks; track more markers at a time"
-        raise fail(tracks.file, len(usable), few)
-    frames = usable[:: -(-len(usable) // MOST_FRAMES)]
-    if not known.body:
-        # All frames are corrected, so that the estimate from some of them holds for all.
-        corrected, words = without_slow_motion(tracks.times, tracks.positions)
-        tracks, remarks = Tracks(tracks.file, tracks.times, tracks.names, corrected), remarks + words
-    motion = rigid_motion(tracks.positions[frames])
-    _check_size(tracks, wing, motion)
-    amplitude = float(np.nanmax(motion.angle) - np.nanmin(motion.angle)) / 2
-    if amplitude < _LEAST_AMPLITUDE:
-        few = (
-            f"the wing turns by +-{np.degrees(amplitude):.2g} deg; at least {np.degrees(_LEAST_AMPLITUDE):.2g} deg are"
-        )
-        raise fail(tracks.file, None, f"too little motion: {few} needed to see its hinge; align a recording that flaps")
-    return _Prepared(tracks, frames, motion, flapping_of(tracks.times[frames], motion.angle), shaking, remarks)
-
-
-def _check_size(tracks: Tracks, wing: Wing, motion: RigidMotion) -> None:
-    shape = motion.shape[np.isfinite(motion.shape[:, 0]) & (motion.weight > 0.3)]
-    rest = described_of(wing)
-    ratio = float(np.sqrt(shape.var(axis=0).sum() / rest.var(axis=0).sum()))
-    if not _SIZES[0] < ratio < _SIZES[1]:
-        message = (
-            f"the tracks that move together spread {ratio:.3g} times as far as the described markers; the ratio must "
-            f"be within {_SIZES[0]:g} to {_SIZES[1]:g}: is the unit right, and is it the described wing?"
-        )
-        raise fail(tracks.file, f"{ratio:.3g}", message)
-
-
-def _given(found: _Prepared, wing: Wing, known: Known) -> tuple[Index, Index]:
+def _given(found: Prepared, wing: Wing, known: Known) -> tuple[Index, Index]:
     """Markers [K] by the tracks' names, and those that the user stated; -1 for none."""
     number = {marker.name: m for m, marker in enumerate(wing.markers)}
     stated = np.array([number[known.labels[name]] if name in known.labels else -1 for name in found.tracks.names])
@@ -120,27 +63,49 @@ def _given(found: _Prepared, wing: Wing, known: Known) -> tuple[Index, Index]:
 
 
 def _arranged(
-    found: _Prepared, wing: Wing, strip: Strip, described: Array, known: Known
+    found: Prepared, wing: Wing, strip: Strip, described: Array, known: Known, report: Callable[[float], object]
 ) -> tuple[Arrangement, float | None]:
     tracks, motion = found.tracks, found.motion
     search = Search(
         strip, described, tracks.positions[found.frames], motion, layout_of(motion), found.flapping.mean, found.shaking
     )
     named, stated = _given(found, wing, known)
-    sides = [True, False] if known.side is None else [known.side == "right"]
-    up, every = known.up_vector(), list[Arrangement]()
-    for candidate in search.candidates(named):
-        for right in sides:
+    up, every, excluded = known.up_vector(), list[Arrangement](), list[Arrangement]()
+    tried = search.candidates(named)
+    for done, candidate in enumerate(tried):
+        report(_PREPARED + (_SEARCHED - _PREPARED) * done / len(tried))
+        for right in (True, False):
             one = search.arranged(candidate, right, stated, named)
-            if one is None or (up is not None and _up(one.fit, up) < 0):
+            if one is None:
                 continue
-            if not any(other.fit.right == right and np.array_equal(other.marker, one.marker) for other in every):
-                every.append(one)
+            allowed = known.side in (None, "right" if right else "left") and (up is None or _up(one.fit, up) > 0)
+            group = every if allowed else excluded
+            if not any(other.fit.right == right and np.array_equal(other.marker, one.marker) for other in group):
+                group.append(one)
     if not every:
         remedy = "check the described positions and the unit, or the directions that you gave"
-        raise fail(tracks.file, None, f"no arrangement of the described markers fits the tracks; {remedy}")
+        near = max(((one.marker >= 0).sum() for one in tried), default=0)
+        message = (
+            f"no arrangement of the described markers fits the tracks: at most {near} of {len(tracks.names)} are near"
+        )
+        raise fail(tracks.file, None, f"{message} one at a time, and after a fit fewer than {LEAST_MARKERS}; {remedy}")
     best, evidence = _best(every, described, named, tracks, wing)
+    _check_stated(best, excluded, described, wing, known)
     return best, evidence if known.side is None and up is None else None
+
+
+def _check_stated(best: Arrangement, excluded: list[Arrangement], described: Array, wing: Wing, known: Known) -> None:
+    """Raise DatasetError if what the user said about the side contradicts the tracks."""
+    costs = {id(one): cost for cost, one in ranked([best, *excluded], described, wing.span)}
+    worse = max((costs[id(best)] - costs[id(one)] for one in excluded), default=0.0)
+    if worse > DISTINCT:
+        stated, value = ("--side", known.side) if known.side else ("--up", known.up)
+        message = (
+            f"the tracks are those of a {'left' if best.fit.right else 'right'} wing: ln of the odds against "
+            f"{stated} {value} is {worse / 2:.3g}, and at most {DISTINCT / 2:g} is accepted. Leave {stated} away; if "
+            "it is right, the axes of the tracks are left-handed, or z of the described markers has the wrong sign"
+        )
+        raise fail(stated, value, message)
 
 
 def _up(one: Fit, up: Array) -> float:
@@ -203,7 +168,7 @@ def _labels_open(
 
 
 def _finished(
-    found: _Prepared,
+    found: Prepared,
     wing: Wing,
     strip: Strip,
     described: Array,
@@ -216,7 +181,7 @@ def _finished(
     marker = np.where(best.doubtful, -1, best.marker)
     _check_match(tracks, best, found.motion, strip)
     points = np.where(best.doubtful[None, :, None], np.nan, tracks.positions)
-    flap = np.interp(np.arange(len(tracks.times)), found.frames, best.fit.states[:, 0])
+    flap = found.flap_angles(best.fit.states[:, 0])
     gate = gate_of(described[:, :2])
     which = best.marker[best.marker >= 0]
     rest = described.copy()
@@ -249,9 +214,9 @@ def _finished(
     return aligned(tracks, wing, final, frame, used, shown, mine, changed, dropped, lost, remarks)
 
 
-def _steadied(mine: Array, strip: Strip, final: Fit, found: _Prepared) -> Array:
+def _steadied(mine: Array, strip: Strip, final: Fit, found: Prepared) -> Array:
     """Return positions [T, M, 3] of the markers, m, without what remains of the body's motion."""
-    flap = np.interp(np.arange(len(mine)), found.frames, final.states[:, 0])
+    flap = found.flap_angles(final.states[:, 0])
     result = mine.copy()
     for start in range(0, len(mine), _CHUNK):
         part = slice(start, start + _CHUNK)

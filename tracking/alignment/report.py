@@ -79,7 +79,7 @@ def aligned(
         rotation=frame.turn,
         origin=origin,
         rotation_error=rotation_error,
-        origin_error=np.hypot(pose[2:5], SHIFT_ERROR * span),
+        origin_error=np.hypot(pose[2:5], np.hypot(SHIFT_ERROR * span, _by_rotation(final.rest))),
         flap_frequency=frame.flapping.frequency,
         flap_amplitude=half_range(frame.flapping.harmonics),
         mean_flap=frame.zero,
@@ -93,6 +93,15 @@ def aligned(
         lost_samples=lost,
         remarks=tuple(remarks),
     )
+
+
+def _by_rotation(rest: Array) -> Array:
+    """Standard errors [3] of the hinge's position (m) by those of rotations, since the markers' middle is fixed.
+
+    ``rest`` [N, 3]: hinge coordinates of the markers, m. Rotations about x do not move the hinge.
+    """
+    _, y, _ = rest.mean(axis=0)
+    return np.array([MODEL_ERROR[2] * abs(y), 0.0, 0.0])
 
 
 def _triple(values: Array) -> tuple[float, float, float]:

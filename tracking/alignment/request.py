@@ -101,6 +101,12 @@ def checked(tracks: Tracks, wing: Wing) -> None:
         raise fail(
             tracks.file, None, "times must increase, one for each row of positions, and names one for each track"
         )
+    if np.isinf(tracks.positions).any():
+        t, k = np.argwhere(np.isinf(tracks.positions).any(axis=-1))[0]
+        infinite = (
+            f"track {tracks.names[k]!r} is infinite at {tracks.times[t]:g} s; leave a position that was not seen empty"
+        )
+        raise fail(tracks.file, None, infinite)
     if T < LEAST_FRAMES:
         raise fail(tracks.file, T, f"holds {T} frames; at least {LEAST_FRAMES} are needed: record a beat or more")
     if K < LEAST_TRACKS:
