@@ -17,8 +17,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.polynomial import legendre
 import scipy
+from numpy.polynomial import legendre
 
 from wingfit.inference.noise.drift_of_mean import MeanPowers, change_of_mean, mean_distances
 from wingfit.inference.noise.mean_beat import fourier_basis, masks_of

@@ -50,7 +50,8 @@ def _basis(recording: Recording, count: int) -> Array:
     return np.concatenate([np.cos(angles), np.sin(angles[1:])])
 
 
-# A search compares with one recording after the other, and again: without these, half of its time goes into cosines and gains.
+# A search compares with one recording after the other, and again: without these, half of its time goes into cosines
+# and gains.
 _recent_basis = lru_cache(maxsize=16)(_basis)
 _last_basis = lru_cache(maxsize=1)(_basis)
 
