@@ -73,4 +73,6 @@ def _solved(
     return np.asarray(states).T, failed
 
 
-_solved_with_room = FunctionType(_solved.__code__.replace(co_stacksize=FRAME_SLOTS), globals(), _solved.__name__)
+_solved_with_room: Callable[..., tuple[Array, str | None]] = FunctionType(
+    _solved.__code__.replace(co_stacksize=FRAME_SLOTS), globals(), _solved.__name__
+)
