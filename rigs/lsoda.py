@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from types import FunctionType
 
 import numpy as np
 from scipy.integrate import odeint, solve_ivp
@@ -11,6 +12,11 @@ from scipy.integrate import odeint, solve_ivp
 from wingfit.records.array_types import Array, ArrayLike, Float
 
 MOST_STEPS = 10**8  # from one instant to the next: the rate itself ends an integration without progress
+
+# Python allocates the frames of functions in chunks of 16 KiB. Where the end of a chunk happens to lie between the
+# solver and the rate, every evaluation of the rate allocates a chunk and frees it, which doubles the time. A frame of
+# this size fits into no such chunk: it gets one of 64 KiB, in which 40 KiB are left for the frames of the rate.
+FRAME_SLOTS = 3100
 
 # Older versions of scipy keep the state of this solver in global memory.
 _one_at_a_time = threading.RLock()
@@ -36,7 +42,7 @@ def lsoda(
             return _explicit(rate, start, times, rtol, atol, longest)
         _thread.solving = True
         try:
-            return _solved(rate, start, times, rtol, atol, longest)
+            return _solved_with_room(rate, start, times, rtol, atol, longest)
         finally:
             _thread.solving = False
 
@@ -65,3 +71,8 @@ def _solved(
     )
     failed = None if known["message"] == "Integration successful." else str(known["message"])
     return np.asarray(states).T, failed
+
+
+_solved_with_room: Callable[..., tuple[Array, str | None]] = FunctionType(
+    _solved.__code__.replace(co_stacksize=FRAME_SLOTS), globals(), _solved.__name__
+)

@@ -17,8 +17,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 from numpy.polynomial import legendre
-from scipy import stats
 
 from wingfit.inference.noise.drift_of_mean import MeanPowers, change_of_mean, mean_distances
 from wingfit.inference.noise.mean_beat import fourier_basis, masks_of
@@ -169,7 +169,7 @@ def _compared(parts: list[_Powers], samples: int) -> Change:
     found = []
     for power, count in zip(slow, of_slow, strict=True):
         ratio = float((power / count / level).mean() / max(around, 1e-300))
-        chance = float(stats.f.sf(ratio / RISE, sources * count.mean() / 2, sources * lines.mean() / 2))
+        chance = float(scipy.stats.f.sf(ratio / RISE, sources * count.mean() / 2, sources * lines.mean() / 2))
         found.append((len(slow) * chance, -ratio))
     probability, ratio = min(found)
     beyond = float((slow[-1] - of_slow[-1] * noise).sum())

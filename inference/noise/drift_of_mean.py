@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
+import scipy
 
 from wingfit.inference.noise.slow_change import Change, independent_sources
 from wingfit.records.array_types import Array, Float
@@ -79,7 +79,7 @@ def change_of_mean(parts: list[MeanPowers], samples: int) -> Change:
     found = []
     for count in range(1, degrees + 1):
         ratio = float(slow[:count].mean() / max(expected[:count].mean(), 1e-300))
-        chance = float(stats.f.sf(ratio, sources * count, sources * 2 * lines))
+        chance = float(scipy.stats.f.sf(ratio, sources * count, sources * 2 * lines))
         found.append((degrees * chance, -ratio))
     probability, ratio = min(found)
     beyond = float(((slow - expected[:, None]) * level).sum())

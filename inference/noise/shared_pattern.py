@@ -11,7 +11,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy import stats
+import scipy
 
 from wingfit.records.array_types import Array, Bool, Float, Mask
 
@@ -56,7 +56,7 @@ def shared_part(scatter: Float[Array, "T C"], valid: Bool[Mask, "T C"], position
     noise = found.other / found.other_patterns
     ratio = found.smooth / found.smooth_patterns / noise
     freedom = [2.0 * found.frames * n / enough.sum() for n in (found.smooth_patterns, found.other_patterns)]
-    if stats.f.sf(ratio, *freedom) > CHANCE:
+    if scipy.stats.f.sf(ratio, *freedom) > CHANCE:
         return 0.0
     return (found.smooth - noise * found.smooth_patterns) / (found.smooth + found.other)
 

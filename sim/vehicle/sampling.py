@@ -7,11 +7,12 @@ from functools import lru_cache
 
 import numpy as np
 
-from wingfit.records import Recording
+from wingfit.records import LowPass, Recording
 from wingfit.records.array_types import Array, Index
 from wingfit.sim.filtering import gain, low_passed, sampling_rate
 
 _NEGLIGIBLE = 1e-9  # gain below which a harmonic is omitted
+_LARGE = 2**18  # numbers; of larger bases only the last one is cached
 
 
 def series_of(forces: Array, harmonics: int, recording: Recording) -> Array:
@@ -21,8 +22,7 @@ def series_of(forces: Array, harmonics: int, recording: Recording) -> Array:
     """
     spectrum = np.fft.rfft(forces)[..., : harmonics + 1] / forces.shape[-1]
     if recording.low_pass:
-        frequency = np.arange(harmonics + 1) * recording.condition.flap_frequency
-        spectrum = spectrum * gain(recording.low_pass, sampling_rate(recording), frequency)
+        spectrum = spectrum * _gain_at_harmonics(recording, recording.low_pass, harmonics)
     spectrum[..., 1:] *= 2
     return np.concatenate([spectrum.real, -spectrum.imag[..., 1:]], axis=-1)
 
@@ -32,7 +32,6 @@ def phases(recording: Recording, times: Array) -> Array:
     return np.asarray(2 * np.pi * recording.condition.flap_frequency * times)
 
 
-@lru_cache(maxsize=1)  # of the last recording only, since those of long recordings are large
 def basis_of(recording: Recording, harmonics: int) -> tuple[Array, Index]:
     """Cosines, then sines, of the harmonics that the recording's low-pass passes, at its T instants: [R, T].
 
@@ -40,11 +39,28 @@ def basis_of(recording: Recording, harmonics: int) -> tuple[Array, Index]:
     """
     k = np.arange(harmonics + 1)
     if recording.low_pass:
-        rate = sampling_rate(recording)
-        passed = gain(recording.low_pass, rate, k * recording.condition.flap_frequency) > _NEGLIGIBLE
+        passed = _gain_at_harmonics(recording, recording.low_pass, harmonics) > _NEGLIGIBLE
         k = k[: int(np.flatnonzero(passed)[-1]) + 1]
-    angles = k[:, None] * phases(recording, recording.times)
-    return np.concatenate([np.cos(angles), np.sin(angles[1:])]), np.concatenate([k, harmonics + k[1:]])
+    cached = _last_basis if 2 * len(k) * len(recording.times) > _LARGE else _recent_basis
+    return cached(recording, len(k)), np.concatenate([k, harmonics + k[1:]])
+
+
+def _basis(recording: Recording, count: int) -> Array:
+    angles = np.arange(count)[:, None] * phases(recording, recording.times)
+    return np.concatenate([np.cos(angles), np.sin(angles[1:])])
+
+
+# A search compares with one recording after the other, and again: without these, half of its time goes into cosines
+# and gains.
+_recent_basis = lru_cache(maxsize=16)(_basis)
+_last_basis = lru_cache(maxsize=1)(_basis)
+
+
+@lru_cache(maxsize=64)
+def _gain_at_harmonics(recording: Recording, low_pass: LowPass, harmonics: int) -> Array:
+    """Gain [K + 1] of ``low_pass`` at harmonics 0 to K of the flap frequency of ``recording``."""
+    frequency = np.arange(harmonics + 1) * recording.condition.flap_frequency
+    return gain(low_pass, sampling_rate(recording), frequency)
 
 
 def passed(added: Array, recording: Recording) -> Array:

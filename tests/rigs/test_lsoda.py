@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import resource
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -116,3 +117,25 @@ def test_rates_that_are_not_finite_fail_with_a_reason(rate: object, message: str
     run = Run("one", TIMES, {}, {}, TIMES)
     with pytest.raises(SimulationError, match=message):
         run.integrate(rate, [1.0])  # type: ignore[arg-type]
+
+
+def test_no_rate_allocates_a_chunk_of_frames_at_any_depth_of_the_stack() -> None:
+    """Every page of a new chunk is a page fault; at an unlucky depth each of the rates would cause some."""
+    rates = 0
+
+    def rate(t: float, state: Array) -> list[float]:
+        nonlocal rates
+        rates += 1
+        return swing(t, state)
+
+    def faults_at(depth: int) -> int:
+        if depth > 0:
+            return faults_at(depth - 1)
+        before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
+        lsoda(rate, np.ones(2), TIMES, 1e-8, TOLERANCE, np.inf)
+        return resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before
+
+    faults_at(0)  # what is allocated once
+    each = rates
+    assert each > 500
+    assert max(faults_at(depth) for depth in range(0, 200, 3)) < each / 2

@@ -78,10 +78,11 @@ class Api:
 
     @staticmethod
     def _until(fetch: Callable[[], Json], condition: Callable[[Json], bool], seconds: float) -> Json:
-        deadline = time.monotonic() + seconds
+        deadline, pause = time.monotonic() + seconds, 0.01
         while not condition(job := fetch()):
             assert time.monotonic() < deadline, f"the job stays as {job}"
-            time.sleep(0.01)
+            time.sleep(pause)
+            pause = min(1.2 * pause, 0.1)  # asking takes time from what is waited for
         return job
 
     def diagnose(self, dataset_id: str | None, **body: Any) -> Json:
