@@ -16,7 +16,7 @@ class ImportCalls(Transport):
     """Base class of the client: sends files of tracking systems; the server stores nothing of them.
 
     ``options`` are those of :func:`wingfit.import_tracks`: unit, rate_hz, axes, format, time_unit, decimal, columns,
-    rows, keep_zeros, keep_unlabelled, incomplete.
+    rows, keep_zeros, keep_unlabelled, incomplete, markers, repeated.
     """
 
     def import_tracks(

@@ -54,6 +54,14 @@ async def options(
     incomplete: Annotated[
         bool, Form(description="import a file that has other than the count of frames that it states")
     ] = False,
+    markers: Annotated[
+        str | None,
+        Form(max_length=LONGEST, description="only these markers: `tip,root`; * stands for any letters: `right_*`"),
+    ] = None,
+    repeated: Annotated[
+        Literal["gaps", "first"] | None,
+        Form(description="rows with the same time: merge them, with gaps where they differ; or keep the first"),
+    ] = None,
 ) -> Given:
     """Return the options of the form; a 422 lists fields that do not exist, because a misspelt one would be ignored."""
     known = Given.names()
@@ -66,8 +74,9 @@ async def options(
     if faults:
         raise invalid("the form has unknown fields", faults)
     return Given(
-        unit, rate_hz, axes, format, time_unit, decimal, columns, rows, keep_zeros, keep_unlabelled, incomplete
-    )
+        unit, rate_hz, axes, format, time_unit, decimal, columns, rows, keep_zeros, keep_unlabelled, incomplete,
+        markers, repeated,
+    )  # fmt: skip
 
 
 def _known(names: tuple[str, ...]) -> str:
