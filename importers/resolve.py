@@ -20,6 +20,7 @@ from wingfit.records.errors import DatasetError, Faults, fail, shown
 from wingfit.records.limits import MIN_FRAMES
 
 _PIXELS = "px"
+_METRES = 5.0  # numbers below it are more likely metres than millimetres, in an example
 _MIRRORS = {
     "wing": "these axes mirror: right for a left wing in a right-handed frame, wrong for a right wing",
     "body": "these axes mirror, which is wrong unless the frame of the file is left-handed",
@@ -117,7 +118,8 @@ def _unit(raw: Raw, given: Given, file: str, faults: Faults) -> Statement | None
     seen = raw.positions[np.isfinite(raw.positions)]
     numbers = f"they are numbers from {seen.min():.4g} to {seen.max():.4g}" if seen.size else ""
     hint = f" ({raw.unit_hint or numbers})" if raw.unit_hint or numbers else ""
-    message = f"{why}{hint}; add it: --unit mm (one of {known})"
+    example = "m" if seen.size and np.abs(seen).max() < _METRES else "mm"
+    message = f"{why}{hint}; add it: --unit {example} (one of {known})"
     faults.put(question("unit", file, raw.unit.value if raw.unit else None, message, [*UNITS], raw.unit_hint))
     return None
 

@@ -247,7 +247,10 @@ def _check_times(times: Array, raw: Raw, file: str, unit: str = " s") -> None:
         what = "repeats the time of the frame before" if times[at] == times[at - 1] else follows
         message = f"{times[at]:g}{unit} {what}; times must increase: sort the rows"
         if choices := raw.row_choices(times):
-            message += f", or choose those of one recording: {_choices(choices)}"
+            message = (
+                f"{times[at]:g}{unit} {what}, because the table holds several recordings; choose the rows of one, as "
+                f"times must increase: {_choices(choices)}"
+            )
             raise ask("rows", _place(raw, at, file), float(times[at]), message, choices)
         if (np.diff(times) >= 0).all():
             raise repeated(raw, times, file, unit)

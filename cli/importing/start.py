@@ -63,4 +63,4 @@ def show(start: Start, dataset: Path) -> None:
         note(f"replace what is assumed by what you know, in {dataset / 'dataset.yaml'} (docs/formats.md)")
     else:
         note("for a dataset of a wing, say where the axes of the file point: --axes 'x aft, y out, z up'")
-    say(f"next: wingfit datasets check {dataset}")
+    say(f"next: wingfit datasets check {dataset}; then, with a server ('wingfit serve'): wingfit datasets upload {dataset}")

@@ -11,12 +11,15 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from wingfit.importers.markers import allowed
+import numpy as np
+
+from wingfit.importers.markers import allowed, listed
 from wingfit.importers.options import question
 from wingfit.importers.start.frequency import flap_frequency
 from wingfit.importers.start.wing import Fact, describe_wing, refuse_two_wings
-from wingfit.importers.tracks import ImportedTracks
-from wingfit.records.errors import DatasetError, Faults
+from wingfit.importers.tracks import DECIMALS, ImportedTracks
+from wingfit.records.array_types import Array, Float
+from wingfit.records.errors import DatasetError, Faults, fail
 from wingfit.records.limits import MAX_QUANTITIES
 
 PRESSURE_MBAR, TEMPERATURE_C = 1013.25, 20
@@ -64,18 +67,22 @@ def start_dataset(found: Sequence[ImportedTracks], name: str, given: Conditions)
     """
     _check_alike(found)
     names = _recording_names([one.file for one in found], given.rows)
-    tables = {f"recordings/{called}.csv": one.csv() for called, one in zip(names, found, strict=True)}
     head = {"name": json.dumps(name, ensure_ascii=False)}
     if found[0].frame != "wing":
-        yaml, facts = _series(found[0], name)
+        channels, left_out = _channels(found)
+        yaml, facts = _series(channels, left_out, name)
+        tables = {
+            f"recordings/{called}.csv": _columns(one.csv(), channels) for called, one in zip(names, found, strict=True)
+        }
         text = _HEAD.format(**head, about=_SERIES) + yaml + "recordings:\n"
         text += "".join(f"  - {{name: {json.dumps(called)}, settings: {{}}}}\n" for called in names)
         return Start("series", yaml, {"dataset.yaml": text} | tables, facts)
     for one in found:
         refuse_two_wings(one)
+    tables = {f"recordings/{called}.csv": one.csv() for called, one in zip(names, found, strict=True)}
     rates = [_frequency(one, given) for one in found]
     wing = describe_wing(found[0], rates[0], name)
-    source = "user: --flap-frequency-hz" if given.flap_frequency_hz else "tracks"
+    source = "user: --flap-frequency-hz" if given.flap_frequency_hz else "tracks; count the beats to confirm it"
     air = f"{PRESSURE_MBAR:g} mbar, {TEMPERATURE_C} deg C"
     facts = (
         Fact("flap frequency", ", ".join(f"{rate:.4g} Hz" for rate in rates), source),
@@ -94,17 +101,48 @@ def start_dataset(found: Sequence[ImportedTracks], name: str, given: Conditions)
     return Start("wing", wing.yaml, {"dataset.yaml": text} | tables, facts, tuple(rates))
 
 
-def _series(tracks: ImportedTracks, name: str) -> tuple[str, tuple[Fact, ...]]:
-    channels = [f"{marker}_{axis}_m" for marker in tracks.markers for axis in "xyz"]
+def _channels(found: Sequence[ImportedTracks]) -> tuple[list[str], list[str]]:
+    """Return the coordinates that change, and those that never do, which a dataset refuses: a sensor may be broken."""
+    tracks = found[0]
+    coordinates = [(marker, axis) for marker in tracks.markers for axis in range(3)]
+    moved = {
+        (marker, axis): any(_changes(one.positions[:, one.markers.index(marker), axis]) for one in found)
+        for marker, axis in coordinates
+    }
+    names = {(marker, axis): f"{marker}_{'xyz'[axis]}_m" for marker, axis in coordinates}
+    channels = [names[one] for one in coordinates if moved[one]]
+    if not channels:
+        raise fail(tracks.file, None, "holds markers that never move; export a part in which they do")
     if len(channels) > MAX_QUANTITIES:
         message = (
             f"has {len(tracks.markers)} markers; a dataset of positions holds {MAX_QUANTITIES // 3}: choose those "
             f"that you need: --markers {','.join(tracks.markers[:3])}"
         )
         raise DatasetError([question("markers", tracks.file, len(tracks.markers), message)])
+    return channels, [names[one] for one in coordinates if not moved[one]]
+
+
+def _changes(values: Float[Array, " T"]) -> bool:
+    seen = np.round(values[np.isfinite(values)], DECIMALS)
+    return bool(seen.size and seen.max() > seen.min())
+
+
+def _series(channels: Sequence[str], left_out: Sequence[str], name: str) -> tuple[str, tuple[Fact, ...]]:
     lines = [f"rig: {json.dumps(name, ensure_ascii=False)}", "channels:"]
     lines += [f"  - {{name: {json.dumps(channel)}, unit: m}}" for channel in channels]
-    return "\n".join([*lines, ""]), (Fact("channels", f"{len(channels)}, x, y and z of each marker", "tracks"),)
+    facts = [Fact("channels", f"{len(channels)}: x, y and z of the markers", "tracks")]
+    if left_out:
+        facts.append(Fact("left out", f"{len(left_out)} coordinates that never change: {listed(left_out)}", "tracks"))
+    return "\n".join([*lines, ""]), tuple(facts)
+
+
+def _columns(csv: str, channels: Sequence[str]) -> str:
+    """Return the table ``csv`` with the columns of time and ``channels``."""
+    rows = [line.split(",") for line in csv.splitlines()]
+    keep = [k for k, column in enumerate(rows[0]) if k == 0 or column in channels]
+    if len(keep) == len(rows[0]):
+        return csv
+    return "".join(",".join([row[k] for k in keep]) + "\n" for row in rows)
 
 
 def _frequency(tracks: ImportedTracks, given: Conditions) -> float:

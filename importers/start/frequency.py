@@ -9,8 +9,8 @@ from wingfit.records.array_types import Array, Float
 HARMONICS = 2
 LEAST_BEATS = 1.5  # in a recording, of the lowest frequency that is tried
 LEAST_EXPLAINED = 0.8  # of the variance, by the harmonics of the frequency; with less, no frequency is clear
-PARTS = ((0.0, 1.0), (0.0, 0.5), (0.5, 1.0), (0.25, 0.75))  # of a recording that are tried: a bird flaps, then glides
-LEAST_ROWS = 16
+PARTS = ((0.0, 1.0), (0.0, 0.5), (0.5, 1.0), (0.25, 0.75), (0.0, 0.34), (0.33, 0.67), (0.66, 1.0))  # of a recording that are tried: a bird flaps, then glides
+LEAST_ROWS = 24
 AS_GOOD = 0.9  # of the variance that the best frequency explains: multiples of a beat explain as much as the beat
 MOST_ROWS, MOST_TRIED, MOST_COLUMNS = 600, 1500, 12
 
@@ -38,7 +38,9 @@ def _of_part(since: Array, values: Array) -> float | None:
     """Return the frequency (Hz) of ``values`` [T, C] at the times ``since`` (s); None if none is clear."""
     if len(since) < LEAST_ROWS or not np.ptp(values, axis=0).max() > 0:
         return None
-    since, values = since - since[0], values - values.mean(axis=0)
+    since = since - since[0]
+    drift = np.column_stack([np.ones_like(since), since])
+    values = values - drift @ np.linalg.lstsq(drift, values, rcond=None)[0]
     lowest = LEAST_BEATS / since[-1]
     highest = 0.25 / float(np.median(np.diff(since)))
     if highest <= lowest:
@@ -57,8 +59,8 @@ def _of_part(since: Array, values: Array) -> float | None:
 
 
 def _explained(times: Array, values: Array, frequency: float) -> float:
-    """Return the fraction of the variance of ``values`` [T, C] that harmonics of ``frequency`` (Hz) explain."""
+    """Return the fraction of the squares of ``values`` [T, C] that a line and harmonics of ``frequency`` (Hz) explain."""
     turn = 2 * np.pi * frequency * times[:, None] * np.arange(1, HARMONICS + 1)
-    basis, _ = np.linalg.qr(np.column_stack([np.ones_like(times), np.cos(turn), np.sin(turn)]))
+    basis, _ = np.linalg.qr(np.column_stack([np.ones_like(times), times, np.cos(turn), np.sin(turn)]))
     left = values - basis @ (basis.T @ values)
     return 1.0 - float((left**2).sum() / (values**2).sum())

@@ -13,6 +13,7 @@ from wingfit.service.http.problems import error_item, invalid
 
 LONGEST = 50_000
 FILE = "file"
+FLAP_FREQUENCY = "flap_frequency_hz"  # of the description alone
 
 
 async def options(
@@ -64,7 +65,7 @@ async def options(
     ] = None,
 ) -> Given:
     """Return the options of the form; a 422 lists fields that do not exist, because a misspelt one would be ignored."""
-    known = Given.names()
+    known = (*Given.names(), *([FLAP_FREQUENCY] if request.url.path.endswith("/description") else []))
     form = await request.form()
     faults = [
         error_item(f"body.{name[:200]}", value if isinstance(value, str) else None, f"unknown field; {_known(known)}")
