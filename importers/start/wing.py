@@ -119,7 +119,7 @@ def _hinge(places: Float[Array, "T M 3"]) -> tuple[Array, str]:
     middle = np.nanmedian(places[..., 1], axis=0)
     inside = float(middle.min())
     if centre[0] < inside and (np.nanstd(radius, axis=0) < _STEADY * np.nanmean(radius, axis=0)).all():
-        return centre, "from the tracks: the markers move on circles about it"
+        return np.round(centre, 4) + 0.0, "from the tracks: the markers move on circles about it"
     if inside > 0:
         return np.zeros(2), "assumed: the origin of the axes"
     span = float(middle.max()) - inside
