@@ -32,7 +32,9 @@ def repeated(raw: Raw, order: Array | Index, file: str, unit: str = "") -> Datas
         says += f"; these differ in the positions of {', '.join(names[:_LISTED])}{more}"
     else:
         says += ", with the same positions"
-    remedy = "merge such rows, with gaps where they differ: --repeated gaps; or keep the first of them: --repeated first"
+    remedy = (
+        "merge such rows, with gaps where they differ: --repeated gaps; or keep the first of them: --repeated first"
+    )
     return ask("repeated", f"{file}, {raw.line_word} {raw.lines[first + 1]}", float(order[first]), f"{says}; {remedy}",
                REPEATED)  # fmt: skip
 

@@ -31,7 +31,10 @@ def check(dataset: Path | None, output: Path | None, flap_frequency_hz: float | 
 
 
 def started(
-    found: list[ImportedTracks], dataset: Path | None, flap_frequency_hz: float | None, airspeed: float | None,
+    found: list[ImportedTracks],
+    dataset: Path | None,
+    flap_frequency_hz: float | None,
+    airspeed: float | None,
     rows: str | None,
 ) -> Start | None:
     """Write the dataset of the tracks ``found`` to the new folder ``dataset``; WingfitError says what is missing."""
@@ -44,7 +47,9 @@ def started(
         start = start_dataset(found, dataset.name, Conditions(flap_frequency_hz, airspeed, rows))
     except DatasetError as error:
         faults = [vars(fault) for fault in error.errors]
-        raise WingfitError("no dataset was written", f"{len(faults)} error{'s' if len(faults) > 1 else ''}", errors=faults) from None
+        raise WingfitError(
+            "no dataset was written", f"{len(faults)} error{'s' if len(faults) > 1 else ''}", errors=faults
+        ) from None
     try:
         (dataset / "recordings").mkdir(parents=True)
         for name, text in start.files.items():
@@ -63,4 +68,6 @@ def show(start: Start, dataset: Path) -> None:
         note(f"replace what is assumed by what you know, in {dataset / 'dataset.yaml'} (docs/formats.md)")
     else:
         note("for a dataset of a wing, say where the axes of the file point: --axes 'x aft, y out, z up'")
-    say(f"next: wingfit datasets check {dataset}; then, with a server ('wingfit serve'): wingfit datasets upload {dataset}")
+    say(
+        f"next: wingfit datasets check {dataset}; then, with a server ('wingfit serve'): wingfit datasets upload {dataset}"
+    )

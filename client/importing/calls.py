@@ -44,7 +44,9 @@ class ImportCalls(Transport):
 
         ``options`` may have ``flap_frequency_hz``, too. WingfitError lists what the tracks do not show.
         """
-        return cast(FirstDescription, self._post_tracks("/v1/imports/description", Path(path), on_bytes, options).json())
+        return cast(
+            FirstDescription, self._post_tracks("/v1/imports/description", Path(path), on_bytes, options).json()
+        )
 
     def _post_tracks(self, url: str, path: Path, on_bytes: OnBytes | None, options: Options) -> Any:
         if not path.is_file():

@@ -78,7 +78,9 @@ def read(source: Source, given: Given) -> Raw:
     ignored = [name for index, name in enumerate(header) if index not in used and name]
     if ignored:
         raw.remarks.append(f"not imported: {_listed(ignored)}")
-        raw.row_choices = lambda order: row_choices(source.rows(separator, line + 1), raw.lines, header, ignored, order, given.rows)
+        raw.row_choices = lambda order: row_choices(
+            source.rows(separator, line + 1), raw.lines, header, ignored, order, given.rows
+        )
     return raw
 
 

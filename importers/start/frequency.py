@@ -9,7 +9,15 @@ from wingfit.records.array_types import Array, Float
 HARMONICS = 2
 LEAST_BEATS = 1.5  # in a recording, of the lowest frequency that is tried
 LEAST_EXPLAINED = 0.8  # of the variance, by the harmonics of the frequency; with less, no frequency is clear
-PARTS = ((0.0, 1.0), (0.0, 0.5), (0.5, 1.0), (0.25, 0.75), (0.0, 0.34), (0.33, 0.67), (0.66, 1.0))  # of a recording that are tried: a bird flaps, then glides
+PARTS = (
+    (0.0, 1.0),
+    (0.0, 0.5),
+    (0.5, 1.0),
+    (0.25, 0.75),
+    (0.0, 0.34),
+    (0.33, 0.67),
+    (0.66, 1.0),
+)  # of a recording that are tried: a bird flaps, then glides
 LEAST_ROWS = 24
 AS_GOOD = 0.9  # of the variance that the best frequency explains: multiples of a beat explain as much as the beat
 MOST_ROWS, MOST_TRIED, MOST_COLUMNS = 600, 1500, 12

@@ -77,7 +77,9 @@ def test_times_must_be_complete_and_increase(cells: dict[str, Any], words: tuple
 
 def test_numbers_of_frames_must_increase_and_be_whole() -> None:
     lines = text_writers.vicon(flapping(), devices=False).splitlines(keepends=True)
-    assert "the first (5) in lines 10 and 11, with the same positions" in refused("".join([*lines[:10], lines[9], *lines[10:]]))
+    assert "the first (5) in lines 10 and 11, with the same positions" in refused(
+        "".join([*lines[:10], lines[9], *lines[10:]])
+    )
     assert "frame 5 follows 6" in refused("".join([*lines[:9], lines[10], lines[9], *lines[11:]]))
     assert "must be a whole number" in refused("".join(lines).replace("\n7,0,", "\n6.5,0,"))
 
