@@ -11,7 +11,9 @@ LOGGER = logging.getLogger(__name__)
 NOT_CARRIED_OUT = "not carried out"
 
 
-def guarded(check: str, where: str, carry_out: Callable[[], Iterable[Mistake | None] | Mistake | None]) -> list[Mistake]:
+def guarded(
+    check: str, where: str, carry_out: Callable[[], Iterable[Mistake | None] | Mistake | None]
+) -> list[Mistake]:
     """Return what ``carry_out`` finds, None left out; if it raises, a warning that ``check`` could not be carried out.
 
     ``where``: place in the dataset that is checked, as in :attr:`wingfit.checks.Mistake.where`.

@@ -20,7 +20,7 @@ from wingfit.checks.load import DatasetWarning
 from wingfit.records import Dataset, DatasetError, Recording, save_dataset
 from wingfit.records.array_types import Array
 
-EXAMPLES = 120
+EXAMPLES = 60
 Change = Callable[[Recording, np.random.Generator], Recording]
 
 
@@ -59,7 +59,9 @@ ODD: dict[str, Change] = {
     "mostly empty": empty(0.97),
     "half empty": empty(0.5),
     "all empty": empty(1.1),
-    "an empty channel": lambda one, _: with_values(one, np.where(np.arange(one.values.shape[1]) == 1, np.nan, one.values)),
+    "an empty channel": lambda one, _: with_values(
+        one, np.where(np.arange(one.values.shape[1]) == 1, np.nan, one.values)
+    ),
     "times far away": lambda one, _: replace(one, times=one.times + 1e9),
     "times close": lambda one, _: replace(one, times=one.times * 1e-9),
     "times apart": lambda one, _: replace(one, times=one.times * 1e9),
@@ -87,7 +89,9 @@ def test_no_dataset_makes_a_check_fail(kind: int, which: list[str], whole: bool,
 
 GOOD: dict[str, Change] = {
     "as it is": lambda one, _: one,
-    "two beats": lambda one, _: rows(int(np.searchsorted(one.times, one.times[0] + 2.2 / one.condition.flap_frequency)))(one, _),
+    "two beats": lambda one, _: rows(
+        int(np.searchsorted(one.times, one.times[0] + 2.2 / one.condition.flap_frequency))
+    )(one, _),
     "gaps": lambda one, rng: empty(0.1)(one, rng) if one.markers else one,
     "rounded": lambda one, _: with_values(one, np.round(one.values, 5)),
     "a little noise": lambda one, rng: with_values(one, one.values + rng.normal(0, 1e-4, one.values.shape)),
@@ -95,8 +99,12 @@ GOOD: dict[str, Change] = {
 }
 
 
-@settings(max_examples=30, deadline=None, derandomize=True, database=None)
-@given(kind=st.integers(0, 1), which=st.lists(st.sampled_from(sorted(GOOD)), max_size=2, unique=True), seed=st.integers(0, 999))
+@settings(max_examples=20, deadline=None, derandomize=True, database=None)
+@given(
+    kind=st.integers(0, 1),
+    which=st.lists(st.sampled_from(sorted(GOOD)), max_size=2, unique=True),
+    seed=st.integers(0, 999),
+)
 def test_no_good_dataset_is_refused(kind: int, which: list[str], seed: int) -> None:
     base, rng = bases()[kind], np.random.default_rng(seed)
     recordings = []
@@ -116,7 +124,10 @@ def test_an_error_in_a_check_is_logged_and_becomes_a_warning(
 
     monkeypatch.setattr("wingfit.checks.examine.check_frequency", broken)
     save_dataset(bases()[0], tmp_path / "wing")
-    with caplog.at_level(logging.ERROR), pytest.warns(DatasetWarning, match="check of the frequency could not be carried"):
+    with (
+        caplog.at_level(logging.ERROR),
+        pytest.warns(DatasetWarning, match="check of the frequency could not be carried"),
+    ):
         assert load_dataset(tmp_path / "wing").kind == "tracks"
     assert "the check of the frequency could not be carried out on recording" in caplog.text
     assert "float division by zero" in caplog.text
