@@ -212,7 +212,8 @@ def _staged(free: tuple[str, ...], recordings: tuple[Recording, ...]) -> tuple[S
         missing, which = ("vacuum", "structural") if structural and not vacuum else ("air", "aerodynamic")
         raise ValueError(
             f"a staged calibration fits the {which} genes on recordings in {missing}, and there is none "
-            f"(vacuum: airspeed 0 and at most {VACUUM_LIMIT / 100:g} mbar); use mode 'joint' (--mode joint) or name other genes"
+            f"(vacuum: airspeed 0 and at most {VACUUM_LIMIT / 100:g} mbar); use mode 'joint' (--mode joint) "
+            "or name other genes"
         )
     stages = (Stage("structure", structural, vacuum), Stage("aerodynamics", aerodynamic, air))
     return tuple(stage for stage in stages if stage.free)

@@ -101,7 +101,7 @@ def resolved(spec: CalibrationSpec, dataset: Dataset) -> CalibrationSpec:
     """
     wing = dataset.kind == "tracks"
     # The markers of a rigid wing show nothing that only vacuum or only air could.
-    default = ("joint" if dataset.wing.structure == "rigid" else "staged") if wing else "local"
+    default: Mode = ("joint" if dataset.wing.structure == "rigid" else "staged") if wing else "local"
     mode, method = spec.mode or default, spec.method or ("genetic" if wing else "gauss_newton")
     _refuse_unknown(mode, method)
     if mode == "staged" and not wing:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 
 from wingfit.checks.axes import check_shape
 from wingfit.checks.conditions import check_conditions
@@ -70,8 +71,8 @@ def _vehicle(dataset: Dataset) -> Iterator[Mistake]:
     blocked = False
     for index, recording in enumerate(dataset.recordings):
         where = f"recording {recording.name!r}"
-        found = guarded("zero forces", where, lambda one=recording: check_zero_forces(one))
-        found = found or guarded("the frequency", where, lambda one=recording, k=index: check_frequency(one, k))
+        found = guarded("zero forces", where, partial(check_zero_forces, recording))
+        found = found or guarded("the frequency", where, partial(check_frequency, recording, index))
         yield from found
         blocked |= bool(found)
     if not blocked:  # estimates, of which some model may have no gene, do not matter: its coefficients are free

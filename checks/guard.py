@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Iterable
+from typing import Literal
 
 from wingfit.checks.mistake import Mistake
 
 LOGGER = logging.getLogger(__name__)
-NOT_CARRIED_OUT = "not carried out"
+NOT_CARRIED_OUT: Literal["not carried out"] = "not carried out"
 
 
 def guarded(

@@ -21,7 +21,7 @@ def repeated(raw: Raw, order: Array | Index, file: str, unit: str = "") -> Datas
     """
     starts, differ = _groups(order), _differing(raw, order)
     first = int(np.flatnonzero(np.diff(order) == 0)[0])
-    names = [name for name, odd in zip(raw.labels, differ.any(axis=0), strict=True) if odd]
+    names = [name for m, name in enumerate(raw.labels) if differ[:, m].any()]
     what = "time" if raw.times is not None else "number"
     count = int(np.count_nonzero(np.diff([*starts, len(order)]) > 1))
     lines = f"{raw.line_word}s {raw.lines[first]} and {raw.lines[first + 1]}"
@@ -51,10 +51,10 @@ def without_repeats(raw: Raw, given: Given) -> Raw:
     remark = f"{len(order) - len(starts)} rows repeat the time of the row before; the first row is kept"
     if given.repeated == "gaps":
         differ = _differing(raw, order)
-        seen = np.isfinite(raw.positions).all(axis=2)
+        seen: Mask = np.all(np.isfinite(raw.positions), axis=2)
         group = np.searchsorted(starts, np.arange(len(order)), side="right") - 1
         for row in np.flatnonzero(np.diff(group, prepend=-1) == 0):
-            fill = seen[row] & ~np.isfinite(positions[group[row]]).all(axis=1)
+            fill: Mask = seen[row] & ~np.all(np.isfinite(positions[group[row]]), axis=1)
             positions[group[row], fill] = raw.positions[row, fill]
         positions[differ] = np.nan
         gaps = f"{int(differ.sum())} positions that differ there are gaps"
@@ -81,4 +81,5 @@ def _differing(raw: Raw, order: Array | Index) -> Mask:
     filled = np.where(np.isfinite(raw.positions), raw.positions, np.inf)
     low = np.minimum.reduceat(filled, starts)
     high = np.maximum.reduceat(np.where(np.isinf(filled), -np.inf, filled), starts)
-    return np.asarray((high > low).any(axis=2))
+    found: Mask = np.any(high > low, axis=2)
+    return found

@@ -29,8 +29,9 @@ def row_choices(
 
     One of the ``columns`` (names in ``header``), or two of them, name the recordings if ``order`` [T] (times, or
     numbers of frames, of the rows at ``lines`` [T]) increases within the rows that have the same values there, but for
-    a few that repeat, for at least half of all rows. ``given``: the value of the option that chose ``lines``. Of several such columns, those are taken for which it does for most rows, then those with
-    the fewest values. None are returned if there are no such columns.
+    a few that repeat, for at least half of all rows. ``given``: the value of the option that chose ``lines``. Of
+    several such columns, those are taken for which it does for most rows, then those with the fewest values. None are
+    returned if there are no such columns.
     """
     texts = _texts(rows, lines, [header.index(name) for name in columns])
     coded = [np.unique(text, return_inverse=True) for text in texts]

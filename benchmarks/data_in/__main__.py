@@ -3,7 +3,8 @@
 Four parts, of which ``--parts`` chooses some. ``formats``: files of other programs, intact and damaged
 (benchmarks/data_in/formats.py). ``mistakes``: deliberate mistakes in datasets, and good datasets
 (benchmarks/mistakes). ``alignment``: tracks in any camera axes (benchmarks/alignment). ``minutes``: how long a new user
-needs from a file to a dataset, by a stated model of a person (benchmarks/data_in/minutes.py). Together they take 20 minutes.
+needs from a file to a dataset, by a stated model of a person (benchmarks/data_in/minutes.py). Together they
+take 25 minutes.
 
 The last line is one JSON object with the keys of all parts that ran. The exit status is 1 if a file is read wrongly, is
 guessed or crashes an importer, if a good dataset has a finding, if an alignment is falsely sure, or if a way from a

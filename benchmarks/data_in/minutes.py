@@ -1,9 +1,9 @@
 """How many minutes a new user needs from the file of a tracking system to a dataset that is shown on the page.
 
-The person of :mod:`benchmarks.data_in.person` knows the file's units and axes, reads the introduction of README.md and the
-sections to which it leads, and then does what the messages say: each option is copied from the error that asks for it, the
-first of several. Installation and the first compilation are not counted. Both ways are really gone: the commands are
-run, and the page is used in a browser.
+The person of :mod:`benchmarks.data_in.person` knows the file's units and axes, reads the introduction of README.md and
+the sections to which it leads, and then does what the messages say: each option is copied from the error that asks for
+it, the first of several. Installation and the first compilation are not counted. Both ways are really gone: the
+commands are run, and the page is used in a browser.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -76,8 +77,8 @@ def run(say: Callable[[str], None], data: Path = DATA) -> tuple[dict[str, Any], 
     if not found:
         return {"minutes_mocap_to_dataset": None, "mocap_to_dataset": result}, True
     for name, source in found.items():
-        row = {"command line": _with_server(lambda url, s, one=source: _by_commands(data, one, url, s)).summary()}
-        page = _with_server(lambda url, s, one=source: _by_page(data, one, url, s, result))
+        row = {"command line": _with_server(partial(_by_commands, data, source)).summary()}
+        page = _with_server(partial(_by_page, data, source, result))
         row |= {} if page is None else {"page": page.summary()}
         result["by_file"][name] = row
         say(f"{name:<22}" + ", ".join(f"{way} {one['minutes']:.1f} min" for way, one in row.items()))
@@ -143,7 +144,7 @@ def _run(person: Person, words: list[str], typed: str) -> tuple[bool, str]:
     """Run a command; the person types it, waits, and reads all output. Return whether it went well, and its output."""
     person.types(len(typed) + 1)
     began = time.monotonic()
-    ran = subprocess.run(
+    ran = subprocess.run(  # noqa: S603  # our own command
         [sys.executable, "-c", PROGRAM, *words],
         cwd=REPOSITORY,
         capture_output=True,
@@ -160,7 +161,7 @@ def _remedies(text: str, source: Source, words: list[str]) -> list[str]:
     """Return the options that the errors in ``text`` name, with the values they offer, or those that the user knows."""
     errors = " ".join(line for line in text.splitlines() if line.startswith("  "))
     known = {"--unit": source.unit, "--time-unit": source.time_unit, "--rows": source.also}
-    found = []
+    found = list[str]()
     for option, value in re.findall(r"(--[a-z-]+)((?: (?!--)[\w.=,*'-]+)?)", errors):
         if option in words or any(one.startswith(f"{option} ") or one == option for one in found):
             continue
@@ -171,7 +172,7 @@ def _remedies(text: str, source: Source, words: list[str]) -> list[str]:
     return found
 
 
-def _by_page(data: Path, source: Source, url: str, start_s: float, result: dict[str, Any]) -> Person | None:
+def _by_page(data: Path, source: Source, result: dict[str, Any], url: str, start_s: float) -> Person | None:
     from benchmarks.data_in import minutes_page
 
     return minutes_page.walked(data, source, url, started(start_s), result)

@@ -27,9 +27,10 @@ TEXT = """(() => {
   const texts = [];
   const walk = (node) => {
     if (node.nodeType === Node.TEXT_NODE) return node.data.trim() && texts.push(node.data.trim());
-    if (node.nodeType !== Node.ELEMENT_NODE || ["SELECT", "SCRIPT", "STYLE", "TEXTAREA"].includes(node.tagName)) return null;
-    if (!node.checkVisibility()) return null;
-    if (node.tagName === "TR") return texts.push([...node.cells].map((cell) => cell.innerText.trim() || "-").join("\\t"));
+    if (node.nodeType !== Node.ELEMENT_NODE || !node.checkVisibility()) return null;
+    if (["SELECT", "SCRIPT", "STYLE", "TEXTAREA"].includes(node.tagName)) return null;
+    const cells = node.tagName === "TR" ? [...node.cells].map((cell) => cell.innerText.trim() || "-") : null;
+    if (cells) return texts.push(cells.join("\\t"));
     return node.childNodes.forEach(walk);
   };
   walk(document.querySelector("main"));
@@ -117,9 +118,8 @@ def _store(walk: Walk, source: Source) -> None:
         walk.until(STORED)
         return
     walk.click("#import-describe")
-    walk.until(
-        "!document.getElementById('import-described').hidden || !document.getElementById('import-describe-errors').hidden"
-    )
+    shown = "!document.getElementById('import-{}').hidden"
+    walk.until(f"{shown.format('described')} || {shown.format('describe-errors')}")
     if page.is_visible("#import-describe-errors"):
         # The message lists the markers of one wing: these are ticked.
         names = page.inner_text("#import-describe-errors").rpartition(" ")[2].strip().split(",")
@@ -127,7 +127,7 @@ def _store(walk: Walk, source: Source) -> None:
         for name in names:
             walk.click(f"[aria-label='Use {name}']")
         walk.click("#import-describe")
-        walk.until("!document.getElementById('import-described').hidden")
+        walk.until(shown.format("described"))
     walk.click("#import-recording [type=submit]")
     walk.until("!document.getElementById('import-dataset-part').hidden")
     walk.click("#import-dataset [type=submit]")

@@ -1,9 +1,10 @@
 """A stated model of a person: how long typing, pointing, thinking and reading take.
 
-The keystroke-level model of Card, Moran and Newell (1983), The Psychology of Human-Computer Interaction, ch. 8: K = 0.28 s
-for a keystroke of an average typist, P = 1.1 s to point with a mouse, B = 0.1 s to press or release its button, H = 0.4
-s to move a hand between mouse and keyboard, M = 1.35 s to prepare a step. Text is read at 200 words a minute, each word
-once, numbers included; of a table, the first five rows, because the others look alike. Machines are waited for.
+The keystroke-level model of Card, Moran and Newell (1983), The Psychology of Human-Computer Interaction, ch. 8:
+K = 0.28 s for a keystroke of an average typist, P = 1.1 s to point with a mouse, B = 0.1 s to press or release its
+button, H = 0.4 s to move a hand between mouse and keyboard, M = 1.35 s to prepare a step. Text is read at 200 words a
+minute, each word once, numbers included; of a table, the first five rows, because the others look alike. Machines are
+waited for.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from dataclasses import dataclass, field
 
 KEY, POINT, BUTTON, HOME, THINK = 0.28, 1.1, 0.1, 0.4, 1.35
 WORDS_PER_MINUTE = 200.0
+KINDS = ("hands", "thought", "reading", "machine")
 ROWS = 5  # of a table that are read
 COLUMNS = 3  # a line with as many, two spaces or a tab apart, is a row of a table
 
@@ -23,7 +25,7 @@ def words(text: str) -> int:
 
 
 def skimmed(text: str) -> str:
-    """Return ``text`` without the lines that are further rows of a table: those behind the first ROWS and the header."""
+    """Return ``text`` without further rows of tables: those behind the header and the first ROWS."""
     kept, row = [], 0
     for line in text.splitlines():
         row = row + 1 if len(re.split(r"\s{2,}|\t", line.strip())) >= COLUMNS else 0

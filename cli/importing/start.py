@@ -20,8 +20,9 @@ def check(dataset: Path | None, output: Path | None, flap_frequency_hz: float | 
     for option, value, most in (("--flap-frequency-hz", flap_frequency_hz, 1e4), ("--airspeed-m-s", airspeed, 1e3)):
         if value is not None and dataset is None:
             raise typer.BadParameter("is for --dataset FOLDER; add it", param_hint=option)
-        if value is not None and not 0 <= value <= most or (value == 0 and option == "--flap-frequency-hz"):
-            raise typer.BadParameter(f"is {value:g}; it must be above 0 and at most {most:g}", param_hint=option)
+        least = 0.0 if option == "--airspeed-m-s" else 1e-3
+        if value is not None and not least <= value <= most:
+            raise typer.BadParameter(f"is {value:g}; it must lie in [{least:g}, {most:g}]", param_hint=option)
     if dataset is None:
         return
     if output is not None:
@@ -69,5 +70,6 @@ def show(start: Start, dataset: Path) -> None:
     else:
         note("for a dataset of a wing, say where the axes of the file point: --axes 'x aft, y out, z up'")
     say(
-        f"next: wingfit datasets check {dataset}; then, with a server ('wingfit serve'): wingfit datasets upload {dataset}"
+        f"next: wingfit datasets check {dataset}; then, with a server ('wingfit serve'): "
+        f"wingfit datasets upload {dataset}"
     )

@@ -67,7 +67,7 @@ def _of_part(since: Array, values: Array) -> float | None:
 
 
 def _explained(times: Array, values: Array, frequency: float) -> float:
-    """Return the fraction of the squares of ``values`` [T, C] that a line and harmonics of ``frequency`` (Hz) explain."""
+    """Return the part of the squares of ``values`` [T, C] that a line and harmonics of ``frequency`` (Hz) explain."""
     turn = 2 * np.pi * frequency * times[:, None] * np.arange(1, HARMONICS + 1)
     basis, _ = np.linalg.qr(np.column_stack([np.ones_like(times), times, np.cos(turn), np.sin(turn)]))
     left = values - basis @ (basis.T @ values)

@@ -17,6 +17,7 @@ _OTHER_SIDE = 0.25  # of the outermost distance: markers so far on the other sid
 _MARGIN = 0.08  # of the span, by which the assumed planform is larger than the area of the markers
 _LEAST_CHORD = 0.15  # of the span
 _THICKNESS = (0.04, 0.008)  # at root and tip, of the span
+_THINNEST = 1e-5  # m
 _AREAL_DENSITY = 1.0  # kg/m^2
 
 
@@ -64,18 +65,19 @@ def describe_wing(tracks: ImportedTracks, frequency: float, name: str) -> FirstW
         "  structure: rigid                # or sheet, to estimate a stiffness (docs/formats.md)",
         "  stations:                       # ASSUMED: the rectangle around the markers; replace it by your planform",
         *(
-            f"    - {{y_m: {y:.4f}, leading_edge_m: {front:.4f}, chord_m: {chord:.4f}, thickness_m: {part * (tip - root):.4f}}}"
+            f"    - {{y_m: {y:.6f}, leading_edge_m: {front:.6f}, chord_m: {chord:.6f}, "
+            f"thickness_m: {max(part * (tip - root), _THINNEST):.6f}}}"
             for y, part in zip((root, tip), _THICKNESS, strict=True)
         ),
-        f"  materials: {{foam_density_kg_m3: 0, skin_areal_density_kg_m2: {_AREAL_DENSITY:g}}}   # ASSUMED: mass / area",
+        f"  materials: {{foam_density_kg_m3: 0, skin_areal_density_kg_m2: {_AREAL_DENSITY:g}}}   # ASSUMED",
         "  markers:                        # mean positions in the tracks, turned back by the flap angle",
         *(
-            f"    - {{name: {json.dumps(marker)}, x_m: {x:.5f}, y_m: {y:.5f}, z_m: {z:.5f}, mass_kg: 0}}"
+            f"    - {{name: {json.dumps(marker)}, x_m: {x:.6f}, y_m: {y:.6f}, z_m: {z:.6f}, mass_kg: 0}}"
             for marker, (x, y, z) in zip(tracks.markers, rest.tolist(), strict=True)
         ),
         f"  reference_markers: [{json.dumps(nearest)}]",
-        f"  hinge: {{y_m: {hinge[0]:.4f}, z_m: {hinge[1]:.4f}}}   # {source}",
-        f"  drive: {{kind: fourier, mean_deg: 0, cosine_deg: [0], sine_deg: [{amplitude:.2f}]}}   # from the tracks",
+        f"  hinge: {{y_m: {hinge[0]:.6f}, z_m: {hinge[1]:.6f}}}   # {source}",
+        f"  drive: {{kind: fourier, mean_deg: 0, cosine_deg: [0], sine_deg: [{amplitude:.2f}]}}",
         "",
     ]
     where = f"y {1e3 * hinge[0]:.0f} mm, z {1e3 * hinge[1]:.0f} mm"
@@ -119,7 +121,7 @@ def _hinge(places: Float[Array, "T M 3"]) -> tuple[Array, str]:
     middle = np.nanmedian(places[..., 1], axis=0)
     inside = float(middle.min())
     if centre[0] < inside and (np.nanstd(radius, axis=0) < _STEADY * np.nanmean(radius, axis=0)).all():
-        return np.round(centre, 4) + 0.0, "from the tracks: the markers move on circles about it"
+        return np.round(centre, 6) + 0.0, "from the tracks: the markers move on circles about it"
     if inside > 0:
         return np.zeros(2), "assumed: the origin of the axes"
     span = float(middle.max()) - inside

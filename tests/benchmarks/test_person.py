@@ -42,7 +42,7 @@ def test_the_readme_leads_to_the_sections_that_are_read() -> None:
 def test_remedies_are_copied_from_errors() -> None:
     errors = (
         "error: 3 errors\n  a.csv: states no unit; add it: --unit mm (one of m, mm)\n"
-        "  a.csv: choose the rows of one: --rows run=1,Left=0 (or run=2)\n  a.csv: export it, or give --incomplete to go\n"
+        "  a.csv: choose the rows of one: --rows run=1,Left=0 (or run=2)\n  a.csv: cut off; give --incomplete\n"
     )
     found = minutes._remedies(errors, minutes.Source("a.csv", unit="m"), ["import", "a.csv"])
     assert found == ["--unit m", "--rows run=1,Left=0", "--incomplete"]

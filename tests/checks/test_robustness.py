@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import importlib
 import logging
 from collections.abc import Callable
 from dataclasses import replace
@@ -110,7 +111,7 @@ def test_no_good_dataset_is_refused(kind: int, which: list[str], seed: int) -> N
     recordings = []
     for recording in base.recordings:
         for name in which:
-            recording = GOOD[name](recording, rng)  # noqa: PLW2901
+            recording = GOOD[name](recording, rng)
         recordings.append(recording)
     found = examine(replace(base, recordings=tuple(recordings)))
     assert [str(one) for one in found if one.certain] == []
@@ -122,7 +123,7 @@ def test_an_error_in_a_check_is_logged_and_becomes_a_warning(
     def broken(*_: object) -> None:
         raise ZeroDivisionError("float division by zero")
 
-    monkeypatch.setattr("wingfit.checks.examine.check_frequency", broken)
+    monkeypatch.setattr(importlib.import_module("wingfit.checks.examine"), "check_frequency", broken)
     save_dataset(bases()[0], tmp_path / "wing")
     with (
         caplog.at_level(logging.ERROR),

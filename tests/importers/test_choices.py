@@ -75,7 +75,7 @@ def test_columns_of_one_marker_in_different_units_are_named() -> None:
 def test_the_flight_of_a_hawk_that_repeats_times_says_which_and_is_read() -> None:
     path = HAWKS / "2024-06-03-TestUnilateralMarkers.csv"
     options = {"unit": "m", "time_unit": "s", "rows": "seqID=02_07_074,Left=1"}
-    with pytest.raises(ValueError, match="3 times stand in more than one line.*positions of wingtip_rot; merge"):
+    with pytest.raises(ValueError, match=r"3 times stand in more than one line.*positions of wingtip_rot; merge"):
         import_tracks(path, **options)  # type: ignore[arg-type]
     found = import_tracks(path, repeated="gaps", **options)  # type: ignore[arg-type]
     assert (len(found.times), found.gaps.total) == (128, 3)

@@ -100,6 +100,7 @@ def test_a_whole_dataset_is_written(wingfit: Wingfit, tmp_path: Path) -> None:
     assert f"next: wingfit datasets check {tmp_path / 'wing'}" in " ".join(out.split())
     assert "replace what is assumed" in err
     dataset = package.load_dataset(tmp_path / "wing")
+    assert isinstance(dataset, package.Dataset)
     assert dataset.recordings[0].condition.airspeed == 4
     code, _, err = wingfit(*words)
     assert (code, "exists; name a new folder" in " ".join(err.replace("│", " ").split())) == (2, True)

@@ -71,7 +71,7 @@ def test_other_tracks_become_series_of_positions(tmp_path: Path) -> None:
 
 
 def test_the_markers_of_two_wings_are_asked_for_by_name() -> None:
-    with pytest.raises(DatasetError, match="--markers in,mid,tip$"):
+    with pytest.raises(DatasetError, match=r"--markers in,mid,tip$"):
         start_dataset([read(wing_table(both=True), axes=AXES)], "wing", Conditions())
     chosen = read(wing_table(both=True), axes=AXES, markers="in,mid,tip")
     assert start_dataset([chosen], "wing", Conditions()).kind == "wing"

@@ -88,7 +88,8 @@ def test_lists_of_datasets_say_which_have_warnings(browser: Browser, api: Api, w
     for address, places in (("", "#newest-datasets li"), ("datasets", "#listing tbody tr")):
         seen.show(address)
         seen.wait(f"document.querySelectorAll('{places}').length >= 2")
-        script = "(nodes) => nodes.map((node) => [node.querySelector('a').textContent, node.querySelector('.badge')?.textContent])"
+        texts = "[node.querySelector('a').textContent, node.querySelector('.badge')?.textContent]"
+        script = f"(nodes) => nodes.map((node) => {texts})"
         rows = dict(seen.page.eval_on_selector_all(places, script))
         assert rows["good"] is None
         assert rows[thin().name] == "1 likely mistake"
