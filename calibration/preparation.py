@@ -142,7 +142,7 @@ def _refuse_without_influence(spec: CalibrationSpec, model: FlexibleWing) -> Non
         raise ValueError(
             "nothing to calibrate: the wing is rigid, so that its markers follow the drive, whatever its stiffness and "
             "the air; describe it with structure: sheet to estimate a stiffness, or include an effect of the drive or "
-            "the cameras (effects, --with), such as stroke_amplitude"
+            "the cameras: --with stroke_amplitude (over HTTP: effects)"
         )
 
 
@@ -212,7 +212,8 @@ def _staged(free: tuple[str, ...], recordings: tuple[Recording, ...]) -> tuple[S
         missing, which = ("vacuum", "structural") if structural and not vacuum else ("air", "aerodynamic")
         raise ValueError(
             f"a staged calibration fits the {which} genes on recordings in {missing}, and there is none "
-            f"(vacuum: airspeed 0 and at most {VACUUM_LIMIT / 100:g} mbar); use mode 'joint' or name other genes"
+            f"(vacuum: airspeed 0 and at most {VACUUM_LIMIT / 100:g} mbar); use mode 'joint' (--mode joint) "
+            "or name other genes"
         )
     stages = (Stage("structure", structural, vacuum), Stage("aerodynamics", aerodynamic, air))
     return tuple(stage for stage in stages if stage.free)

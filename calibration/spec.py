@@ -37,7 +37,7 @@ class CalibrationSpec:
             goes on with ``division`` from what it found. None: both have ``division``.
         mode: "staged" (wings) fits structural genes on vacuum recordings, then aerodynamic ones on the rest; "joint"
             fits all genes to all recordings; "local" (vehicles) fits each recording by itself. None: staged for a
-            wing, local for a vehicle, joint for a rig of the user's own.
+            wing (joint for a rigid one), local for a vehicle, joint for a rig of the user's own.
         population: individuals per generation.
         stall: generations without improvement of the best fitness after which a search ends.
         tolerance: smallest relative decrease of the best fitness that counts as an improvement.
@@ -100,7 +100,9 @@ def resolved(spec: CalibrationSpec, dataset: Dataset) -> CalibrationSpec:
     ValueError, too, for numbers beyond their limits (:mod:`wingfit.calibration.limits`).
     """
     wing = dataset.kind == "tracks"
-    mode, method = spec.mode or ("staged" if wing else "local"), spec.method or ("genetic" if wing else "gauss_newton")
+    # The markers of a rigid wing show nothing that only vacuum or only air could.
+    default: Mode = ("joint" if dataset.wing.structure == "rigid" else "staged") if wing else "local"
+    mode, method = spec.mode or default, spec.method or ("genetic" if wing else "gauss_newton")
     _refuse_unknown(mode, method)
     if mode == "staged" and not wing:
         raise ValueError(

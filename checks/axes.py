@@ -122,9 +122,9 @@ def _axes(tracked: Tracked) -> Mistake | None:
     few = tracked.moved(tracked.positions[::step])
     misfits = [few.moved(oriented(few.positions, axes)).misfit for axes in EVERY]
     least = min(misfits)
-    if least > BETTER * given:
+    if not least <= BETTER * given < np.inf:
         return None
-    close = [axes for axes, misfit in zip(EVERY, misfits, strict=True) if misfit < least + 0.01 * span]
+    close = [axes for axes, misfit in zip(EVERY, misfits, strict=True) if misfit <= least + 0.01 * span]
     axes = min(close, key=lambda one: (_against_drive(tracked, one) > 2.0 * _best(tracked, close), _changes(one)))
     if axes == AS_GIVEN:
         return None

@@ -20,6 +20,7 @@ MEMBRANE = (15.0, 30_000.0)  # kg/m^3, of wing mass over area times thickness
 # batteries and toys lie within a factor of 40.
 ALLOMETRY, SPREAD = (0.67, 2.56), 60.0
 STREAM = 1.0  # m/s
+ATMOSPHERE_MMHG, NEAR_ATMOSPHERE = 760.0, 0.3  # as a pressure in mbar, that of a place 2360 m above the sea
 PRESSURES = ((10.0, "kPa"), (1000.0, "bar"), (1.333224, "mmHg"), (0.01, "Pa"))
 
 
@@ -54,6 +55,13 @@ def _air(index: int, recording: Recording) -> Iterator[Mistake]:
             "air pressure", (*at, "pressure_mbar"), where, f"pressure_mbar is {mbar:.6g} with a stream: {rho}",
             f"{GROUND[0]:g} to {GROUND[1]:g} mbar", f"the pressure is in {unit}" if unit else "another unit than mbar",
             mbar * factor if unit else None, mbar,
+        )  # fmt: skip
+    elif streaming and abs(mbar - ATMOSPHERE_MMHG) <= NEAR_ATMOSPHERE:
+        yield _key(
+            "air pressure", (*at, "pressure_mbar"), where,
+            f"pressure_mbar is {mbar:.6g}, the number of the standard atmosphere in mmHg: {rho}",
+            "1013.25 mbar, unless the rig stands 2360 m above the sea", "the pressure is in mmHg",
+            round(mbar * 1.333224, 2), mbar,
         )  # fmt: skip
     if not ROOM[0] <= celsius <= ROOM[1]:
         fahrenheit = (celsius - 32.0) / 1.8

@@ -4,27 +4,32 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 
 from wingfit.checks.axes import check_shape
 from wingfit.checks.conditions import check_conditions
 from wingfit.checks.drive import check_drive
 from wingfit.checks.forces import check_forces
 from wingfit.checks.frequency import check_frequency
+from wingfit.checks.guard import guarded
 from wingfit.checks.markers import check_markers
 from wingfit.checks.mistake import Mistake, together
 from wingfit.checks.recordings import check_recordings
 from wingfit.checks.tracked import Tracked
 from wingfit.checks.zeros import check_zero_forces
-from wingfit.records import AnyDataset, Dataset, Wing
+from wingfit.records import AnyDataset, Dataset, Recording, Wing
 from wingfit.records.blas_threads import one_blas_thread
 
 
 @one_blas_thread
 def examine(dataset: AnyDataset) -> tuple[Mistake, ...]:
-    """Return the likely mistakes in ``dataset``: certain ones first. The same dataset gives the same answer."""
-    found = list(check_recordings(dataset))
+    """Return the likely mistakes in ``dataset``: certain ones first. The same dataset gives the same answer.
+
+    An error inside a check is logged and becomes a warning (:mod:`wingfit.checks.guard`).
+    """
+    found = guarded("the recordings", "dataset", lambda: check_recordings(dataset))
     if isinstance(dataset, Dataset):
-        found += check_conditions(dataset)
+        found += guarded("the conditions", "dataset", lambda: check_conditions(dataset))
         found += _wing(dataset, dataset.rig) if isinstance(dataset.rig, Wing) else _vehicle(dataset)
     merged = together(found, len(dataset.recordings))
     return tuple(sorted(merged, key=lambda one: not one.certain))
@@ -37,28 +42,39 @@ def _wing(dataset: Dataset, wing: Wing) -> Iterator[Mistake]:
     for index, recording in enumerate(dataset.recordings):
         if not recording.markers or any(name not in known for name in recording.markers):
             continue
-        tracked = Tracked.of(recording, wing)
-        markers = list(check_markers(tracked))
-        filled = [one for one in markers if one.kind == "placeholders"]
-        if (shape := None if filled else check_shape(tracked)) is not None:
-            yield shape
-            continue
-        yield from markers
-        repeats = None if filled else check_frequency(recording, index)
-        if repeats is not None:
-            yield repeats
-        elif not filled:
+        found, tracked = _recording(recording, wing, index)
+        yield from found
+        if tracked is not None:
             good.append(tracked)
             indices.append(index)
-    yield from check_drive(good, indices)
+    yield from guarded("the drive", "dataset", lambda: check_drive(good, indices))
+
+
+def _recording(recording: Recording, wing: Wing, index: int) -> tuple[list[Mistake], Tracked | None]:
+    """Return the mistakes in one recording of a wing, and the recording for further checks if its shape fits."""
+    where = f"recording {recording.name!r}"
+    fitted = list[Tracked]()
+    failed = guarded("the markers", where, lambda: fitted.append(Tracked.of(recording, wing)))
+    if not fitted:
+        return failed, None
+    tracked = fitted[0]
+    markers = guarded("the markers", where, lambda: check_markers(tracked))
+    if any(one.kind == "placeholders" for one in markers):
+        return markers, None
+    if shape := guarded("the axes", where, lambda: check_shape(tracked)):
+        return shape, None
+    repeats = guarded("the frequency", where, lambda: check_frequency(recording, index))
+    return markers + repeats, None if repeats else tracked
 
 
 def _vehicle(dataset: Dataset) -> Iterator[Mistake]:
     blocked = False
     for index, recording in enumerate(dataset.recordings):
-        zeros = check_zero_forces(recording)
-        repeats = None if zeros else check_frequency(recording, index)
-        yield from (one for one in (zeros, repeats) if one is not None)
-        blocked |= zeros is not None or repeats is not None
+        where = f"recording {recording.name!r}"
+        found = guarded("zero forces", where, partial(check_zero_forces, recording))
+        found = found or guarded("the frequency", where, partial(check_frequency, recording, index))
+        yield from found
+        blocked |= bool(found)
     if not blocked:  # estimates, of which some model may have no gene, do not matter: its coefficients are free
-        yield from check_forces(replace(dataset, rig=replace(dataset.vehicle, estimates={})))
+        plain = replace(dataset, rig=replace(dataset.vehicle, estimates={}))
+        yield from guarded("the forces", "dataset", lambda: check_forces(plain))

@@ -15,6 +15,7 @@ HARMONICS = 4
 COLUMNS, ROWS = 4, 500  # most that are used
 GAPS = 0.35  # fraction of a column that may be missing
 LEAST_BEATS = 1.5  # with fewer, close frequencies look alike
+MOST_BEATS = 2000.0  # with more, near frequencies are too many to try, and clocks drift apart
 NEAR = 1.6  # frequencies from the stated one divided by this to that times this are tried
 STEP = 0.2  # beats by which neighbouring trial frequencies differ over the recording
 # Of the variance, what the stated frequency leaves at least, and of this what the right one leaves at most: a warning,
@@ -91,7 +92,7 @@ class Candidate(NamedTuple):
 def _by_scan(recording: Recording, index: int, times: Array, values: Array, given: Repeat) -> list[Candidate]:
     """Return the best frequency near the stated one, if it is clearly better."""
     stated, length = given.frequency, float(np.ptp(times))
-    if given.left < DOUBTFUL or stated * length < LEAST_BEATS:
+    if given.left < DOUBTFUL or not LEAST_BEATS <= stated * length <= MOST_BEATS:
         return []
     best = _near(times, values, stated)
     apart = abs(best.frequency - stated) * length >= SLIP and abs(best.frequency / stated - 1) >= APART

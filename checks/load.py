@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from wingfit.checks.examine import examine
+from wingfit.checks.guard import is_finding
 from wingfit.checks.mistake import Mistake
 from wingfit.records import AnyDataset, DatasetError, load_archive
 from wingfit.records import load_dataset as read_dataset
@@ -55,7 +56,7 @@ def _checked(load: Callable[[bool], AnyDataset]) -> Checked:
     except DatasetError:
         # A wrong unit of length, force or time is refused where files are read, in words that know less.
         dataset = load(False)
-        mistakes = examine(dataset)
+        mistakes = tuple(one for one in examine(dataset) if is_finding(one))
         if not mistakes:
             raise
         return Checked(dataset, tuple(replace(one, certain=True) for one in mistakes))

@@ -13,8 +13,9 @@ from wingfit.records.errors import Fault
 Kind = Literal[
     "air pressure", "air temperature", "airspeed", "amplitude", "axes", "body pitch", "constant channel", "cut",
     "density", "duplicate", "force axes", "force phase", "force unit", "frequency", "frozen marker", "jumps",
-    "length unit", "mass", "mean angle", "motion", "origin", "phase lag", "placeholders", "pressure and rig", "scale",
-    "side", "swapped markers", "thickness", "tilt", "time unit", "unsteady", "vertical sign", "weight",
+    "length unit", "mass", "mean angle", "motion", "not carried out", "origin", "phase lag", "placeholders",
+    "pressure and rig", "scale", "side", "swapped markers", "thickness", "tilt", "time unit", "unsteady",
+    "vertical sign", "weight",
 ]  # fmt: skip
 
 Alter = Callable[[Float[Array, " T"], Float[Array, "T C"], tuple[str, ...]], tuple[Array, Array]]

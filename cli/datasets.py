@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -46,7 +47,7 @@ def upload(
     Example: wingfit datasets upload examples/robird
     """
     with Client(url) as client:
-        emit(upload_dataset(client, path, name), _uploaded, as_json=as_json)
+        emit(upload_dataset(client, path, name), partial(_uploaded, url=url), as_json=as_json)
 
 
 @app.command()
@@ -197,13 +198,14 @@ def _warned(dataset: a.Dataset) -> None:
         remarks([f"{text}; change {one['change']}"], "warning")
 
 
-def _uploaded(dataset: a.Dataset) -> None:
+def _uploaded(dataset: a.Dataset, url: str) -> None:
     _warned(dataset)
     say(f"dataset {dataset['id']} '{dataset['name']}' with {len(dataset['recordings'])} recordings")
     if dataset["kind"] == "series":
         say(f"next: wingfit diagnose {dataset['id']} --rig my_rig.py")
     else:
         say(f"next: wingfit runs submit {dataset['id']} --watch")
+    say(f"its page: {url.rstrip('/')}/#dataset={dataset['id']}")
 
 
 def _show(dataset: a.Dataset) -> None:

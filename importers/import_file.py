@@ -32,6 +32,8 @@ def import_tracks(
     keep_zeros: bool = False,
     keep_unlabelled: bool = False,
     incomplete: bool = False,
+    markers: str | None = None,
+    repeated: str | None = None,
 ) -> ImportedTracks:
     """Read the marker tracks in a file of a motion-capture system or digitiser, whose format its content shows.
 
@@ -49,6 +51,8 @@ def import_tracks(
         keep_zeros: positions that are exactly zero on all axes are seen; by default they are gaps.
         keep_unlabelled: import markers that the capture program did not identify, too.
         incomplete: import the frames that are there if the file states another count of frames.
+        markers: only these markers: "tip,root"; ``*`` stands for any letters: "right_*".
+        repeated: if rows have the same time: "gaps" merges them, with a gap where they differ; "first" keeps the first.
 
     Returns:
         The tracks in metres and seconds, with what was stated by whom, gaps by cause, and remarks.
@@ -58,8 +62,9 @@ def import_tracks(
 
     """
     given = Given(
-        unit, rate_hz, axes, format, time_unit, decimal, columns, rows, keep_zeros, keep_unlabelled, incomplete
-    )
+        unit, rate_hz, axes, format, time_unit, decimal, columns, rows, keep_zeros, keep_unlabelled, incomplete,
+        markers, repeated,
+    )  # fmt: skip
     place = Path(path)
     try:
         size = place.stat().st_size

@@ -7,10 +7,13 @@ import unicodedata
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
+
+import numpy as np
 
 from wingfit.importers.options import ask
 from wingfit.records.array_types import Mask
-from wingfit.records.errors import Faults, shown
+from wingfit.records.errors import Faults, nearest, shown
 
 _UNLABELLED = re.compile(
     r"|\*\d*|(?:unlabell?ed|unidentified|uname)[\s_*\-]*\d*|new[\s_]\d{3,}|(?:.*:)?\*\d+", re.IGNORECASE
@@ -31,14 +34,37 @@ class Names:
 
     def only(self, seen: Mask) -> Names:
         """Return the names without the markers that are not ``seen`` [M], and with a remark about these."""
-        left = [name for name, there in zip(self.markers, seen, strict=True) if not there]
-        chosen = [k for k in range(len(self.markers)) if seen[k]]
+        return self._only(seen, "that are never seen")
+
+    def chosen(self, text: str) -> Names:
+        """Return the markers that ``text``, the option ``markers``, names: "tip,root", or "right_*".
+
+        DatasetError lists the parts of ``text`` that name none.
+        """
+        faults, used = Faults(), np.zeros(len(self.markers), dtype=np.bool_)
+        pairs = [*zip(self.markers, self.labels, strict=True)]
+        for part in filter(None, (piece.strip() for piece in text.split(","))):
+            found = [fnmatchcase(name, part) or fnmatchcase(label, part) for name, label in pairs]
+            if not any(found):
+                message = f"no marker is called {shown(part)!r} ({nearest(part, self.markers)})"
+                faults.add("--markers", part, f"{message}; * stands for any letters: 'right_*'")
+            used |= found
+        if not used.any() and not faults.faults:
+            faults.add("--markers", text, "names no marker; write it like 'tip,root'")
+        faults.raise_any()
+        return self._only(used, "that --markers does not name")
+
+    def _only(self, used: Mask, why: str) -> Names:
+        left = [name for name, there in zip(self.markers, used, strict=True) if not there]
+        if not left:
+            return self
+        chosen = [k for k in range(len(self.markers)) if used[k]]
         return replace(
             self,
             keep=[self.keep[k] for k in chosen],
             labels=tuple(self.labels[k] for k in chosen),
             markers=tuple(self.markers[k] for k in chosen),
-            remarks=(*self.remarks, f"not imported: {len(left)} markers that are never seen ({listed(left)})"),
+            remarks=(*self.remarks, f"not imported: {len(left)} markers {why} ({listed(left)})"),
         )
 
 

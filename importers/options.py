@@ -14,6 +14,7 @@ from wingfit.records.errors import DatasetError, Fault, Faults, fail, nearest, s
 UNITS = {"m": (1, 1), "cm": (1, 100), "mm": (1, 1000), "um": (1, 1_000_000), "in": (254, 10_000), "ft": (3048, 10_000)}
 TIME_UNITS = {"s": (1, 1), "ms": (1, 1000), "us": (1, 1_000_000)}
 Decimal = Literal["point", "comma"]
+REPEATED = ("gaps", "first")
 _UNIT_WORDS = {
     "m": ("meter", "meters", "metre", "metres"),
     "cm": ("centimeter", "centimeters", "centimetre", "centimetres"),
@@ -42,6 +43,9 @@ class Given:
         keep_zeros: positions that are exactly zero on all axes are seen, not missing.
         keep_unlabelled: markers that the capture program did not identify are imported too.
         incomplete: the file may have other than the count of frames that it states.
+        markers: which markers are imported, "tip,root"; ``*`` stands for any letters: "right_*".
+        repeated: what becomes of rows that have the same time: "gaps" merges them and leaves a gap where they differ,
+            "first" keeps the first.
     """
 
     unit: str | None = None
@@ -55,6 +59,8 @@ class Given:
     keep_zeros: bool = False
     keep_unlabelled: bool = False
     incomplete: bool = False
+    markers: str | None = None
+    repeated: str | None = None
 
     @staticmethod
     def names() -> tuple[str, ...]:
@@ -68,6 +74,7 @@ class Given:
         _choice("--time-unit", self.time_unit, TIME_UNITS, faults)
         _choice("--format", self.format, formats, faults)
         _choice("--decimal", self.decimal, get_args(Decimal), faults)
+        _choice("--repeated", self.repeated, REPEATED, faults)
         if self.rate_hz is not None and not MIN_RATE <= self.rate_hz <= MAX_RATE:
             limits = f"it must lie in [{MIN_RATE:g}, {MAX_RATE:g}] Hz"
             faults.add("--rate-hz", self.rate_hz, f"is {self.rate_hz:g} Hz; {limits}: give frames per second")

@@ -12,13 +12,15 @@ from wingfit.importers.limits import MAX_DISTANCE
 from wingfit.importers.markers import Names, names_of
 from wingfit.importers.options import UNITS, Given, ask, question, unit_of
 from wingfit.importers.raw import Raw, Reader
+from wingfit.importers.repeats import without_repeats
 from wingfit.importers.times import resolve_times
 from wingfit.importers.tracks import Gaps, ImportedTracks, Statement
 from wingfit.records.array_types import Array, Mask
-from wingfit.records.errors import Faults, fail, shown
+from wingfit.records.errors import DatasetError, Faults, fail, shown
 from wingfit.records.limits import MIN_FRAMES
 
 _PIXELS = "px"
+_METRES = 5.0  # numbers below it are more likely metres than millimetres, in an example
 _MIRRORS = {
     "wing": "these axes mirror: right for a left wing in a right-handed frame, wrong for a right wing",
     "body": "these axes mirror, which is wrong unless the frame of the file is left-handed",
@@ -30,11 +32,17 @@ def resolve(raw: Raw, reader: Reader, given: Given, file: str) -> ImportedTracks
     _check_counts(raw, given, file)
     faults = Faults()
     unit = _unit(raw, given, file, faults)
-    timing = resolve_times(raw, given, file, faults)
+    timing = None
+    try:
+        raw = without_repeats(raw, given)
+        timing = resolve_times(raw, given, file, faults)
+    except DatasetError as error:
+        faults.extend(error)
     faults.raise_any()
     if unit is None or timing is None:
         raise fail(file, None, "unit and rate are missing")
     names = names_of(raw.labels, file, keep_unlabelled=given.keep_unlabelled)
+    names = names.chosen(given.markers) if given.markers else names
     invalid = None if raw.invalid is None else raw.invalid[:, names.keep]
     positions, gaps = _without_gaps(raw.positions[:, names.keep], invalid, given)
     numerator, denominator = UNITS[unit.value]
@@ -107,8 +115,11 @@ def _unit(raw: Raw, given: Given, file: str, faults: Faults) -> Statement | None
         return Statement("unit", given.unit, "user", "--unit")
     known = ", ".join(UNITS)
     why = f"states the unit {shown(raw.unit.value)!r}, which is unknown" if raw.unit else "states no unit of positions"
-    hint = f" ({raw.unit_hint})" if raw.unit_hint else ""
-    message = f"{why}{hint}; add it: --unit mm (one of {known})"
+    seen = raw.positions[np.isfinite(raw.positions)]
+    numbers = f"they are numbers from {seen.min():.4g} to {seen.max():.4g}" if seen.size else ""
+    hint = f" ({raw.unit_hint or numbers})" if raw.unit_hint or numbers else ""
+    example = "m" if seen.size and np.abs(seen).max() < _METRES else "mm"
+    message = f"{why}{hint}; add it: --unit {example} (one of {known})"
     faults.put(question("unit", file, raw.unit.value if raw.unit else None, message, [*UNITS], raw.unit_hint))
     return None
 

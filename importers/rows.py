@@ -13,18 +13,25 @@ from wingfit.records.limits import MIN_FRAMES
 
 _MOST_COLUMNS = 12  # that are tried
 _MOST_CHOICES = 500
+_MOST_REPEATS = 0.1  # of the rows of one recording
 _LONGEST = 80  # characters of a value
 
 
 def row_choices(
-    rows: Iterable[Row], lines: Index, header: Sequence[str], columns: Sequence[str], order: Array | Index
+    rows: Iterable[Row],
+    lines: Index,
+    header: Sequence[str],
+    columns: Sequence[str],
+    order: Array | Index,
+    given: str | None = None,
 ) -> list[str]:
     """Return values for the option ``rows``, such as "run=1", each of which selects one recording.
 
     One of the ``columns`` (names in ``header``), or two of them, name the recordings if ``order`` [T] (times, or
-    numbers of frames, of the rows at ``lines`` [T]) increases within the rows that have the same values there, for at
-    least half of all rows. Of several such columns, those are taken for which it does for most rows, then those with
-    the fewest values. None are returned if there are no such columns.
+    numbers of frames, of the rows at ``lines`` [T]) increases within the rows that have the same values there, but for
+    a few that repeat, for at least half of all rows. ``given``: the value of the option that chose ``lines``. Of
+    several such columns, those are taken for which it does for most rows, then those with the fewest values. None are
+    returned if there are no such columns.
     """
     texts = _texts(rows, lines, [header.index(name) for name in columns])
     coded = [np.unique(text, return_inverse=True) for text in texts]
@@ -39,7 +46,10 @@ def row_choices(
             tried.append((-int(sizes.sum()), len(first), chosen, first))
         if tried and -min(tried, key=lambda one: one[:3])[0] >= len(lines) / 2:
             _, _, chosen, first = min(tried, key=lambda one: one[:3])
-            return [",".join(f"{columns[k]}={texts[k][at]}" for k in chosen) for at in first[:_MOST_CHOICES]]
+            before = [given] if given else []
+            return [
+                ",".join([*before, *(f"{columns[k]}={texts[k][at]}" for k in chosen)]) for at in first[:_MOST_CHOICES]
+            ]
     return []
 
 
@@ -60,12 +70,17 @@ def _may_name(values: Sequence[str], count: int) -> bool:
 
 
 def _recordings(group: Index, order: Array | Index) -> tuple[Index, Index]:
-    """Return the first row and the count of rows of each ``group`` in which ``order`` increases, by first row."""
+    """Return the first row and the count of rows of each ``group`` in which ``order`` increases, by first row.
+
+    A fraction of the rows may repeat the value of the row before: the option ``repeated`` says what becomes of them.
+    """
     _, first, inverse, sizes = np.unique(group, return_index=True, return_inverse=True, return_counts=True)
     by_group = np.argsort(inverse, kind="stable")
-    falls = np.diff(order[by_group]) <= 0
+    steps, groups = np.diff(order[by_group]), inverse[by_group][1:]
     same = np.diff(inverse[by_group]) == 0
-    wrong = np.isin(np.arange(len(first)), inverse[by_group][1:][falls & same])
+    falls = np.bincount(groups[same & (steps < 0)], minlength=len(first))
+    repeats = np.bincount(groups[same & (steps == 0)], minlength=len(first))
+    wrong = (falls > 0) | (repeats > _MOST_REPEATS * sizes)
     good = np.flatnonzero(np.logical_not(wrong) & (sizes >= MIN_FRAMES))
     good = good[np.argsort(first[good])]
     return first[good], sizes[good]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shlex
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -9,6 +11,7 @@ import numpy as np
 from wingfit.importers.limits import MAX_RATE, MIN_RATE
 from wingfit.importers.options import TIME_UNITS, Given, ask, question
 from wingfit.importers.raw import Raw, Stated
+from wingfit.importers.repeats import repeated
 from wingfit.importers.tracks import Statement
 from wingfit.records.array_types import Array, Float
 from wingfit.records.errors import DatasetError, Faults, fail
@@ -17,6 +20,7 @@ _SAME_RATE = 1e-4  # relative: "119.88" and 119.8801 are the same rate, 119.88 a
 _MOST_DECIMALS = 9
 _ROUNDING = 0.51  # of the last decimal of a printed time
 _FURTHEST = 0.3  # frame intervals between a printed time and its frame; beyond, it may belong to the next frame
+_LISTED = 12  # recordings of a file that an error names
 _DRIFT = 1e-6  # relative: of times that a program computed in single precision
 
 
@@ -41,6 +45,7 @@ def resolve_times(raw: Raw, given: Given, file: str, faults: Faults) -> Timing |
         return _from_rate(raw, rate, given, file, faults)
     unit = _time_unit(raw, given, file, faults)
     if unit is None:
+        _check_times(raw.times, raw, file, "")
         return None
     numerator, denominator = TIME_UNITS[unit.value]
     printed = raw.times * numerator / denominator
@@ -65,9 +70,11 @@ def _check_frames(raw: Raw, file: str) -> None:
         what = "repeats the number of the line above" if steps[at - 1] == 0 else f"follows {raw.frames[at - 1]}"
         message = f"frame {raw.frames[at]} {what}; numbers of frames must increase: sort the rows, remove repeats"
         if choices := raw.row_choices(raw.frames):
-            message += ", or choose those of one recording (--rows)"
+            message += f", or choose those of one recording: {_choices(choices)}"
             where = f"{file}, {raw.line_word} {raw.lines[at]}"
             raise ask("rows", where, int(raw.frames[at]), message, choices)
+        if (steps >= 0).all():
+            raise repeated(raw, raw.frames, file)
         raise fail(f"{file}, {raw.line_word} {raw.lines[at]}", int(raw.frames[at]), message)
 
 
@@ -222,8 +229,8 @@ def _resolution(printed: Array) -> float:
     return float(10.0**-_MOST_DECIMALS)
 
 
-def _check_times(times: Array, raw: Raw, file: str) -> None:
-    """Raise DatasetError unless ``times`` (s) are complete and increase."""
+def _check_times(times: Array, raw: Raw, file: str, unit: str = " s") -> None:
+    """Raise DatasetError unless ``times`` are complete and increase; ``unit``: as it stands behind a number."""
     if not np.isfinite(times).all():
         at = int(np.flatnonzero(~np.isfinite(times))[0])
         raise _time_fault(
@@ -236,13 +243,26 @@ def _check_times(times: Array, raw: Raw, file: str) -> None:
     wrong = np.flatnonzero(~(np.diff(times) > 0))
     if len(wrong):
         at = int(wrong[0]) + 1
-        what = "repeats the time of the frame before" if times[at] == times[at - 1] else f"follows {times[at - 1]:g} s"
-        message = (
-            f"{times[at]:g} s {what}; times must increase: sort the rows, or choose those of one recording (--rows)"
-        )
+        follows = f"follows {times[at - 1]:g}{unit}"
+        what = "repeats the time of the frame before" if times[at] == times[at - 1] else follows
+        message = f"{times[at]:g}{unit} {what}; times must increase: sort the rows"
         if choices := raw.row_choices(times):
+            message = (
+                f"{times[at]:g}{unit} {what}, because the table holds several recordings; choose the rows of one, as "
+                f"times must increase: {_choices(choices)}"
+            )
             raise ask("rows", _place(raw, at, file), float(times[at]), message, choices)
+        if (np.diff(times) >= 0).all():
+            raise repeated(raw, times, file, unit)
+        message += ", or give those of one recording: --rows COLUMN=VALUE"
         raise _time_fault(raw, at, file, float(times[at]), message)
+
+
+def _choices(values: Sequence[str]) -> str:
+    """Return the option ``rows`` with the first of ``values``, and the other values."""
+    others = f" (or {', '.join(values[1:_LISTED])}" if len(values) > 1 else ""
+    more = f", and {len(values) - _LISTED} more" if len(values) > _LISTED else ""
+    return f"--rows {shlex.quote(values[0])}{others}{more}{')' if others else ''}"
 
 
 def _time_fault(raw: Raw, at: int, file: str, value: float | None, message: str) -> DatasetError:

@@ -11,7 +11,7 @@ import numpy as np
 from wingfit.records.array_types import Array, Float
 from wingfit.records.files.table import write_table
 
-_DECIMALS = 12  # of metres
+DECIMALS = 12  # of metres
 _FRAMES_OF_PART = 1000
 FactName = Literal["unit", "rate", "times", "axes", "up", "first frame"]
 
@@ -110,6 +110,6 @@ class ImportedTracks:
         columns = [f"{marker}_{axis}_m" for marker in self.markers for axis in "xyz"]
         for start in range(0, len(self.times), _FRAMES_OF_PART):
             part = slice(start, start + _FRAMES_OF_PART)
-            values = np.round(self.positions[part], _DECIMALS).reshape(-1, len(columns))
+            values = np.round(self.positions[part], DECIMALS).reshape(-1, len(columns))
             text = write_table(columns, self.times[part], values)
             yield text if start == 0 else text[text.index("\n") + 1 :]

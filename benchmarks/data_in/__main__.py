@@ -1,11 +1,14 @@
 """Proves what reads and judges the data of a user: ``python -m benchmarks.data_in [--json] [--only-formats]``.
 
-Three parts, of which ``--parts`` chooses some. ``formats``: files of other programs, intact and damaged
+Four parts, of which ``--parts`` chooses some. ``formats``: files of other programs, intact and damaged
 (benchmarks/data_in/formats.py). ``mistakes``: deliberate mistakes in datasets, and good datasets
-(benchmarks/mistakes). ``alignment``: tracks in any camera axes (benchmarks/alignment). Together they take 20 minutes.
+(benchmarks/mistakes). ``alignment``: tracks in any camera axes (benchmarks/alignment). ``minutes``: how long a new user
+needs from a file to a dataset, by a stated model of a person (benchmarks/data_in/minutes.py). Together they
+take 25 minutes.
 
 The last line is one JSON object with the keys of all parts that ran. The exit status is 1 if a file is read wrongly, is
-guessed or crashes an importer, if a good dataset has a finding, or if an alignment is falsely sure.
+guessed or crashes an importer, if a good dataset has a finding, if an alignment is falsely sure, or if a way from a
+file to a dataset takes more than 10 minutes.
 """
 
 from __future__ import annotations
@@ -15,6 +18,7 @@ import json
 import sys
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 from benchmarks.data_in import formats
@@ -50,7 +54,14 @@ def of_alignment(options: argparse.Namespace, say: Say) -> tuple[dict[str, Any],
     return result, result["alignment"]["falsely_sure"] == 0
 
 
-PARTS = {"formats": of_formats, "mistakes": of_mistakes, "alignment": of_alignment}
+def of_minutes(options: argparse.Namespace, say: Say) -> tuple[dict[str, Any], bool]:
+    """Return the minutes from a file to a dataset, and whether they are few enough."""
+    from benchmarks.data_in import minutes  # starts servers and a browser
+
+    return minutes.run(say, options.data or minutes.DATA)
+
+
+PARTS = {"formats": of_formats, "mistakes": of_mistakes, "alignment": of_alignment, "minutes": of_minutes}
 
 
 def main() -> None:
@@ -81,6 +92,7 @@ def _options() -> argparse.Namespace:
     parser.add_argument("--kind", help="only mistakes whose name contains this")
     parser.add_argument("--good", type=int, help="good datasets of wings, and as many of vehicles")
     parser.add_argument("--trials", type=int, help="recordings that are aligned")
+    parser.add_argument("--data", type=Path, help="folder with hawk/ and mocap/; without it, minutes are not measured")
     options = parser.parse_args()
     if options.only:
         options.parts = [part for part in options.parts if part == "formats"]

@@ -56,6 +56,24 @@ def import_(
     incomplete: Annotated[
         bool, typer.Option("--incomplete", help="Import a file with other than the count of frames that it states.")
     ] = False,
+    markers: Annotated[
+        str | None, typer.Option(help="Only these markers: 'tip,root'; * stands for any letters: 'right_*'.")
+    ] = None,
+    repeated: Annotated[
+        Literal["gaps", "first"] | None,
+        typer.Option(help="Rows with the same time: merge them, with gaps where they differ; or keep the first."),
+    ] = None,
+    dataset: Annotated[
+        Path | None,
+        typer.Option(
+            help="Write a whole dataset to this new folder: with --axes of a wing, the wing described from its tracks; "
+            "else, series of positions."
+        ),
+    ] = None,
+    flap_frequency_hz: Annotated[
+        float | None, typer.Option(help="For --dataset; default: as the tracks show it.")
+    ] = None,
+    airspeed_m_s: Annotated[float | None, typer.Option(help="For --dataset; default: 0.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print what was read as JSON.")] = False,
 ) -> None:
     """Read tracked markers from the files of other programs; show what was understood; write tracks in s and m.
@@ -64,7 +82,7 @@ def import_(
     of SLEAP (3-D), and plain tables. The content shows the format. What a file does not state must be given; nothing is
     guessed. Tracks of one camera must be triangulated first.
 
-    Example: wingfit import trial.c3d --axes 'x aft, y out, z up' -o trial.csv
+    Example: wingfit import trial.c3d --axes 'x aft, y out, z up' --dataset my-wing
     """
     from wingfit.cli.importing import results  # imported late: other commands start faster
     from wingfit.importers import Given
@@ -81,17 +99,25 @@ def import_(
         keep_zeros=keep_zeros,
         keep_unlabelled=keep_unlabelled,
         incomplete=incomplete,
+        markers=markers,
+        repeated=repeated,
     )
+    from wingfit.cli.importing import start
+
+    start.check(dataset, output, flap_frequency_hz, airspeed_m_s)
     targets = _targets(files, output, force=force)
     found = _read(files, given)
+    started = start.started(found, dataset, flap_frequency_hz, airspeed_m_s, rows)
     written = results.write(found, targets)
     if as_json:
         print_json([results.as_json(tracks, path) for tracks, path in zip(found, written, strict=True)])
         return
     for tracks in found:
         results.show(tracks)
-    if not targets:
-        note("nothing was written; to write the tracks, add: --output FILE.csv, or a folder")
+    if started is not None and dataset is not None:
+        start.show(started, dataset)
+    elif not targets:
+        note("nothing was written; to write the tracks, add: --output FILE.csv; to write a dataset: --dataset FOLDER")
 
 
 def _targets(files: list[Path], output: Path | None, *, force: bool) -> list[Path]:

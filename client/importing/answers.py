@@ -101,3 +101,20 @@ class TrackImport(TypedDict):
     contents: FileContents | None
     questions: list[ImportQuestion]
     tracks: ImportedTracksInfo | None
+
+
+class DescribedFact(TypedDict):
+    """One number of a first description: ``what``, its ``value``, and its ``source``: tracks, user, or assumed."""
+
+    what: str
+    value: str
+    source: str
+
+
+class FirstDescription(TypedDict):
+    """A description from tracks alone: ``yaml`` is the key ``wing`` of dataset.yaml, or ``rig`` and ``channels``."""
+
+    kind: Literal["wing", "series"]
+    yaml: str
+    flap_frequency_hz: float | None
+    facts: list[DescribedFact]

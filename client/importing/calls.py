@@ -6,7 +6,7 @@ import io
 from pathlib import Path
 from typing import Any, cast
 
-from wingfit.client.importing.answers import TrackImport
+from wingfit.client.importing.answers import FirstDescription, TrackImport
 from wingfit.client.transport import CountedFile, OnBytes, Transport, WingfitError, given
 
 Options = dict[str, str | float | bool | None]
@@ -16,7 +16,7 @@ class ImportCalls(Transport):
     """Base class of the client: sends files of tracking systems; the server stores nothing of them.
 
     ``options`` are those of :func:`wingfit.import_tracks`: unit, rate_hz, axes, format, time_unit, decimal, columns,
-    rows, keep_zeros, keep_unlabelled, incomplete.
+    rows, keep_zeros, keep_unlabelled, incomplete, markers, repeated.
     """
 
     def import_tracks(
@@ -36,6 +36,17 @@ class ImportCalls(Transport):
         WingfitError lists what is wrong with the file, and which options are missing.
         """
         return str(self._post_tracks("/v1/imports/table", Path(path), on_bytes, options).text)
+
+    def import_description(
+        self, path: str | Path, *, on_bytes: OnBytes | None = None, **options: str | float | bool | None
+    ) -> FirstDescription:
+        """Return a first description of the rig by the tracks in the file ``path`` alone.
+
+        ``options`` may have ``flap_frequency_hz``, too. WingfitError lists what the tracks do not show.
+        """
+        return cast(
+            FirstDescription, self._post_tracks("/v1/imports/description", Path(path), on_bytes, options).json()
+        )
 
     def _post_tracks(self, url: str, path: Path, on_bytes: OnBytes | None, options: Options) -> Any:
         if not path.is_file():

@@ -45,7 +45,11 @@ _TAIL = """\
   hinge: {{y_m: {hinge_y}, z_m: {hinge_z}}}
   # For example {{kind: fourier, mean_deg: 5, cosine_deg: [0], sine_deg: [30]}}; or a four-bar linkage
   drive: {drive}
-recordings: {recordings}
+# One line like this for each recording. Its tracks are the table recordings/NAME.csv beside this file, as
+# "wingfit import TRACKS --axes 'x aft, y out, z up' -o NAME.csv" writes it, with the names of the markers above.
+recordings:
+  - {{name: first, rig: {rig}, flap_frequency_hz: {frequency}, phase_lag_deg: {lag},
+     pressure_mbar: {pressure}, temperature_c: {temperature}, airspeed_m_s: 0}}
 """
 
 
@@ -70,7 +74,11 @@ def description(
             hinge_y=_number(hinge[0], 12),
             hinge_z=_number(hinge[1], 12),
             drive=_blank("drive of the wing, a mapping with its kind"),
-            recordings=_blank("list of recordings (docs/formats.md)"),
+            rig=_blank("rig, vacuum_chamber or wind_tunnel"),
+            frequency=_blank("flap frequency, Hz"),
+            lag="0" if options.structure else _blank("phase lag of the rear rod, deg"),
+            pressure=_blank("pressure, mbar, such as 1013"),
+            temperature=_blank("temperature, deg C, such as 20"),
         )
     )
     return "".join(parts)

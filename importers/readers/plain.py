@@ -48,6 +48,7 @@ class _Found:
     frame: int | None = None
     time_unit: str | None = None
     units: set[str] = field(default_factory=set)
+    unit_examples: dict[str, str] = field(default_factory=dict)  # a marker for each of the units
 
 
 def recognises(source: Source) -> bool:
@@ -77,7 +78,9 @@ def read(source: Source, given: Given) -> Raw:
     ignored = [name for index, name in enumerate(header) if index not in used and name]
     if ignored:
         raw.remarks.append(f"not imported: {_listed(ignored)}")
-        raw.row_choices = lambda order: row_choices(source.rows(separator, line + 1), raw.lines, header, ignored, order)
+        raw.row_choices = lambda order: row_choices(
+            source.rows(separator, line + 1), raw.lines, header, ignored, order, given.rows
+        )
     return raw
 
 
@@ -123,13 +126,15 @@ def _by_name(source: Source, header: list[str], line: int) -> _Found:
                 axis = match["axis"].lower().translate(str.maketrans("123", "xyz"))
                 key = (kind, match["marker"] or ONLY_MARKER, (match["unit"] or "").lower())
                 groups.setdefault(key, {}).setdefault(axis, index)
-    _complete(found, groups, source.at(line), faults)
+    _complete(found, groups, header, source.at(line), faults)
     faults.raise_any()
     if not found.markers:
         raise _no_marker(source, header, line, groups)
     if len(found.units) > 1:
         listed = ", ".join(sorted(unit or "none" for unit in found.units))
-        raise fail(source.at(line), listed, f"the columns of markers state the units {listed}; write all in one unit")
+        examples = ", ".join(f"{header[found.markers[label][0]]!r}" for label in found.unit_examples.values())
+        message = f"the columns of markers state the units {listed} (as in {examples}); write all in one unit"
+        raise fail(source.at(line), listed, message)
     found.units.discard("")
     return found
 
@@ -150,7 +155,9 @@ def _special(found: _Found, name: str, index: int, where: str, faults: Faults) -
     return False
 
 
-def _complete(found: _Found, groups: dict[tuple[int, str, str], dict[str, int]], where: str, faults: Faults) -> None:
+def _complete(
+    found: _Found, groups: dict[tuple[int, str, str], dict[str, int]], header: list[str], where: str, faults: Faults
+) -> None:
     """Add the groups that have x, y and z to ``found``; a group with two of them is a fault if others have three."""
     used = set[int]()
     for (_, label, unit), columns in groups.items():
@@ -159,8 +166,17 @@ def _complete(found: _Found, groups: dict[tuple[int, str, str], dict[str, int]],
             if label in found.markers:
                 faults.add(where, label, f"two markers are called {label!r}; rename the columns of one")
             found.markers[label] = (columns["x"], columns["y"], columns["z"])
-            found.units.add(unit_of(unit) or "" if unit else "")
+            found.units.add(known := unit_of(unit) or "" if unit else "")
+            found.unit_examples.setdefault(known, label)
             used |= places
+    for (kind, label, unit), columns in groups.items():
+        others = [more for key, more in groups.items() if key[:2] == (kind, label) and key[2] != unit]
+        together = set(columns).union(*others)
+        if len(columns) < 3 and together == set("xyz") and not used & set(columns.values()):
+            used |= {at for group in (columns, *others) for at in group.values()}
+            names = [header[at] for at in sorted(at for group in (columns, *others) for at in group.values())]
+            message = f"the columns of marker {label!r} state different units ({', '.join(names)})"
+            faults.add(where, label, f"{message}; write all in one unit, and name them so")
     for (_, label, _unit), columns in groups.items():
         if found.markers and len(columns) == 2 and not used & set(columns.values()):
             missing = next(axis for axis in "xyz" if axis not in columns)

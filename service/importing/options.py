@@ -13,6 +13,7 @@ from wingfit.service.http.problems import error_item, invalid
 
 LONGEST = 50_000
 FILE = "file"
+FLAP_FREQUENCY = "flap_frequency_hz"  # of the description alone
 
 
 async def options(
@@ -54,9 +55,17 @@ async def options(
     incomplete: Annotated[
         bool, Form(description="import a file that has other than the count of frames that it states")
     ] = False,
+    markers: Annotated[
+        str | None,
+        Form(max_length=LONGEST, description="only these markers: `tip,root`; * stands for any letters: `right_*`"),
+    ] = None,
+    repeated: Annotated[
+        Literal["gaps", "first"] | None,
+        Form(description="rows with the same time: merge them, with gaps where they differ; or keep the first"),
+    ] = None,
 ) -> Given:
     """Return the options of the form; a 422 lists fields that do not exist, because a misspelt one would be ignored."""
-    known = Given.names()
+    known = (*Given.names(), *([FLAP_FREQUENCY] if request.url.path.endswith("/description") else []))
     form = await request.form()
     faults = [
         error_item(f"body.{name[:200]}", value if isinstance(value, str) else None, f"unknown field; {_known(known)}")
@@ -66,8 +75,9 @@ async def options(
     if faults:
         raise invalid("the form has unknown fields", faults)
     return Given(
-        unit, rate_hz, axes, format, time_unit, decimal, columns, rows, keep_zeros, keep_unlabelled, incomplete
-    )
+        unit, rate_hz, axes, format, time_unit, decimal, columns, rows, keep_zeros, keep_unlabelled, incomplete,
+        markers, repeated,
+    )  # fmt: skip
 
 
 def _known(names: tuple[str, ...]) -> str:

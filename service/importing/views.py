@@ -10,6 +10,7 @@ from wingfit.client.importing import answers as i
 from wingfit.client.importing.questions import ImportQuestion
 from wingfit.importers.inspection import Inspection, preview_frames, ranges
 from wingfit.importers.raw import Raw
+from wingfit.importers.start import Start
 from wingfit.importers.summary import as_json
 from wingfit.importers.tracks import ImportedTracks
 
@@ -26,6 +27,16 @@ def imported(found: Inspection) -> i.TrackImport:
         "contents": _contents(found.raw) if found.raw else None,
         "questions": questions(found),
         "tracks": _tracks(found.tracks) if found.tracks else None,
+    }
+
+
+def description(start: Start) -> i.FirstDescription:
+    """Return the answer about a first description."""
+    return {
+        "kind": "wing" if start.kind == "wing" else "series",
+        "yaml": start.yaml,
+        "flap_frequency_hz": start.flap_frequency_hz[0] if start.flap_frequency_hz else None,
+        "facts": [{"what": one.what, "value": one.value, "source": one.source} for one in start.facts],
     }
 
 

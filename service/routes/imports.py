@@ -5,14 +5,16 @@ from __future__ import annotations
 from pathlib import PurePath
 from typing import Annotated
 
-from fastapi import APIRouter, Depends, UploadFile
+from fastapi import APIRouter, Depends, Form, UploadFile
 from pydantic_core import to_json
 from starlette.responses import Response, StreamingResponse
 
-from wingfit.client.importing.answers import TrackImport
+from wingfit.client.importing.answers import FirstDescription, TrackImport
 from wingfit.importers import Given, inspect_bytes
 from wingfit.importers.inspection import Inspection
 from wingfit.importers.markers import allowed
+from wingfit.importers.start import Conditions, start_dataset
+from wingfit.records.errors import DatasetError
 from wingfit.service.container import READ_SLOT
 from wingfit.service.http import csv_text
 from wingfit.service.http import responses as http
@@ -62,6 +64,36 @@ def import_table(file: UploadFile, given: Options) -> Response:
     name = allowed(PurePath(found.file).stem) or "tracks"
     headers = http.attachment(f"{name}.csv")
     return StreamingResponse(found.tracks.csv_parts(), media_type=csv_text.MEDIA_TYPE, headers=headers)
+
+
+@router.post(
+    "/description",
+    response_model=FirstDescription,
+    responses=http.errors(400, 413),
+    summary="Describe a wing by its tracks",
+    dependencies=[READ_SLOT],
+)
+def import_description(
+    file: UploadFile,
+    given: Options,
+    flap_frequency_hz: Annotated[
+        float | None, Form(gt=0, le=1e4, description="flap frequency, if the tracks do not show it clearly")
+    ] = None,
+) -> Response:
+    """Return a first description of the rig by its tracks alone, for dataset.yaml; what is assumed is marked in it.
+
+    With `axes` of a wing it is a wing; otherwise series of the positions of the markers, without a wing.
+    """
+    found = _inspected(file, given)
+    if found.tracks is None:
+        raise _refused(found)
+    name = allowed(PurePath(found.file).stem) or "wing"
+    try:
+        start = start_dataset([found.tracks], name, Conditions(flap_frequency_hz, rows=given.rows))
+    except DatasetError as error:
+        found.error = error
+        raise _refused(found) from None
+    return Response(to_json(views.description(start)), media_type=http.JSON)
 
 
 def _inspected(file: UploadFile, given: Given) -> Inspection:

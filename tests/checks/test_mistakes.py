@@ -151,3 +151,17 @@ def test_the_copy_is_written_beside_and_keeps_comments(tmp_path: Path) -> None:
     assert fixed == new.replace("foam_density_kg_m3: 0.03", "foam_density_kg_m3: 30", 1)
     with pytest.raises(DatasetError, match="nothing is overwritten"):
         repaired(source, tmp_path / "copy", ())
+
+
+def test_the_standard_atmosphere_in_mmhg_is_a_warning_and_mountains_are_not() -> None:
+    wing = good_wing()
+    tunnel = wing.recordings[2]
+
+    def causes(pascal: float) -> list[str]:
+        thin = replace(tunnel, condition=replace(tunnel.condition, pressure=pascal))
+        found = examine(replace(wing, recordings=(*wing.recordings[:2], thin)))
+        assert not [one for one in found if one.certain]
+        return [one.cause for one in found if one.kind == "air pressure"]
+
+    assert causes(76_000.0) == ["the pressure is in mmHg"]
+    assert causes(75_000.0) == causes(77_000.0) == []

@@ -102,7 +102,10 @@ def test_a_file_that_is_cut_off_is_refused() -> None:
         (b"time_s,a_x_m,a_y_m\n0,1,2\n", "triangulate"),
         (b"time_s,a_x_m,a_y_m,a_z_m,b_x_m,b_y_m\n0,1,2,3,4,5\n", "has no column for z"),
         (b"time_s,t_ms,a_x_m,a_y_m,a_z_m\n0,0,1,2,3\n", "second column of times"),
-        (b"time_s,a_x_m,a_y_m,a_z_m,b_x_mm,b_y_mm,b_z_mm\n" + b"0,1,2,3,4,5,6\n", "m, mm; write all in one unit"),
+        (
+            b"time_s,a_x_m,a_y_m,a_z_m,b_x_mm,b_y_mm,b_z_mm\n" + b"0,1,2,3,4,5,6\n",
+            "m, mm (as in 'a_x_m', 'b_x_mm'); write all in one unit",
+        ),
         (b"time_s,a_x_px,a_y_px,a_z_px\n" + b"".join(b"%d,1,2,3\n" % t for t in range(9)), "triangulate"),
         (b'time_s,a_x_m,a_y_m,a_z_m\n0,"1,2,3\n1,2,3,4\n', "stray quotes"),
         (bytes(range(256)) * 8, "binary"),

@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 import typer
 
+import wingfit as package
 from tests.command_line import Wingfit, in_process
+from tests.importers.start.test_start import wing_table
 from tests.oracles.track_files import flapping, text_writers
 from wingfit.cli.importing.command import import_
 from wingfit.records.files.tracks import read_tracks
@@ -83,3 +85,29 @@ def test_the_faults_of_all_files_are_listed_and_nothing_is_written(wingfit: Wing
     for words in ("a_xyzpts.csv: states no unit", "--rate-hz", "gone.c3d: cannot be read: No such file"):
         assert words in message
     assert not (trial.parent / "tracks").exists()
+
+
+def test_a_whole_dataset_is_written(wingfit: Wingfit, tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text(wing_table(both=True))
+    words = (tmp_path / "a.csv", "--axes", "x aft, y out, z up", "--dataset", tmp_path / "wing")
+    code, _, err = wingfit(*words)
+    assert code == 1
+    assert "--markers in,mid,tip" in err
+    assert not (tmp_path / "wing").exists()
+    code, out, err = wingfit(*words, "--markers", "in,mid,tip", "--airspeed-m-s", 4)
+    assert code == 0, err
+    assert "assumed: a rectangle around the markers" in out
+    assert f"next: wingfit datasets check {tmp_path / 'wing'}" in " ".join(out.split())
+    assert "replace what is assumed" in err
+    dataset = package.load_dataset(tmp_path / "wing")
+    assert isinstance(dataset, package.Dataset)
+    assert dataset.recordings[0].condition.airspeed == 4
+    code, _, err = wingfit(*words)
+    assert (code, "exists; name a new folder" in " ".join(err.replace("│", " ").split())) == (2, True)
+    code, _, err = wingfit(tmp_path / "a.csv", "--airspeed-m-s", 4)
+    assert (code, "is for --dataset" in " ".join(err.replace("│", " ").split())) == (2, True)
+    code, out, err = wingfit(tmp_path / "a.csv", "--dataset", tmp_path / "positions", "--markers", "tip")
+    assert code == 0
+    assert "series of positions, without a wing" in out
+    assert "--axes" in err
+    assert package.load_dataset(tmp_path / "positions").kind == "series"

@@ -65,7 +65,7 @@ def test_frames_that_were_dropped_leave_a_step_in_time() -> None:
     ("cells", "words"),
     [
         ({"r5c0": "0.02"}, ("line 7", "0.02 s follows 0.04 s")),
-        ({"r5c0": "0.04"}, ("line 7", "repeats the time")),
+        ({"r5c0": "0.04"}, ("line 7", "in lines 6 and 7; these differ in the positions of tip", "--repeated gaps")),
         ({"r5c0": ""}, ("line 7", "every frame needs a time")),
         ({"r5c0": "NaN"}, ("line 7", "every frame needs a time")),
     ],
@@ -77,7 +77,9 @@ def test_times_must_be_complete_and_increase(cells: dict[str, Any], words: tuple
 
 def test_numbers_of_frames_must_increase_and_be_whole() -> None:
     lines = text_writers.vicon(flapping(), devices=False).splitlines(keepends=True)
-    assert "frame 5 repeats" in refused("".join([*lines[:10], lines[9], *lines[10:]]))
+    assert "the first (5) in lines 10 and 11, with the same positions" in refused(
+        "".join([*lines[:10], lines[9], *lines[10:]])
+    )
     assert "frame 5 follows 6" in refused("".join([*lines[:9], lines[10], lines[9], *lines[11:]]))
     assert "must be a whole number" in refused("".join(lines).replace("\n7,0,", "\n6.5,0,"))
 

@@ -15,6 +15,8 @@ const FIELDS = {
   keep_zeros: { label: "Positions 0, 0, 0 are seen; else they are gaps", tick: true },
   keep_unlabelled: { label: "Import markers that were not identified, too", tick: true },
   incomplete: { label: "Import the frames that are there", tick: true },
+  markers: { label: "Only these markers", example: "tip,root; or right_*" },
+  repeated: { label: "Rows with the same time", choices: { gaps: "merge them, with gaps where they differ", first: "keep the first" } },
 };
 const DIRECTIONS = { aft: "aft", fore: "fore", out: "out", in: "in", right: "right", left: "left", up: "up", down: "down" };
 
@@ -99,7 +101,7 @@ function field(option, question = null) {
 
 // The first part of the message; its remedy is the field itself.
 const why = ({ message, hint, choices, option }) => [
-  inWords(message.split(/; (?:add|say|choose|export|if this|if they|name them|label them|times must|numbers of frames)/)[0]).replace(/^(?=states|has|fits)/, "The file "),
+  inWords(message.split(/; (?:add|say|choose|merge|export|if this|if they|name them|label them|times must|numbers of frames)/)[0]).replace(/^(?=states|has|fits)/, "The file "),
   hint && !message.includes(hint) ? hint : null, option === "columns" && choices.length ? `columns: ${choices.join(", ")}` : null].filter(Boolean).join("; ");
 
 function controlOf(option, question) {

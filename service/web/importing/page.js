@@ -5,6 +5,7 @@ import { save } from "../base/download.js";
 import { $, el, size, toast } from "../base/format.js";
 import { setUpDataset } from "./dataset.js";
 import { answers, inWords, restart, setUpForm, showQuestions } from "./form.js";
+import { setUpStart, showStart } from "./start.js";
 import { setUpPreview, showPreview, stopPreview } from "./preview.js";
 import { chosenMarkers, setUpUnderstood, showKnown, showTracks } from "./understood.js";
 
@@ -42,6 +43,7 @@ async function build() {
   setUpUnderstood(downloadTable);
   setUpPreview();
   setUpDataset({ ...hooks, currentTracks: () => tracks, table });
+  setUpStart({ ...hooks, body, table });
   setUpFile();
 }
 
@@ -111,14 +113,18 @@ function show(found) {
   showKnown(found);
   showQuestions(found.questions);
   $("import-result").hidden = !tracks;
+  showStart(tracks);
   if (!tracks) return stopPreview();
   showTracks(found);
   showPreview(tracks);
   const stem = file.name.replace(/\.[^.]*$/, "").replace(/[^A-Za-z0-9._-]+/g, "_").replace(/^[._-]+|[._-]+$/g, "");
-  $("import-recording").elements.namedItem("name").value ||= stem;
+  $("import-recording").elements.namedItem("name").value ||= rowsName() || stem;
   $("import-recording-note").textContent = tracks.frame === "wing" ? "As they were set for this recording. Fields with “else” may stay empty."
     : "A dataset of a wing has the axes x aft, y out, z up: state above how the axes of the file lie (aft, fore, out, in, up, down).";
 }
+
+// The values of the rows that were chosen name the recording: a table of several has one name for all of them.
+const rowsName = () => (answers().rows ?? "").split(",").map((part) => part.split("=")[1]?.trim()).filter(Boolean).join("_").replace(/[^A-Za-z0-9._-]+/g, "_");
 
 function showProblem(error) {
   const box = $("import-errors");

@@ -90,4 +90,5 @@ export function chosenMarkers(csv, { markers }) {
   return [["time_s", ...names.flatMap((name) => [..."xyz"].map((axis) => `${name}_${axis}_m`))].join(","), ...lines, ""].join("\n");
 }
 
+export const chosenSources = () => rows().filter((row) => tick(row).checked).map((row) => row.dataset.name);
 export const chosenNames = () => rows().filter((row) => tick(row).checked).map((row) => row.querySelector("[type=text]").value.trim());

@@ -3,6 +3,7 @@
 import { get, part } from "../base/api.js";
 import { $, DASH, el, plural, size, toast, when } from "../base/format.js";
 import { badge, runName, stateWord, timeLeft } from "../parts/sidebar.js";
+import { warningBadge } from "../parts/warnings.js";
 import { isForces, isSeries, METHODS, misfit, modelOf, withEffects } from "../base/labels.js";
 
 const SHOWN = 100;
@@ -170,6 +171,6 @@ function kindOf(dataset) {
 
 function datasetRow(dataset) {
   const held = dataset.recordings.filter((recording) => recording.held_out).length;
-  return el("tr", {}, cell(open("dataset", dataset.id, dataset.name)), cell(kindOf(dataset)),
+  return el("tr", {}, cell(open("dataset", dataset.id, dataset.name), ...warningBadge(dataset)), cell(kindOf(dataset)),
     cell(String(dataset.recordings.length)), cell(String(held)), cell(size(dataset.size_bytes)), cell(when(dataset.created_at)));
 }

@@ -3,6 +3,7 @@
 import { isFinal } from "../base/api.js";
 import { $, DASH, duration, el, plural, size, when } from "../base/format.js";
 import { contents, misfit, modelOf } from "../base/labels.js";
+import { warningBadge } from "./warnings.js";
 
 const WORDS = {
   QUEUED: "waiting", RUNNING: "running", PAUSED: "paused", SUCCEEDED: "done", FAILED: "failed", CANCELLED: "cancelled",
@@ -80,6 +81,7 @@ export function drawDatasets(datasets, { onRun, onDiagnose, onDelete }) {
     const button = (text, action, key) => keyed(el("button", { type: "button", onclick: () => action(dataset) }, text), `${key}-${dataset.id}`);
     return el("li", {}, el("div", { className: "card" },
       el("a", { href: `#dataset=${encodeURIComponent(dataset.id)}`, title: dataset.description }, el("strong", {}, dataset.name)),
+      ...warningBadge(dataset),
       el("span", { className: "line" }, el("span", {}, about), el("span", {}, size(dataset.size_bytes))),
       el("div", { className: "buttons" }, button("New run", onRun, "run"), button("Diagnose", onDiagnose, "diagnose"),
         keyed(el("a", { className: "link-button", href: `v1/datasets/${encodeURIComponent(dataset.id)}/archive`, download: "" }, "Download"), `get-${dataset.id}`),

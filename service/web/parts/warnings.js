@@ -11,6 +11,10 @@ const count = ({ warnings }) => plural(warnings.length, "likely mistake");
 // A message that a dataset was ``done``, and that it has warnings.
 export const stored = (done, dataset) => `${done} ${dataset.name}${dataset.warnings?.length ? `: it has ${count(dataset)}` : ""}`;
 
+// What a list shows beside the name of a dataset with warnings; nothing for one without.
+export const warningBadge = (dataset) => (dataset.warnings?.length
+  ? [" ", el("span", { className: "badge bad", title: dataset.warnings.map((one) => `${one.where}: ${one.value}`).join("\n") }, count(dataset))] : []);
+
 export function showWarnings(dataset) {
   const { warnings } = dataset;
   $("warnings-title").textContent = `${count(dataset)} in this dataset`;

@@ -33,8 +33,11 @@ FILLED = {
     "driven_rods": "[front, rear]",
     "reference_markers": "[s1c1, s1c2]",
     "drive": "{kind: fourier, mean_deg: 5, cosine_deg: [0], sine_deg: [30]}",
-    "recordings": "\n  - {name: r, rig: vacuum_chamber, flap_frequency_hz: 3, phase_lag_deg: 0, pressure_mbar: 10, "
-    "temperature_c: 20}",
+    "rig": "vacuum_chamber",
+    "flap_frequency_hz": "3",
+    "phase_lag_deg": "0",
+    "pressure_mbar": "10",
+    "temperature_c": "20",
 }
 
 
@@ -64,7 +67,7 @@ def test_placeholders_are_refused_and_a_filled_description_loads(tmp_path: Path)
     header = ",".join(["time_s", *(f"{name}_{axis}_m" for name in names for axis in "xyz")])
     places = ",".join(f"{marker.x},{marker.y},{marker.z}" for marker in found.markers)
     rows = [f"{k / 60:.4f},{places}" for k in range(20)]
-    (folder / "recordings" / "r.csv").write_text("\n".join([header, *rows]) + "\n")
+    (folder / "recordings" / "first.csv").write_text("\n".join([header, *rows]) + "\n")
     wing = wing_or_vehicle(load_dataset(folder)).wing
     assert wing.name == 'my "wing"'
     assert [(s.y, s.leading_edge, s.chord) for s in wing.stations] == [(0, 0, 0.08), (0.2, 0.03, 0.03)]
@@ -173,3 +176,8 @@ def test_an_animal_s_wing_needs_no_rods(tmp_path: Path) -> None:
     assert math.isclose(density, 0.011 / 0.011, rel_tol=1e-5)  # 11 g on 0.011 m^2
     assert "give --structure" in refused(tmp_path, SWEPT, mass_g=11.0)
     assert "must be sheet or rigid" in refused(tmp_path, SWEPT, structure="soft")
+
+
+def test_a_thickness_that_is_impossible_is_refused_once(tmp_path: Path) -> None:
+    assert refused(tmp_path, SWEPT, thickness_mm=(1000.0, 1000.0)).count("--thickness-mm") == 1
+    assert refused(tmp_path, SWEPT, thickness_mm=(1000.0, 2000.0)).count("--thickness-mm") == 2

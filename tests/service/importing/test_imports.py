@@ -14,12 +14,13 @@ import httpx
 import numpy as np
 import pytest
 
+from tests.importers.start.test_start import FREQUENCY, wing_table
 from tests.oracles.track_files import Case, Truth, binary_writers, cases, flapping, refusals, text_writers
 from tests.service.conftest import Api, As, toy_service
 from tests.service.shapes import valid
 from wingfit.client.answers import Problem
 from wingfit.client.client import Client, WingfitError
-from wingfit.client.importing.answers import TrackImport
+from wingfit.client.importing.answers import FirstDescription, TrackImport
 from wingfit.importers import Given, import_bytes, inspect_bytes
 from wingfit.importers.inspection import PREVIEW_FRAMES, PREVIEW_POSITIONS
 from wingfit.importers.readers import READERS
@@ -254,3 +255,29 @@ class TestKeys:
         assert post(as_("ann"), raw).status_code == 200
         assert post(as_("ann-reads"), raw).status_code == 403
         assert post(as_("ann-reads"), raw, "/v1/imports/table").status_code == 403
+
+
+def test_a_wing_is_described_by_its_tracks(api: Api) -> None:
+    path = "/v1/imports/description"
+    found = valid(FirstDescription, post(api, wing_table(), path, "hawk 1.csv", axes="x aft, y out, z up").json())
+    assert found.kind == "wing"
+    assert found.flap_frequency_hz == pytest.approx(FREQUENCY, rel=0.01)
+    assert found.yaml.startswith('wing:\n  name: "hawk_1"\n  structure: rigid')
+    assert {"planform", "mass"} <= {one.what for one in found.facts if one.source.startswith("assumed")}
+    stated = post(api, wing_table(), path, axes="x aft, y out, z up", flap_frequency_hz=3).json()
+    assert stated["flap_frequency_hz"] == 3
+    series = valid(FirstDescription, post(api, wing_table(), path).json())
+    assert (series.kind, series.flap_frequency_hz) == ("series", None)
+    assert "channels:" in series.yaml
+    two = problem(post(api, wing_table(both=True), path, axes="x aft, y out, z up"))
+    assert "--markers in,mid,tip" in two.errors[0].message
+    assert problem(post(api, "tip_x,tip_y,tip_z\n" + "1,2,3\n" * 9, path)).questions[0].option == "unit"
+    assert "unknown field" in problem(post(api, wing_table(), flap_frequency_hz=3)).errors[0].message
+
+
+def test_the_client_asks_for_a_description(api: Api, tmp_path: Path) -> None:
+    file = tmp_path / "wing.csv"
+    file.write_text(wing_table())
+    with Client(str(api.client.base_url)) as client:
+        found = client.import_description(file, axes="x aft, y out, z up", markers="in,tip")
+    assert "2 markers" in {one["what"]: one["value"] for one in found["facts"]}["rest positions"]

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from tests.importers.start.test_start import wing_table
 from tests.oracles.track_files import flapping, text_writers
 from tests.service import toy
 from tests.service.conftest import Api, serving
@@ -273,3 +274,39 @@ def test_nothing_is_in_the_way(browser: Browser, api: Api, scheme: Any, width: i
     assert seen.page.evaluate("document.documentElement.scrollWidth <= innerWidth"), "nothing is wider than the screen"
     assert (seen.errors, seen.foreign) == ([], [])
     seen.page.context.close()
+
+
+def test_a_wing_is_described_by_its_tracks(seen: Seen, api: Api) -> None:
+    choose(seen, "two wings.csv", wing_table(both=True))
+    seen.wait(SHOWN)
+    select(seen, AXES)
+    seen.wait(f"{TEXT.format('import-facts')}.includes('of the wing')")
+    seen.page.click("#import-describe")
+    seen.page.wait_for_selector("#import-describe-errors li")
+    assert "“Only these markers” in,mid,tip" in seen.page.inner_text("#import-describe-errors")
+    seen.errors.clear()  # the browser reports the refusal
+    for name in ("left_in", "left_mid", "left_tip"):
+        seen.page.uncheck(f"[aria-label='Use {name}']")
+    seen.page.fill("[aria-label='Name of in']", "root")
+    seen.page.click("#import-describe")
+    seen.wait("!document.getElementById('import-described').hidden")
+    assert "assumed: a rectangle around the markers" in seen.page.inner_text("#import-described")
+    seen.page.click("#import-recording [type=submit]")
+    seen.wait(f"{TEXT.format('import-recordings')}.includes('two_wings')")
+    assert "ASSUMED" in seen.page.input_value("#import-dataset [name=description]")
+    seen.page.click("#import-dataset [type=submit]")
+    seen.wait("location.hash.startsWith('#dataset=')")
+    stored = api.get(f"/v1/datasets/{seen.page.url.rpartition('=')[2]}")
+    assert (stored["name"], stored["markers"], stored["kind"], stored["warnings"]) == ("two_wings", 3, "tracks", [])
+
+
+def test_positions_are_stored_without_a_wing(seen: Seen, api: Api) -> None:
+    choose(seen, "arm.csv", wing_table())
+    seen.wait(SHOWN)
+    assert seen.page.is_hidden("#import-describe"), "without axes there is no wing"
+    seen.page.fill("[aria-label='Name of in']", "elbow")
+    seen.page.click("#import-series")
+    seen.wait("location.hash.startsWith('#dataset=')")
+    stored = api.get(f"/v1/datasets/{seen.page.url.rpartition('=')[2]}")
+    assert (stored["name"], stored["kind"]) == ("arm", "series")
+    assert [one["name"] for one in stored["rig"]["channels"]][:2] == ["elbow_y_m", "elbow_z_m"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -74,3 +75,26 @@ def _paper(seen: Seen) -> str:
     """Check that the page fits on its screen; return the colour of the drawing's paper."""
     assert seen.page.evaluate("document.documentElement.scrollWidth <= innerWidth"), "nothing is wider than the screen"
     return str(seen.page.evaluate("getComputedStyle(document.querySelector('#drawing .paper')).fill"))
+
+
+def test_lists_of_datasets_say_which_have_warnings(browser: Browser, api: Api, wrong: Path, tmp_path: Path) -> None:
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="pip install -e '.[dev]'").Axe()
+    good = tmp_path / "good.zip"
+    stored(replace(thin(), name="good", recordings=thin().recordings[:1]), good)
+    for path in (wrong, good):
+        answer = api.client.post("/v1/datasets", files={"file": path.read_bytes()})
+        assert answer.status_code == 201, answer.text
+    seen = Seen.watched(browser.new_page(viewport={"width": 1280, "height": 800}), str(api.client.base_url).rstrip("/"))
+    for address, places in (("", "#newest-datasets li"), ("datasets", "#listing tbody tr")):
+        seen.show(address)
+        seen.wait(f"document.querySelectorAll('{places}').length >= 2")
+        texts = "[node.querySelector('a').textContent, node.querySelector('.badge')?.textContent]"
+        script = f"(nodes) => nodes.map((node) => {texts})"
+        rows = dict(seen.page.eval_on_selector_all(places, script))
+        assert rows["good"] is None
+        assert rows[thin().name] == "1 likely mistake"
+        assert "pressure_mbar is 101.325" in str(seen.page.get_attribute(f"{places} .badge", "title"))
+        found = axe.run(seen.page).response["violations"]
+        assert [one["id"] for one in found] == []
+    assert (seen.errors, seen.foreign) == ([], [])
+    seen.page.close()

@@ -1,0 +1,75 @@
+"""``wingfit import --dataset``: a whole dataset from tracks alone."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+from wingfit.cli.base.output import note, say, table
+from wingfit.client.transport import WingfitError
+
+if TYPE_CHECKING:
+    from wingfit.importers import ImportedTracks
+    from wingfit.importers.start import Start
+
+
+def check(dataset: Path | None, output: Path | None, flap_frequency_hz: float | None, airspeed: float | None) -> None:
+    """Raise a usage error for options that do not go together, or have impossible values."""
+    for option, value, most in (("--flap-frequency-hz", flap_frequency_hz, 1e4), ("--airspeed-m-s", airspeed, 1e3)):
+        if value is not None and dataset is None:
+            raise typer.BadParameter("is for --dataset FOLDER; add it", param_hint=option)
+        least = 0.0 if option == "--airspeed-m-s" else 1e-3
+        if value is not None and not least <= value <= most:
+            raise typer.BadParameter(f"is {value:g}; it must lie in [{least:g}, {most:g}]", param_hint=option)
+    if dataset is None:
+        return
+    if output is not None:
+        raise typer.BadParameter("the dataset has the tables in it; leave out --output", param_hint="--dataset")
+    if dataset.exists():
+        raise typer.BadParameter(f"{dataset} exists; name a new folder", param_hint="--dataset")
+
+
+def started(
+    found: list[ImportedTracks],
+    dataset: Path | None,
+    flap_frequency_hz: float | None,
+    airspeed: float | None,
+    rows: str | None,
+) -> Start | None:
+    """Write the dataset of the tracks ``found`` to the new folder ``dataset``; WingfitError says what is missing."""
+    from wingfit.importers.start import Conditions, start_dataset
+    from wingfit.records.errors import DatasetError
+
+    if dataset is None:
+        return None
+    try:
+        start = start_dataset(found, dataset.name, Conditions(flap_frequency_hz, airspeed, rows))
+    except DatasetError as error:
+        faults = [vars(fault) for fault in error.errors]
+        raise WingfitError(
+            "no dataset was written", f"{len(faults)} error{'s' if len(faults) > 1 else ''}", errors=faults
+        ) from None
+    try:
+        (dataset / "recordings").mkdir(parents=True)
+        for name, text in start.files.items():
+            (dataset / name).write_text(text, encoding="utf-8", newline="\n")
+    except OSError as error:
+        raise WingfitError(f"the dataset cannot be written to {dataset}", error.strerror or str(error)) from error
+    return start
+
+
+def show(start: Start, dataset: Path) -> None:
+    """Print what was described, from where, and what to do next."""
+    what = "the wing, described from its tracks" if start.kind == "wing" else "series of positions, without a wing"
+    say(f"dataset written to {dataset}: {what}")
+    table(["described", "value", "source"], [[one.what, one.value, one.source] for one in start.facts])
+    if start.kind == "wing":
+        note(f"replace what is assumed by what you know, in {dataset / 'dataset.yaml'} (docs/formats.md)")
+    else:
+        note("for a dataset of a wing, say where the axes of the file point: --axes 'x aft, y out, z up'")
+    say(
+        f"next: wingfit datasets check {dataset}; then, with a server ('wingfit serve'): "
+        f"wingfit datasets upload {dataset}"
+    )

@@ -1,0 +1,74 @@
+"""The flap frequency of tracks whose frequency nobody has stated."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wingfit.records.array_types import Array, Float
+
+HARMONICS = 2
+LEAST_BEATS = 1.5  # in a recording, of the lowest frequency that is tried
+LEAST_EXPLAINED = 0.8  # of the variance, by the harmonics of the frequency; with less, no frequency is clear
+PARTS = (
+    (0.0, 1.0),
+    (0.0, 0.5),
+    (0.5, 1.0),
+    (0.25, 0.75),
+    (0.0, 0.34),
+    (0.33, 0.67),
+    (0.66, 1.0),
+)  # of a recording that are tried: a bird flaps, then glides
+LEAST_ROWS = 24
+AS_GOOD = 0.9  # of the variance that the best frequency explains: multiples of a beat explain as much as the beat
+MOST_ROWS, MOST_TRIED, MOST_COLUMNS = 600, 1500, 12
+
+
+def flap_frequency(times: Float[Array, " T"], positions: Float[Array, "T M 3"]) -> float | None:
+    """Return the frequency (Hz) with whose harmonics the markers move most; None if none is clear.
+
+    ``times`` in s, ``positions`` in m with NaN in gaps. Only y and z are used: a wing flaps about x.
+    """
+    rows = slice(None, None, max(1, -(-len(times) // MOST_ROWS)))
+    values = positions[rows, :, 1:].reshape(len(times[rows]), -1)
+    values = values[:, np.isfinite(values).all(axis=0)][:, :MOST_COLUMNS]
+    since = times[rows] - times[0]
+    if not values.shape[1]:
+        return None
+    for start, end in PARTS:
+        part = (since >= start * since[-1]) & (since <= end * since[-1])
+        found = _of_part(since[part], values[part])
+        if found is not None:
+            return found
+    return None
+
+
+def _of_part(since: Array, values: Array) -> float | None:
+    """Return the frequency (Hz) of ``values`` [T, C] at the times ``since`` (s); None if none is clear."""
+    if len(since) < LEAST_ROWS or not np.ptp(values, axis=0).max() > 0:
+        return None
+    since = since - since[0]
+    drift = np.column_stack([np.ones_like(since), since])
+    values = values - drift @ np.linalg.lstsq(drift, values, rcond=None)[0]
+    lowest = LEAST_BEATS / since[-1]
+    highest = 0.25 / float(np.median(np.diff(since)))
+    if highest <= lowest:
+        return None
+    # A fifth of a beat over the recording is the smallest difference that shows.
+    count = min(MOST_TRIED, max(2, int(5 * (highest - lowest) * since[-1])))
+    tried = np.linspace(lowest, highest, count)
+    explained = np.array([_explained(since, values, one) for one in tried])
+    if explained.max() < LEAST_EXPLAINED:
+        return None
+    peaks = [k for k in range(count) if explained[k] == explained[max(0, k - 1) : k + 2].max()]
+    best = max(k for k in peaks if explained[k] >= AS_GOOD * explained.max())
+    step = tried[1] - tried[0]
+    near = np.linspace(max(lowest, tried[best] - step), tried[best] + step, 41)
+    return float(near[int(np.argmax([_explained(since, values, one) for one in near]))])
+
+
+def _explained(times: Array, values: Array, frequency: float) -> float:
+    """Return the part of the squares of ``values`` [T, C] that a line and harmonics of ``frequency`` (Hz) explain."""
+    turn = 2 * np.pi * frequency * times[:, None] * np.arange(1, HARMONICS + 1)
+    basis, _ = np.linalg.qr(np.column_stack([np.ones_like(times), times, np.cos(turn), np.sin(turn)]))
+    left = values - basis @ (basis.T @ values)
+    return 1.0 - float((left**2).sum() / (values**2).sum())
