@@ -217,8 +217,8 @@ def _single_refits(state: SearchState) -> Steps:
 def _refits_from_estimates(state: SearchState) -> Steps:
     """Refit from the estimates of the genes: suspects with the strongest score tests there, and those with a location.
 
-    At the nominal fit a score test cannot see what the nominal genes have absorbed, such as a heavy mass. To a series,
-    suspects that act within the simulation are also fitted from a large size.
+    At the nominal fit a score test cannot see what the nominal genes have absorbed, such as a heavy mass. Suspects with
+    a location and, on series, those that act within the simulation are also fitted from a large size.
     """
     if state.initial_fit is None:
         raise ValueError("the nominal model has not been fitted")
@@ -228,8 +228,8 @@ def _refits_from_estimates(state: SearchState) -> Steps:
         found.append(trials)
         yield 0.74, f"score test of {suspect.name} at the estimates"
     starts = [entry for trial in _restart_trials(state.data, found) for entry in start_points(trial)]
-    if state.data.kind == "series":
-        starts += [large_start(trial) for trial in _inner_trials(state)]
+    local = [trials[0] for trials in found if trials and _has_location(trials[0].suspect)]
+    starts += [large_start(trial) for trial in (_inner_trials(state) if state.data.kind == "series" else local)]
     yield from ((0.77, stage) for stage in _compete(state, starts))
 
 
@@ -237,7 +237,12 @@ def _restart_trials(data: WhitenedData, found: Sequence[list[Trial]]) -> list[Tr
     """The strongest trials in ``found``, and, since few locations were tested, the best of each local suspect."""
     strongest = strongest_trials(data, found, MAX_RESTARTED)
     others = [trials[0] for trials in found if trials and all(trials[0] is not one for one in strongest)]
-    return strongest + [one for one in others if one.suspect.location_genes and not one.suspect.candidate_shapes]
+    return strongest + [one for one in others if _has_location(one.suspect)]
+
+
+def _has_location(suspect: Suspect) -> bool:
+    """Return whether ``suspect`` acts at a location of which a score test tries few, and not at a marker."""
+    return bool(suspect.location_genes) and not suspect.candidate_shapes
 
 
 def _inner_trials(state: SearchState) -> list[Trial]:
