@@ -228,8 +228,11 @@ def _refits_from_estimates(state: SearchState) -> Steps:
         found.append(trials)
         yield 0.74, f"score test of {suspect.name} at the estimates"
     starts = [entry for trial in _restart_trials(state.data, found) for entry in start_points(trial)]
-    local = [trials[0] for trials in found if trials and _has_location(trials[0].suspect)]
-    starts += [large_start(trial) for trial in (_inner_trials(state) if state.data.kind == "series" else local)]
+    if state.data.kind == "series":
+        starts += [large_start(trial) for trial in _inner_trials(state)]
+    else:
+        local = [trials[0] for trials in found if trials and _has_location(trials[0].suspect)]
+        starts += [large_start(trial, typical_shape=True) for trial in local]
     yield from ((0.77, stage) for stage in _compete(state, starts))
 
 

@@ -62,15 +62,15 @@ def start_points(trial: Trial, others: Sequence[Trial] = (), refit: Refit | None
     return [StartPoint((*others, trial), np.array([*known, *start])) for start in starts]
 
 
-def large_start(trial: Trial) -> StartPoint:
+def large_start(trial: Trial, *, typical_shape: bool = False) -> StartPoint:
     """Return a start at LARGE times the typical size of the suspect of ``trial``, with the sign of its score test.
 
-    A large effect changes the frequency of an oscillation so much that a fit with a small one does not come to it, and
-    the response of a wing so much that its location in a score test, which is of a small one, is not that of the cause:
-    a suspect with a location starts at the typical one.
+    A large effect changes the frequency of an oscillation so much that a fit with a small one does not come to it. It
+    changes the motion of a wing so much that its location in a score test, which is of a small one, may be that of
+    another cause: with ``typical_shape`` it starts at the typical location and shape.
     """
     off, typical, size = off_units(trial.suspect), typical_units(trial.suspect), size_columns(trial.suspect)
-    unit = typical.copy() if trial.suspect.location_genes else trial.unit[0].copy()
+    unit = (typical if typical_shape else trial.unit[0]).copy()
     sign = np.where(trial.start[size] < off[size], -1.0, 1.0)
     unit[size] = np.clip(off[size] + LARGE * sign * np.abs(typical[size] - off[size]), 0.0, 1.0)
     return StartPoint((trial,), unit)

@@ -202,9 +202,10 @@ def test_start_points_are_the_trials_and_the_typical_location() -> None:
 
 
 def test_a_large_start_has_the_sign_of_the_score_test() -> None:
-    """Three times 5 g of 30 g, at the location of the trial; a friction of either sign, within its bounds."""
+    """Three times 5 g of 30 g, at the location of the trial or the typical; a friction of either sign, in bounds."""
     mass = trial("point_mass", [0.9, 0.2])
     np.testing.assert_allclose(large_start(mass).unit, [0.5, 0.2])
+    np.testing.assert_allclose(large_start(mass, typical_shape=True).unit, [0.5, 0.7])
     cubic = trial("cubic", [0.6])
     positive, negative = (large_start(replace(cubic, multiples=np.array([one]))).unit for one in (1.0, -1.0))
     (off,) = off_units(cubic.suspect)
