@@ -28,6 +28,7 @@ TRIALS = 60
 WITHIN_DEG, WITHIN_MM = 0.5, 1.0
 NINETY = 1.6449  # standard errors of the stated 90 % interval
 GROSS_DEG, GROSS_SPANS, GROSS_LABELS = 2.0, 0.02, 0.02
+GROSS_STANDARD = 5.0  # standard errors beyond which an error that is not within the tolerance counts as gross
 
 
 @dataclass(frozen=True)
@@ -49,8 +50,9 @@ class Score:
 
     @property
     def false(self) -> bool:
-        """Whether the answer is grossly wrong."""
+        """Whether the answer is grossly wrong: by itself, or beyond the tolerance and far beyond its stated errors."""
         far = self.rotation > GROSS_DEG or self.offset > 1e3 * GROSS_SPANS * self.span
+        far = far or (not self.within and max(abs(z) for z in self.z) > GROSS_STANDARD)
         return not self.side or far or self.right < 1 - GROSS_LABELS
 
 
