@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -20,6 +20,7 @@ from wingfit.records import Condition, Dataset, FourBarDrive, Wing
 Array = npt.NDArray[np.float64]
 Plant = Literal["bodies", "rod"]
 Body = Literal["rests", "drifts", "flies"]
+BODIES: tuple[Body, ...] = get_args(Body)
 
 _DIVISION = "11"
 _LOST_OF = 49  # markers for which the number of lost ones is drawn
@@ -83,8 +84,8 @@ def with_stroke(wing: Wing, factor: float) -> Wing:
     return replace(wing, drive=replace(drive, cosine=cosine, sine=sine))
 
 
-def make(seed: int) -> Trial:
-    """Return the trial of a ``seed``: the same for the same seed."""
+def make(seed: int, motion: Body | None = None) -> Trial:
+    """Return the trial of a ``seed``, the same for the same seed, with this ``motion`` of the body or a drawn one."""
     rng = np.random.default_rng([seed, 25])
     rig = ("robird", "bird", "insect")[seed % 3]
     plant: Plant = ("bodies", "rod")[seed // 3 % 2]
@@ -98,7 +99,8 @@ def make(seed: int) -> Trial:
     recording = film(beat, wing, Condition(frequency, 0.0, 1e5, 293.0, speed), filming, rng).recording
     seen = recording.values.reshape(len(recording.times), -1, 3)
     left = bool(rng.integers(2))
-    body: Body = ("rests", "rests", "drifts", "flies")[int(rng.integers(4))]
+    drawn: Body = ("rests", "rests", "drifts", "flies")[int(rng.integers(4))]
+    body = motion or drawn
     return _mixed(
         f"{rig} {plant}", wing, recording.times, recording.markers, seen, left, body, filming.noise.level, rng
     )

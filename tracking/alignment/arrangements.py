@@ -11,7 +11,7 @@ from wingfit.records.array_types import Array, Index, Mask
 from wingfit.tracking.alignment.candidates import Candidate, Layout, candidates, gate_of, start_of, with_all
 from wingfit.tracking.alignment.fit import Fit, fit, shaken
 from wingfit.tracking.alignment.identity import whole_tracks
-from wingfit.tracking.alignment.pose_error import PoseError
+from wingfit.tracking.alignment.pose_error import Frames
 from wingfit.tracking.alignment.rigid_motion import RigidMotion
 from wingfit.tracking.alignment.wing_model import Strip, positions
 
@@ -67,8 +67,7 @@ class Search:
     tracks: Array
     motion: RigidMotion
     layout: Layout
-    mean: Array
-    shaking: PoseError
+    frames: Frames
 
     def candidates(self, given: Index) -> list[Candidate]:
         """Return the candidates to fit, best first; ``given`` [K] are markers of named tracks (-1: none)."""
@@ -102,7 +101,7 @@ class Search:
     def _fitted(self, here: Fit, marker: Index, rest: Array, steps: int) -> Fit:
         which = marker[marker >= 0]
         start, tracks = with_all(here, rest[which]), self.tracks[:, marker >= 0]
-        return fit(self.strip, self.described[which], tracks, self.mean, self.shaking, start, steps=steps)
+        return fit(self.strip, self.described[which], tracks, self.frames, start, steps=steps)
 
     def arranged(self, candidate: Candidate, right: bool, given: Index, named: Index) -> Arrangement | None:
         """Return the fit that starts from ``candidate``, relabelled until labels and fit agree; None without fit."""
@@ -116,7 +115,7 @@ class Search:
             rest[marker[marker >= 0]] = here.rest
             # Described rest positions: estimated ones would confirm wrong labels.
             model = positions(self.strip, self.described, here.states, here.line)[0]
-            model += shaken(model, here.jitter)
+            model += shaken(model, here.jitter + self.frames.slow @ here.drift)
             found, away, doubtful = whole_tracks(here.coordinates(self.tracks), model, gate)
             found = _with_given(found, given)
             if round_ > 0 and np.array_equal(found, marker):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from wingfit.records.array_types import Array, Index
 from wingfit.records.errors import fail
@@ -89,7 +90,7 @@ def slow(
     """
     fitted = np.isfinite(motion.rotation[:, 0, 0])
     t = times - times[0]
-    order = min(_MOST_ORDER, int(flapping.frequency * t[-1] + 0.6))
+    order = order_of(times, flapping)
     if order < 1:
         return None
     s = 2 * t / t[-1] - 1
@@ -110,7 +111,10 @@ def slow(
     mean = powers @ c[: order + 1]
     rotation, place = _nearest(mean[:, :9].reshape(-1, 3, 3)), mean[:, 9:]
     middle = _nearest(mean[:, :9].mean(axis=0).reshape(1, 3, 3))[0]
-    relative = rotation @ middle.T
+    # Rotation vectors are a polynomial: elements of rotation matrices have higher orders of a large turn.
+    vectors = Rotation.from_matrix(rotation @ middle.T).as_rotvec()
+    vectors = powers @ np.linalg.lstsq(powers[frames], vectors[frames], rcond=None)[0]
+    relative = Rotation.from_rotvec(vectors).as_matrix()
     pivot = place.mean(axis=0)
     angle = np.degrees(np.arccos(np.clip((np.trace(relative, axis1=1, axis2=2) - 1) / 2, -1, 1))).max()
     way = 1e3 * np.linalg.norm(np.ptp(place, axis=0))
@@ -120,6 +124,11 @@ def slow(
     return BodyMotion(relative, place - relative @ pivot, words, STEADY)
 
 
+def order_of(times: Array, flapping: Flapping) -> int:
+    """Return the order of the polynomial over ``times`` [T] (s) that the flapping allows; 0 for less than 0.4 beats."""
+    return min(_MOST_ORDER, int(flapping.frequency * float(times[-1] - times[0]) + 0.6))
+
+
 def _nearest(matrices: Array) -> Array:
     """Rotations [T, 3, 3] nearest to ``matrices``."""
     U, _, Vt = np.linalg.svd(matrices)
@@ -127,12 +136,12 @@ def _nearest(matrices: Array) -> Array:
     return np.asarray(U @ Vt)
 
 
-def without_slow_motion(times: Array, positions: Array, frames: Index) -> tuple[Array, list[str]]:
-    """Return ``positions`` [T, K, 3] without slow common motion, and what was removed in words.
+def without_slow_motion(times: Array, positions: Array, frames: Index) -> tuple[Array, list[str], int]:
+    """Return ``positions`` [T, K, 3] without slow common motion, what was removed in words, and its order (0: none).
 
     The motion is estimated from ``frames`` [F].
     """
-    words = list[str]()
+    words, order = list[str](), 0
     for _ in range(_ROUNDS):
         motion = rigid_motion(positions[frames])
         frequency = strongest(times, motion.angles_of(positions)) if len(times) > MOST_FRAMES else None
@@ -141,6 +150,7 @@ def without_slow_motion(times: Array, positions: Array, frames: Index) -> tuple[
         if found is None:
             break
         positions, words = found.removed(positions), words or [found.words]
+        order = order_of(times, flapping)
         if np.abs(found.rotation - np.eye(3)).max() < _SETTLED:
             break
-    return positions, words
+    return positions, words, order

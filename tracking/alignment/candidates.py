@@ -216,6 +216,7 @@ def start_of(candidate: Candidate, layout: Layout, motion: RigidMotion, right: b
         origin,
         states,
         np.zeros((len(states), 5)),
+        np.zeros((0, 5)),
         np.array(strip.line),
         rest,
         1.0,

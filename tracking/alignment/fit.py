@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from wingfit.records.array_types import Array, Mask
 from wingfit.records.blas_threads import one_blas_thread
-from wingfit.tracking.alignment.pose_error import PoseError
+from wingfit.tracking.alignment.pose_error import Frames, PoseError
 from wingfit.tracking.alignment.wing_model import BENDING, STATES, SWEEPING, TWISTING, Strip, positions
 
 # Prior standard deviations of the states, rad: none for the flap angle; bending, twist and sweep are hardly restricted.
@@ -42,6 +42,7 @@ _MEAN_PRIOR = _mean_prior()
 _MEAN_PRECISION = np.linalg.inv(_MEAN_PRIOR)
 _JITTER = 5
 _LOCAL = STATES + _JITTER
+_SLOW_TURN, _SLOW_SHIFT = np.radians(2.0), 0.02  # standard deviations of the remainder of slow motion: rad, spans
 _LINE_PRIOR = 0.15  # standard deviation of the line that a wing twists about, chords
 _FRAME = 7  # small rotation about y and z, a shift, and the line: rotation about x is the zero of phi
 _STEPS = 40
@@ -63,6 +64,7 @@ class Fit:
         hinge: [3] o, camera position of the hinge, m.
         states: [T, STATES] as in :mod:`.wing_model`, rad.
         jitter: [T, 5] motion of the body in each frame that was not removed: rotation about y and z (rad), shift (m).
+        drift: [D, 5] the same of slow motion, as coefficients of D polynomials over time.
         line: [2] that the wing twists about, as in :mod:`.wing_model`, m.
         rest: [M, 3] rest positions in hinge coordinates, m.
         noise: standard deviation of one coordinate of one sample, model errors included, m.
@@ -78,6 +80,7 @@ class Fit:
     hinge: Array
     states: Array
     jitter: Array
+    drift: Array
     line: Array
     rest: Array
     noise: float
@@ -99,17 +102,16 @@ class Fit:
 
 
 @one_blas_thread
-def fit(
-    strip: Strip, described: Array, tracks: Array, mean: Array, shaking: PoseError, start: Fit, *, steps: int = _STEPS
-) -> Fit:
+def fit(strip: Strip, described: Array, tracks: Array, frames: Frames, start: Fit, *, steps: int = _STEPS) -> Fit:
     """Fit the frame of ``tracks`` [T, M, 3] (m; NaN where not seen) to ``described`` rest positions [M, 3], m.
 
-    ``described`` are hinge coordinates; the tracks are in the order of the markers. ``mean`` [T]: weights of the frames
-    whose sum over a state is its mean over the beat. ``shaking``: errors of the body's pose, in every frame anew.
-    ``start`` is where to begin.
+    ``described`` are hinge coordinates; the tracks are in the order of the markers. ``start`` is where to begin.
     """
     seen: Mask = np.asarray(np.isfinite(tracks).all(axis=-1))
-    problem = _Problem(strip, described, tracks, seen, mean, shaking.precision(start.turn, start.hinge))
+    steady = frames.shaking.precision(start.turn, start.hinge)
+    problem = _Problem(strip, described, tracks, seen, frames.mean, frames.slow, steady)
+    if len(start.drift) != frames.slow.shape[1]:
+        start = replace(start, drift=np.zeros((frames.slow.shape[1], _JITTER)))
     here = replace(start, residuals=problem.residuals(start), scatter=_FIRST_SCATTER * strip.span)
     here, damping = problem.scaled(here), 1e-4
     for _ in range(steps):
@@ -138,11 +140,19 @@ class _Problem:
     tracks: Array
     seen: Mask
     mean: Array
+    slow: Array
     steady: Array
+
+    @property
+    def drift_precision(self) -> Array:
+        """Of the coefficients [D, 5] of slow motion."""
+        shift = _SLOW_SHIFT * self.strip.span
+        one = np.array([_SLOW_TURN, _SLOW_TURN, shift, shift, shift]) ** -2.0
+        return np.tile(one, (self.slow.shape[1], 1))
 
     def residuals(self, at: Fit) -> Array:
         model = positions(self.strip, at.rest, at.states, at.line)[0]
-        return np.asarray(at.coordinates(self.tracks) - model - shaken(model, at.jitter))
+        return np.asarray(at.coordinates(self.tracks) - model - shaken(model, at.jitter + self.slow @ at.drift))
 
     def weighed(self, at: Fit) -> Fit:
         """Return ``at`` with its cost under its own noise and scatter."""
@@ -154,7 +164,8 @@ class _Problem:
         means = means @ _MEAN_PRECISION @ means
         line = (((at.line - self.strip.line) / (_LINE_PRIOR * self.strip.chord)) ** 2).sum()
         jitter = np.einsum("ta,ab,tb->", at.jitter, self.steady, at.jitter)
-        return replace(at, cost=float(data / at.memory + moves + states + jitter + means + line))
+        drift = (at.drift**2 * self.drift_precision).sum()
+        return replace(at, cost=float(data / at.memory + moves + states + jitter + means + line + drift))
 
     def scaled(self, at: Fit) -> Fit:
         """Return ``at`` with new estimates of noise, its memory and scatter, and its cost under these."""
@@ -207,8 +218,8 @@ def _memory(residuals: Array, noise: float) -> float:
 class _Step:
     """Linearised problem at one point, with the states eliminated.
 
-    Unknowns of all frames: rotation, shift and line [7], rest positions [3 M], and the forces that restrict the
-    means of the elastic states [_MEANS] (dual variables, so that no frame is coupled to another).
+    Unknowns of all frames: rotation, shift and line [7], rest positions [3 M], the forces that restrict the means of
+    the elastic states [_MEANS] (dual variables, so that no frame is coupled to another), and slow motion [5 D].
     """
 
     def __init__(self, problem: _Problem, at: Fit) -> None:
@@ -221,14 +232,18 @@ class _Step:
         by_state = np.concatenate([by_state, by_frame[..., :_JITTER]], axis=-1)
         J, free = weight[..., None, None] * by_state, _FRAME + 3 * M
         prior = _local_prior(at.memory, problem.steady)
-        self.A = np.einsum("tmia,tmib->tab", J, by_state) + prior
-        self.a = np.einsum("tmia,tmi->ta", J, r) - np.hstack([at.states, at.jitter]) @ prior
-        self.B = np.zeros((T, free + _MEANS, _LOCAL))
+        seen_only, pull = np.einsum("tmia,tmib->tab", J, by_state), np.einsum("tmia,tmi->ta", J, r)
+        self.A, self.a = seen_only + prior, pull - np.hstack([at.states, at.jitter]) @ prior
+        slow, drifts = problem.slow, slice(free + _MEANS, free + _MEANS + at.drift.size)
+        self.free, self.drifts = free, drifts
+        self.B = np.zeros((T, drifts.stop, _LOCAL))
         self.B[:, :_FRAME] = np.einsum("tmia,tmib->tab", by_frame, J)
         self.B[:, _FRAME:free] = np.einsum("tmia,tmib->tmab", by_rest, J).reshape(T, 3 * M, _LOCAL)
-        self.B[:, free:, _ELASTIC] = problem.mean[:, None, None] * np.eye(_MEANS)
+        self.B[:, free : drifts.start, _ELASTIC] = problem.mean[:, None, None] * np.eye(_MEANS)
+        # Slow motion is a jitter that all frames share, times polynomials.
+        self.B[:, drifts] = np.einsum("td,tab->tdab", slow, seen_only[:, STATES:]).reshape(T, at.drift.size, _LOCAL)
         weighted = weight[..., None, None] * by_rest
-        C = np.zeros((free + _MEANS, free + _MEANS))
+        C = np.zeros((drifts.stop, drifts.stop))
         C[:_FRAME, :_FRAME] = np.einsum("tm,tmia,tmib->ab", weight, by_frame, by_frame)
         C[:_FRAME, _FRAME:free] = np.einsum("tmia,tmib->amb", by_frame, weighted).reshape(_FRAME, 3 * M)
         C[_FRAME:free, :_FRAME] = C[:_FRAME, _FRAME:free].T
@@ -236,14 +251,19 @@ class _Step:
         for m in range(M):
             here = slice(_FRAME + 3 * m, _FRAME + 3 * m + 3)
             C[here, here] = blocks[m]
-        C[free:, free:] = -_MEAN_PRIOR
+        C[free : drifts.start, free : drifts.start] = -_MEAN_PRIOR
+        C[:free, drifts] = np.einsum("tga,td->gda", self.B[:, :free, STATES:], slow).reshape(free, at.drift.size)
+        C[drifts, :free] = C[:free, drifts].T
+        C[drifts, drifts] = np.einsum("tga,td->gda", self.B[:, drifts, STATES:], slow).reshape([at.drift.size] * 2)
+        C[drifts, drifts] += np.diag(problem.drift_precision.ravel())
         self.C = C
         by_all = np.einsum("tmia,tmi->ma", weighted, r) - (at.rest - problem.described) / at.scatter**2
         restricted = np.diag([0.0] * 5 + [(_LINE_PRIOR * problem.strip.chord) ** -2.0] * 2)
         C[:_FRAME, :_FRAME] += restricted
         common = np.einsum("tm,tmia,tmi->a", weight, by_frame, r)
         common[5:] -= restricted[5:, 5:] @ (at.line - problem.strip.line)
-        self.c = np.concatenate([common, by_all.ravel(), -(problem.mean @ at.states[:, _ELASTIC])])
+        shared = slow.T @ pull[:, STATES:] - problem.drift_precision * at.drift
+        self.c = np.concatenate([common, by_all.ravel(), -(problem.mean @ at.states[:, _ELASTIC]), shared.ravel()])
 
     def _reduced(self, damping: float) -> tuple[Array, Array, Array]:
         grown = self.A + damping * np.einsum("tab,ab->tab", self.A, np.eye(_LOCAL))
@@ -264,7 +284,8 @@ class _Step:
             states=self.at.states + states[:, :STATES],
             jitter=self.at.jitter + states[:, STATES:],
             line=self.at.line + d[5:_FRAME],
-            rest=self.at.rest + d[_FRAME:-_MEANS].reshape(-1, 3),
+            rest=self.at.rest + d[_FRAME : self.free].reshape(-1, 3),
+            drift=self.at.drift + d[self.drifts].reshape(-1, _JITTER),
         )
         return replace(there, residuals=self.problem.residuals(there))
 
@@ -277,14 +298,18 @@ class _Step:
         alone = np.linalg.solve(grown, np.broadcast_to(first, (len(grown), _LOCAL))[..., None])[:, 0, 0]
         common = np.einsum("t,tg->g", self.problem.mean, solved[:, 0])
         variance = float((self.problem.mean**2) @ alone + common @ whole @ common)
-        return np.asarray(whole[:-_MEANS, :-_MEANS]), float(np.sqrt(max(variance, 0.0)))
+        return np.asarray(whole[: self.free, : self.free]), float(np.sqrt(max(variance, 0.0)))
 
 
-def states_of(strip: Strip, tracks: Array, at: Fit, shaking: PoseError, flap: Array) -> tuple[Array, Array]:
-    """Return states [T, STATES] and jitter [T, 5] of ``tracks`` [T, M, 3] (m) with the rest as in the fit ``at``.
+def states_of(
+    strip: Strip, tracks: Array, at: Fit, shaking: PoseError, slow: Array, flap: Array
+) -> tuple[Array, Array]:
+    """Return states [T, STATES] and motion of the body [T, 5] in ``tracks`` [T, M, 3] (m), else as in the fit ``at``.
 
-    ``flap`` [T]: where the flap angle begins, rad. The tracks are in the order of the fit's rest positions.
+    The motion is slow motion, with the polynomials ``slow`` [T, D], and jitter. ``flap`` [T]: where the flap angle
+    begins, rad. The tracks are in the order of the fit's rest positions.
     """
+    drift = slow @ at.drift
     local = np.zeros((len(tracks), _LOCAL))
     local[:, 0] = flap
     prior = _local_prior(at.memory, shaking.precision(at.turn, at.hinge))
@@ -292,10 +317,10 @@ def states_of(strip: Strip, tracks: Array, at: Fit, shaking: PoseError, flap: Ar
     measured = at.coordinates(np.nan_to_num(tracks))
     for _ in range(_STATE_STEPS):
         q, J, _, _ = positions(strip, at.rest, local[:, :STATES], at.line)
-        r = np.where(seen[..., None], measured - q - shaken(q, local[:, STATES:]), 0.0)
+        r = np.where(seen[..., None], measured - q - shaken(q, drift + local[:, STATES:]), 0.0)
         J = np.concatenate([J, by_pose(q)], axis=-1)
         weight = seen / (at.memory * at.noise**2 * (1 + (r**2).sum(-1) / (_CAUCHY * at.noise) ** 2))
         A = np.einsum("tm,tmia,tmib->tab", weight, J, J, optimize=True) + prior
         a = np.einsum("tm,tmia,tmi->ta", weight, J, r, optimize=True) - local @ prior
         local += np.linalg.solve(A, a[..., None])[..., 0]
-    return local[:, :STATES], local[:, STATES:]
+    return local[:, :STATES], drift + local[:, STATES:]

@@ -1,4 +1,4 @@
-"""Errors of the body's pose in each frame, and the motion of the wing's hinge that they seem to be."""
+"""What is known of the frames of a fit: weights for means over the beat, slow motion and errors of the body."""
 
 from __future__ import annotations
 
@@ -45,3 +45,24 @@ class PoseError:
 
 STEADY = PoseError(np.zeros((3, 3)), 0.0, np.zeros(3))
 """Of a body that rests."""
+
+
+@dataclass(frozen=True, eq=False)
+class Frames:
+    """What is known of the T frames of a fit.
+
+    Attributes:
+        mean: [T] weights whose sum with a state is its mean over the beat.
+        slow: [T, D] polynomials over time, without a constant, of which the body's motion that is left is made.
+        shaking: errors of the body's pose, in every frame anew.
+    """
+
+    mean: Array
+    slow: Array
+    shaking: PoseError
+
+
+def polynomials(times: Array, order: int) -> Array:
+    """Return the Legendre polynomials of order 1 to ``order`` [T, order] over ``times`` [T], s."""
+    s = 2 * (times - times[0]) / (times[-1] - times[0]) - 1
+    return np.asarray(np.polynomial.legendre.legvander(s, order)[:, 1:])

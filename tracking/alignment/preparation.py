@@ -11,13 +11,14 @@ from wingfit.records.errors import fail
 from wingfit.records.wing import Wing
 from wingfit.tracking.alignment.body_motion import by_markers, without_slow_motion
 from wingfit.tracking.alignment.flapping import MOST_FRAMES, Flapping, flapping_of, strongest
-from wingfit.tracking.alignment.pose_error import STEADY, PoseError
+from wingfit.tracking.alignment.pose_error import STEADY, Frames, PoseError, polynomials
 from wingfit.tracking.alignment.request import LEAST_TRACKS, Known, Tracks
 from wingfit.tracking.alignment.rigid_motion import RigidMotion, distance_changes, rigid_motion
 
 _LEAST_AMPLITUDE = np.radians(4.0)
 _SIZES = (0.6, 1.7)  # ratio of the tracks' extent to that of the described markers
 _FLAT = 0.02  # least spread of the tracks across the line along which they spread most
+_LEFT = 1  # higher orders than those removed of which slow motion may be left
 _MOST_CHANGE = 0.01  # of the distances between tracks, spans; wings of benchmarks.alignment have up to 0.0017
 
 
@@ -32,6 +33,7 @@ class Prepared:
         angle: [T] turn of the wing in all frames, rad; NaN where too few tracks are seen.
         flapping: in ``frames``.
         shaking: errors of the body's pose.
+        slow: [T, D] polynomials of which slow motion may be left; D = 0 where there is none.
         remarks: what was done.
     """
 
@@ -41,7 +43,17 @@ class Prepared:
     angle: Array
     flapping: Flapping
     shaking: PoseError
+    slow: Array
     remarks: list[str]
+
+    @property
+    def of_frames(self) -> Frames:
+        """What is known of ``frames``."""
+        return Frames(self.flapping.mean, self.slow[self.frames], self.shaking)
+
+    def flapping_by(self, angle: Array, frequency: float) -> Flapping:
+        """Return the flapping by the flap ``angle`` [F] (rad) in ``frames``, with a period near ``frequency`` (Hz)."""
+        return flapping_of(self.tracks.times[self.frames], angle, trend=self.slow.shape[1], known=frequency)
 
     def flap_angles(self, some: Array) -> Array:
         """Return approximate flap angles [T] of all frames by ``some`` [F] of the estimate's frames, rad."""
@@ -62,7 +74,7 @@ def described_of(wing: Wing) -> Array:
 
 def prepared(tracks: Tracks, wing: Wing, known: Known) -> Prepared:
     """Return ``tracks`` prepared for the search; DatasetError if they cannot be those of ``wing``."""
-    remarks, shaking = list[str](), STEADY
+    remarks, shaking, order = list[str](), STEADY, 0
     if known.body:
         body = by_markers(tracks, known.body)
         tracks = tracks.only(np.array([name not in known.body for name in tracks.names]))
@@ -78,7 +90,7 @@ def prepared(tracks: Tracks, wing: Wing, known: Known) -> Prepared:
     _check_distances(tracks, wing, frames)
     if not known.body:
         # All frames are corrected, so that the estimate from some of them holds for all.
-        corrected, words = without_slow_motion(tracks.times, tracks.positions, frames)
+        corrected, words, order = without_slow_motion(tracks.times, tracks.positions, frames)
         tracks, remarks = Tracks(tracks.file, tracks.times, tracks.names, corrected), remarks + words
     motion = rigid_motion(tracks.positions[frames])
     _check_size(tracks, wing, motion)
@@ -90,8 +102,9 @@ def prepared(tracks: Tracks, wing: Wing, known: Known) -> Prepared:
         )
         raise fail(tracks.file, None, f"too little motion: {few} needed to see its hinge; align a recording that flaps")
     frequency = strongest(tracks.times, angle) if len(usable) > MOST_FRAMES else None
-    flapping = flapping_of(tracks.times[frames], motion.angle, known=frequency)
-    return Prepared(tracks, frames, motion, angle, flapping, shaking, remarks)
+    slow = polynomials(tracks.times, order + _LEFT if order else 0)
+    flapping = flapping_of(tracks.times[frames], motion.angle, trend=slow.shape[1], known=frequency)
+    return Prepared(tracks, frames, motion, angle, flapping, shaking, slow, remarks)
 
 
 def _spread(usable: Index) -> Index:

@@ -13,7 +13,7 @@ from wingfit.records.wing import Wing
 from wingfit.tracking.alignment.arrangements import DISTINCT, LEAST_MARKERS, Arrangement, Search, ranked
 from wingfit.tracking.alignment.candidates import gate_of, layout_of, with_all
 from wingfit.tracking.alignment.fit import Fit, fit, shaken, states_of
-from wingfit.tracking.alignment.flapping import Flapping, drive_series, flapping_of, half_range
+from wingfit.tracking.alignment.flapping import Flapping, drive_series, half_range
 from wingfit.tracking.alignment.identity import exchanges, frame_by_frame, gathered
 from wingfit.tracking.alignment.preparation import Prepared, described_of, prepared
 from wingfit.tracking.alignment.report import Frame, aligned
@@ -66,9 +66,8 @@ def _arranged(
     found: Prepared, wing: Wing, strip: Strip, described: Array, known: Known, report: Callable[[float], object]
 ) -> tuple[Arrangement, float | None]:
     tracks, motion = found.tracks, found.motion
-    search = Search(
-        strip, described, tracks.positions[found.frames], motion, layout_of(motion), found.flapping.mean, found.shaking
-    )
+    points = tracks.positions[found.frames]
+    search = Search(strip, described, points, motion, layout_of(motion), found.of_frames)
     named, stated = _given(found, wing, known)
     up, every, excluded = known.up_vector(), list[Arrangement](), list[Arrangement]()
     tried = search.candidates(named)
@@ -189,19 +188,20 @@ def _finished(
     shown = np.full((len(points), len(described)), -1)
     for start in range(0, len(points), _CHUNK):
         part = slice(start, start + _CHUNK)
-        states, jitter = states_of(strip, points[part][:, best.marker >= 0], best.fit, found.shaking, flap[part])
+        mine, slow = points[part][:, best.marker >= 0], found.slow[part]
+        states, moved = states_of(strip, mine, best.fit, found.shaking, slow, flap[part])
         model = positions(strip, rest, states, best.fit.line)[0]
-        model += shaken(model, jitter)
+        model += shaken(model, moved)
         shown[part] = frame_by_frame(best.fit.coordinates(points[part]), model, marker, best.fit.noise, gate)
     shown[:, (shown >= 0).sum(axis=0) < _LEAST_SAMPLES] = -1
     used = np.flatnonzero((shown >= 0).any(axis=0))
     mine = gathered(tracks.positions, shown[:, used])
     initial = with_all(best.fit, rest[used])
-    final = fit(strip, described[used], mine[found.frames], found.flapping.mean, found.shaking, initial)
+    final = fit(strip, described[used], mine[found.frames], found.of_frames, initial)
     _check_fit(tracks.file, final, strip)
-    if known.body:
+    if known.body or found.slow.size:
         mine = _steadied(mine, strip, final, found)
-    flapping = flapping_of(tracks.times[found.frames], final.states[:, 0], known=found.flapping.frequency)
+    flapping = found.flapping_by(final.states[:, 0], found.flapping.frequency)
     zero = _zero(tracks.file, wing, flapping, known)
     names = tuple(one.name for one in wing.markers)
     changed = exchanges(shown, best.marker, tracks.times, tracks.names, names)
@@ -220,9 +220,9 @@ def _steadied(mine: Array, strip: Strip, final: Fit, found: Prepared) -> Array:
     result = mine.copy()
     for start in range(0, len(mine), _CHUNK):
         part = slice(start, start + _CHUNK)
-        states, jitter = states_of(strip, mine[part], final, found.shaking, flap[part])
+        states, moved = states_of(strip, mine[part], final, found.shaking, found.slow[part], flap[part])
         model = positions(strip, final.rest, states, final.line)[0]
-        result[part] -= shaken(model, jitter) @ final.turn
+        result[part] -= shaken(model, moved) @ final.turn
     return result
 
 

@@ -26,7 +26,7 @@ class RigidMotion:
         misfit: [K] root mean square distance from the rigid body of each track, m.
         weight: [K] from 0 (does not move with the body) to 1.
         axis: [3] unit vector that turns least, in the axes of ``shape``.
-        pivot: [3] point of ``shape`` that moves least, m.
+        pivot: [3] point of ``shape`` that moves least, m; of the line of such points, the one nearest to the tracks.
         angle: [T] turn about the axis, rad, from the mean.
         steadiness: RMS motion of the pivot, m.
     """
@@ -80,6 +80,8 @@ def rigid_motion(tracks: Array) -> RigidMotion:
     axis, pivot, angle, steadiness = _hinge(R[fitted], p[fitted])
     every = np.full(len(R), np.nan)
     every[fitted] = angle
+    # A point far along the axis would be moved by each error of the axis.
+    pivot = pivot + axis * (axis @ (_middle(shape, track_weight) - pivot))
     return RigidMotion(shape, R, p, misfit, track_weight, axis, pivot, every, steadiness)
 
 
@@ -126,6 +128,12 @@ def distance_changes(tracks: Array) -> Array:
             away[:, k] = np.nan
             found[:, k] = np.nanmedian(np.abs(away - np.nanmedian(away, axis=0)), axis=1)
     return found
+
+
+def _middle(shape: Array, weight: Array) -> Array:
+    """Mean [3] of the known points of ``shape`` [K, 3] (m) with the ``weight`` [K] of tracks."""
+    known = np.isfinite(shape[:, 0])
+    return np.asarray(weight[known] @ shape[known] / max(float(weight[known].sum()), 1e-12))
 
 
 def _sizes(away: Array) -> tuple[Array, Array]:
