@@ -18,13 +18,13 @@ from fastapi import FastAPI
 
 from tests.service import toy, toy_diagnosis
 from tests.service.pages.browsing import chromium
+from wingfit.client.private_files import make_file
 from wingfit.service.app import create_app
 from wingfit.service.auth import keys
 from wingfit.service.container import Service
 from wingfit.service.http.header_limits import Protocol
 from wingfit.service.settings import Settings
 from wingfit.service.storage.database import FILE_NAME, Database, make_folder
-from wingfit.client.private_files import make_file
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
