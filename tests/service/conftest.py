@@ -161,7 +161,12 @@ def prepare(folder: Path) -> None:
 def toy_service(folder: Path, **settings: Any) -> Iterator[tuple[Service, Api]]:
     """A service that computes toys, and its API."""
     prepare(folder)
-    app = create_app(Settings(data=folder, **settings), engine=toy.ToyEngine(), make_evaluator=toy.NoEvaluator)
+    app = create_app(
+        Settings(data=folder, **settings),
+        engine=toy.ToyEngine(),
+        make_evaluator=toy.NoEvaluator,
+        diagnoser=toy_diagnosis.ToyDiagnoser(),
+    )
     with serving(app) as client:
         yield app.state.service, Api(client)
 
