@@ -118,7 +118,7 @@ def test_what_cannot_be_meant_is_refused_with_place_and_remedy(
     shared: tuple[Api, str], body: Json, where: str, message: str
 ) -> None:
     api, dataset = shared
-    named = {} if {"dataset_id", "run_id"} & set(body) or not body else {"dataset_id": dataset}
+    named: Json = {} if {"dataset_id", "run_id"} & set(body) or not body else {"dataset_id": dataset}
     found = error(api, **named, **body)["errors"][0]
     assert found["where"] == where
     assert message in found["message"]
