@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import functools
 import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import httpx
@@ -16,12 +18,13 @@ from fastapi import FastAPI
 
 from tests.service import toy, toy_diagnosis
 from tests.service.pages.browsing import chromium
+from wingfit.client.private_files import make_file
 from wingfit.service.app import create_app
 from wingfit.service.auth import keys
 from wingfit.service.container import Service
 from wingfit.service.http.header_limits import Protocol
 from wingfit.service.settings import Settings
-from wingfit.service.storage.database import Database
+from wingfit.service.storage.database import FILE_NAME, Database, make_folder
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
@@ -135,10 +138,35 @@ def serving(app: FastAPI) -> Iterator[httpx.Client]:
         assert not thread.is_alive(), "the server does not stop"
 
 
+@functools.cache
+def _migrated() -> bytes:
+    """A database that all migrations have made."""
+    with TemporaryDirectory() as folder:
+        Database(Path(folder)).close()
+        return Path(folder, FILE_NAME).read_bytes()
+
+
+def prepare(folder: Path) -> None:
+    """Make a new data ``folder`` with a migrated database, since migrating is most of what starting costs.
+
+    Folders that exist are left alone. Migrations have tests of their own (storage/test_database.py).
+    """
+    if not folder.exists():
+        make_folder(folder)
+        make_file(folder / FILE_NAME)
+        (folder / FILE_NAME).write_bytes(_migrated())
+
+
 @contextmanager
 def toy_service(folder: Path, **settings: Any) -> Iterator[tuple[Service, Api]]:
     """A service that computes toys, and its API."""
-    app = create_app(Settings(data=folder, **settings), engine=toy.ToyEngine(), make_evaluator=toy.NoEvaluator)
+    prepare(folder)
+    app = create_app(
+        Settings(data=folder, **settings),
+        engine=toy.ToyEngine(),
+        make_evaluator=toy.NoEvaluator,
+        diagnoser=toy_diagnosis.ToyDiagnoser(),
+    )
     with serving(app) as client:
         yield app.state.service, Api(client)
 
@@ -175,6 +203,7 @@ def diagnoser(request: pytest.FixtureRequest) -> toy_diagnosis.ToyDiagnoser:
 
 def made(folder: Path, name: str, *scopes: str, owner: str = "") -> str:
     """The secret of a new key."""
+    prepare(folder)
     database = Database(folder)
     with database.write() as session:
         _, secret = keys.make(session, name, owner or name, scopes)  # type: ignore[arg-type]
@@ -217,6 +246,7 @@ def client(
 ) -> Iterator[httpx.Client]:
     if settings.keys:
         request.getfixturevalue("secrets")  # before the server has the folder
+    prepare(settings.data)
     app = create_app(settings, engine=engine, make_evaluator=toy.NoEvaluator, diagnoser=diagnoser)
     with serving(app) as client:
         yield client
@@ -225,3 +255,10 @@ def client(
 @pytest.fixture
 def api(client: httpx.Client) -> Api:
     return Api(client)
+
+
+@pytest.fixture(scope="module")
+def shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Api, str]]:
+    """One service for the requests of a module that change nothing, and the id of the dataset in it."""
+    with toy_service(tmp_path_factory.mktemp("shared") / "data") as (_, api):
+        yield api, str(api.upload()["id"])

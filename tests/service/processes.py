@@ -74,19 +74,25 @@ def free_port() -> int:
 
 
 class ServerProcess:
-    """``python -m MODULE ARGUMENTS``, started on entering, stopped on leaving; ``kill`` is kill -9."""
+    """``python -m MODULE ARGUMENTS``, started on entering, stopped on leaving; ``kill`` is kill -9.
 
-    def __init__(self, data: Path, module: Sequence[str], env: Mapping[str, str] | None = None) -> None:
+    A ``forked`` one has imported already; by default all are but those that users start.
+    """
+
+    def __init__(
+        self, data: Path, module: Sequence[str], env: Mapping[str, str] | None = None, *, forked: bool | None = None
+    ) -> None:
         self.port = free_port()
         self._log = data.parent / f"server-{self.port}.log"
         self._module = module
+        self._forked = module[0].startswith("tests.") if forked is None else forked
         self._env = {**os.environ, "WINGFIT_DATA": str(data), "WINGFIT_PORT": str(self.port), **(env or {})}
         self.process: subprocess.Popen[bytes] | ForkedProcess
         self.client = httpx.Client(base_url=f"http://127.0.0.1:{self.port}", timeout=30.0)
         self.api = Api(self.client)
 
     def __enter__(self) -> Self:
-        if self._module[0].startswith("tests."):
+        if self._forked:
             self.process = ForkedProcess(self._module, self._env, self._log)
         else:
             with self._log.open("wb") as log:

@@ -28,7 +28,7 @@ __all__ = ["wingfit"]
 @pytest.fixture(scope="module")
 def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ServerProcess]:
     data = tmp_path_factory.mktemp("cli") / "data"
-    with ServerProcess(data, ("wingfit.service.server",), {"WINGFIT_EVALUATOR": "in_process"}) as process:
+    with ServerProcess(data, ("wingfit.service.server",), {"WINGFIT_EVALUATOR": "in_process"}, forked=True) as process:
         yield process
 
 

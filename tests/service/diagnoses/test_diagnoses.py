@@ -114,8 +114,11 @@ def test_a_run_without_a_genome_is_a_conflict(api: Api, gate: Gate) -> None:
         ({"population": 3}, "body.population", "not permitted"),
     ],
 )
-def test_what_cannot_be_meant_is_refused_with_place_and_remedy(api: Api, body: Json, where: str, message: str) -> None:
-    named = {} if {"dataset_id", "run_id"} & set(body) or not body else {"dataset_id": api.upload()["id"]}
+def test_what_cannot_be_meant_is_refused_with_place_and_remedy(
+    shared: tuple[Api, str], body: Json, where: str, message: str
+) -> None:
+    api, dataset = shared
+    named: Json = {} if {"dataset_id", "run_id"} & set(body) or not body else {"dataset_id": dataset}
     found = error(api, **named, **body)["errors"][0]
     assert found["where"] == where
     assert message in found["message"]

@@ -6,7 +6,6 @@ import re
 from pathlib import Path
 from typing import Any, get_args
 
-import httpx
 import pytest
 from pydantic import BaseModel, TypeAdapter
 
@@ -28,9 +27,9 @@ DOCS = Path(__file__).parents[3] / "docs" / "api.md"
 Specification = dict[str, Any]
 
 
-@pytest.fixture
-def specification(client: httpx.Client) -> Specification:
-    answer = client.get("/openapi.json")
+@pytest.fixture(scope="module")
+def specification(shared: tuple[Api, str]) -> Specification:
+    answer = shared[0].client.get("/openapi.json")
     assert answer.status_code == 200
     return dict(answer.json())
 
@@ -118,7 +117,10 @@ def test_events_are_as_described(api: Api, specification: Specification) -> None
 
 
 @pytest.mark.parametrize("filename", ["a.zip", "a.nc", "a", "a.tar"])
-def test_an_archive_comes_back_as_described(api: Api, specification: Specification, filename: str) -> None:
+def test_an_archive_comes_back_as_described(
+    shared: tuple[Api, str], specification: Specification, filename: str
+) -> None:
+    api, _ = shared
     dataset = api.client.post("/v1/datasets", files={"file": (filename, toy.archive())}).json()["id"]
     described = specification["paths"]["/v1/datasets/{dataset_id}/archive"]["get"]["responses"]["200"]["content"]
     assert api.client.get(f"/v1/datasets/{dataset}/archive").headers["Content-Type"] in described
@@ -179,16 +181,16 @@ def test_settings_in_answers_are_described_as_in_requests(specification: Specifi
             assert schemas[answer]["properties"][name]["description"] == described[name]
 
 
-def test_the_documentation_page_needs_no_other_origin(client: httpx.Client, specification: Specification) -> None:
-    page = client.get("/docs")
+def test_the_documentation_page_needs_no_other_origin(shared: tuple[Api, str], specification: Specification) -> None:
+    page = shared[0].client.get("/docs")
     assert page.status_code == 200
     assert not re.findall(r"""(?:src|href)=["'](?:https?:)?//""", page.text)
     for method, path, _ in operations(specification):
         assert f"{method} {path}" in page.text
 
 
-def test_the_schema_of_datasets_is_published(client: httpx.Client) -> None:
-    schema = client.get("/v1/schemas/dataset").json()
+def test_the_schema_of_datasets_is_published(shared: tuple[Api, str]) -> None:
+    schema = shared[0].client.get("/v1/schemas/dataset").json()
     assert schema["$schema"].startswith("https://json-schema.org/")
     kinds = [schema["$defs"][part["$ref"].rpartition("/")[2]]["properties"] for part in schema["anyOf"]]
     assert ["wing" in kinds[0], "vehicle" in kinds[1]] == [True, True]

@@ -50,8 +50,10 @@ from wingfit.service.runs import views
         ({"recordings": ["unseen"]}, "body"),
     ],
 )
-def test_a_specification_that_does_not_fit_is_refused(api: Api, body: dict[str, Any], where: str) -> None:
-    dataset = api.upload()["id"]
+def test_a_specification_that_does_not_fit_is_refused(
+    shared: tuple[Api, str], body: dict[str, Any], where: str
+) -> None:
+    api, dataset = shared
     answer = api.client.post("/v1/runs", json={"dataset_id": dataset} | body)
     assert answer.status_code == 422, answer.text
     assert [error["where"] for error in answer.json()["errors"]] == [where]
@@ -80,7 +82,10 @@ def test_a_specification_is_checked_without_a_run(api: Api) -> None:
 
 @pytest.mark.parametrize("division", ["eleven", "128x1", "4 ", "", "4\n", ",".join(["1"] * 65), "1," * 150 + "1"])
 @pytest.mark.parametrize("route", ["runs", "simulations", "loads"])
-def test_an_invalid_discretisation_is_refused_with_an_example(api: Api, route: str, division: str) -> None:
+def test_an_invalid_discretisation_is_refused_with_an_example(
+    shared: tuple[Api, str], route: str, division: str
+) -> None:
+    api, _ = shared
     answer = api.client.post(f"/v1/{route}", json={"dataset_id": "x", "recording": "slow", "division": division})
     (said,) = [error["message"] for error in answer.json()["errors"] if error["where"] == "body.division"]
     assert "preset 4, 11, 24; strips x bodies of each: 6x4" in said
@@ -103,7 +108,8 @@ def test_known_names_are_listed_once(api: Api) -> None:
 
 
 @pytest.mark.parametrize("text", ["", "{", "[]", '{"dataset_id": "\\ud800"}', '{"dataset_id": "x", "tolerance": NaN}'])
-def test_a_body_that_is_no_json_object_is_a_problem(api: Api, text: str) -> None:
+def test_a_body_that_is_no_json_object_is_a_problem(shared: tuple[Api, str], text: str) -> None:
+    api, _ = shared
     answer = api.client.post("/v1/runs", content=text, headers={"Content-Type": "application/json"})
     assert (answer.status_code, answer.headers["Content-Type"]) == (422, "application/problem+json")
     assert answer.json()["errors"]
@@ -146,8 +152,11 @@ def test_a_long_recording_is_thinned_out(api: Api, monkeypatch: pytest.MonkeyPat
         ({"genome": {"stiffness": 9.5}}, 409, None),
     ],
 )
-def test_an_invalid_simulation_is_refused(api: Api, body: dict[str, Any], status: int, where: str | None) -> None:
-    complete = {"dataset_id": api.upload()["id"], "recording": "slow"} | body
+def test_an_invalid_simulation_is_refused(
+    shared: tuple[Api, str], body: dict[str, Any], status: int, where: str | None
+) -> None:
+    api, dataset = shared
+    complete = {"dataset_id": dataset, "recording": "slow"} | body
     answer = api.client.post("/v1/simulations", json=complete)
     assert answer.status_code == status, answer.text
     assert ([e["where"] for e in answer.json().get("errors", ())] or [None]) == [where]

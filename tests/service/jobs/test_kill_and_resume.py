@@ -26,7 +26,7 @@ def server(data: Path, evaluator: str) -> ServerProcess:
     env = {"WINGFIT_EVALUATOR": evaluator}
     if evaluator == "processes":
         env["WINGFIT_WORKERS"] = "2"
-    return ServerProcess(data, ("wingfit.service.server",), env)
+    return ServerProcess(data, ("wingfit.service.server",), env, forked=True)
 
 
 @pytest.fixture(scope="module")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Mapping
 from dataclasses import replace
@@ -12,7 +11,7 @@ import pytest
 
 import wingfit
 from tests.service.conftest import Json
-from tests.service.rigs import decay_rig
+from tests.service.rigs import deadly_rig, decay_rig
 from tests.service.rigs.test_drive import client_of, service, upload
 from wingfit._drive import BROKEN, _Computing, _Simulator
 from wingfit.client.drive_answers import Simulation
@@ -20,21 +19,9 @@ from wingfit.records.array_types import Array
 from wingfit.rigs.declaration import declaration
 from wingfit.rigs.run import Run
 
-DEADLY = 2.5  # 1/s: rate above which the simulation ends its process
-
-
-def simulate(genes: Mapping[str, float], run: Run) -> dict[str, Array]:
-    if genes["rate"] > DEADLY:
-        os._exit(3)
-    time.sleep(0.3)  # so that the others are under way when it ends
-    return decay_rig.simulate(genes, run)
-
 
 def misspelt(genes: Mapping[str, float], run: Run) -> dict[str, Array]:
     return {"charge": run.times * genes["rat"]}
-
-
-RIG = replace(decay_rig.rig, simulate=simulate)
 
 
 def simulation(name: str, rate: float) -> Simulation:
@@ -52,7 +39,7 @@ def test_only_the_simulation_that_ends_its_process_fails() -> None:
     simulations = [simulation(f"good {k}", 0.5 + 0.1 * k) for k in range(6)]
     simulations.insert(1, simulation("deadly", 3.0))
     results, deadline = dict[str, Json](), time.monotonic() + 180.0
-    with _Computing(_Simulator(RIG, decay_rig.dataset()), 3) as computing:
+    with _Computing(_Simulator(deadly_rig.rig, decay_rig.dataset()), 3) as computing:
         computing.add(simulations)
         while computing.holding:
             assert time.monotonic() < deadline

@@ -37,8 +37,8 @@ Json = dict[str, Any]
 ROUTES = ("/v1/runs", "/v1/simulations", "/v1/loads")
 
 
-def ask(api: Api, route: str, **body: Any) -> httpx.Response:
-    about = {"dataset_id": api.upload()["id"]} | ({} if route == "/v1/runs" else {"recording": "slow"})
+def ask(api: Api, dataset: str, route: str, **body: Any) -> httpx.Response:
+    about = {"dataset_id": dataset} | ({} if route == "/v1/runs" else {"recording": "slow"})
     return api.client.post(route, json=about | body)
 
 
@@ -47,8 +47,10 @@ def ask(api: Api, route: str, **body: Any) -> httpx.Response:
     ("value", "said"),
     [(0.0199, "at least 0.02 mm: below, corners"), (0.0, "at least"), (-0.1, "at least"), (1.001, "at most 1.0 mm")],
 )
-def test_an_accuracy_out_of_reach_is_refused_and_says_why(api: Api, route: str, value: float, said: str) -> None:
-    answer = ask(api, route, accuracy_mm=value)
+def test_an_accuracy_out_of_reach_is_refused_and_says_why(
+    shared: tuple[Api, str], route: str, value: float, said: str
+) -> None:
+    answer = ask(*shared, route, accuracy_mm=value)
     assert answer.status_code == 422
     (error,) = answer.json()["errors"]
     assert (error["where"], error["value"]) == ("body.accuracy_mm", value)
@@ -58,7 +60,7 @@ def test_an_accuracy_out_of_reach_is_refused_and_says_why(api: Api, route: str, 
 @pytest.mark.parametrize("route", ROUTES)
 @pytest.mark.parametrize("value", [FINEST_MM, 0.07, COARSEST_MM])
 def test_an_accuracy_within_the_limits_is_taken(api: Api, route: str, value: float) -> None:
-    assert ask(api, route, accuracy_mm=value).is_success
+    assert ask(api, api.upload()["id"], route, accuracy_mm=value).is_success
 
 
 def test_the_limits_are_published(client: httpx.Client) -> None:
@@ -101,12 +103,12 @@ def test_the_engine_is_given_metres(
 
     for name in ("compare", "loads"):
         monkeypatch.setattr(engine, name, noted(getattr(engine, name)))
-    assert ask(api, route, accuracy_mm=0.5, outputs=True).is_success
+    assert ask(api, api.upload()["id"], route, accuracy_mm=0.5, outputs=True).is_success
     assert given == [5e-4] * (2 if route == "/v1/simulations" else 1)
 
 
-def test_a_simulation_says_how_it_was_solved(api: Api) -> None:
-    answer = ask(api, "/v1/simulations", accuracy_mm=0.5).json()["numerics"]
+def test_a_simulation_says_how_it_was_solved(shared: tuple[Api, str]) -> None:
+    answer = ask(*shared, "/v1/simulations", accuracy_mm=0.5).json()["numerics"]
     assert answer == {"accuracy_mm": 0.5, "estimated_error_mm": 0.1, "steps_per_beat": 144, "beats": 7}
     assert set(answer) == fields(NumericsAnswer)
 
@@ -227,6 +229,6 @@ def test_what_the_simulator_gives_as_reason_has_a_remedy(dataset: Dataset) -> No
 def test_a_simulation_that_failed_comes_with_its_remedy(api: Api) -> None:
     """The toy diverges beyond a stiffness of 9."""
     for route in ("/v1/simulations", "/v1/loads"):
-        answer = ask(api, route, genome={"stiffness": 9.5})
+        answer = ask(api, api.upload()["id"], route, genome={"stiffness": 9.5})
         assert answer.status_code == 409
         assert answer.json()["detail"] == f"the simulation failed: the simulation diverged at 0.1 s. Remedy: {FLUTTER}"

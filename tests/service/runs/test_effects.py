@@ -27,7 +27,8 @@ from wingfit.sim.wing.flexible_wing import FlexibleWing
 Json = dict[str, Any]
 
 
-def test_the_list_is_the_registry(api: Api) -> None:
+def test_the_list_is_the_registry(shared: tuple[Api, str]) -> None:
+    api, _ = shared
     found = valid(Effects, api.get("/v1/effects")).effects
     assert [one.name for one in found] == list(EFFECTS)
     for one in found:
@@ -41,7 +42,8 @@ def test_the_list_is_the_registry(api: Api) -> None:
         assert one.signature
 
 
-def test_bounds_that_scale_with_the_rig_are_parts_of_it(api: Api) -> None:
+def test_bounds_that_scale_with_the_rig_are_parts_of_it(shared: tuple[Api, str]) -> None:
+    api, _ = shared
     shift = api.get("/v1/effects/camera_shift")
     assert shift in api.get("/v1/effects")["effects"]
     assert shift["applies_to"] == ["wing"]
@@ -52,7 +54,8 @@ def test_bounds_that_scale_with_the_rig_are_parts_of_it(api: Api) -> None:
     assert first["upper"] != gene.upper
 
 
-def test_an_unknown_effect_is_not_found_and_the_known_ones_named(api: Api) -> None:
+def test_an_unknown_effect_is_not_found_and_the_known_ones_named(shared: tuple[Api, str]) -> None:
+    api, _ = shared
     answer = api.client.get("/v1/effects/added_moss")
     assert answer.status_code == 404
     assert answer.json()["detail"].startswith("there is no effect 'added_moss'; there are ")
@@ -70,8 +73,11 @@ def test_an_unknown_effect_is_not_found_and_the_known_ones_named(api: Api) -> No
         ([""], "body.effects.0", "at least 1 character"),
     ],
 )
-def test_effects_that_cannot_be_are_refused(api: Api, route: str, effects: Any, where: str, said: str) -> None:
-    body = {"dataset_id": api.upload()["id"], "effects": effects} | ({} if route == "runs" else {"recording": "slow"})
+def test_effects_that_cannot_be_are_refused(
+    shared: tuple[Api, str], route: str, effects: Any, where: str, said: str
+) -> None:
+    api, dataset = shared
+    body = {"dataset_id": dataset, "effects": effects} | ({} if route == "runs" else {"recording": "slow"})
     answer = api.client.post(f"/v1/{route}", json=body)
     assert answer.status_code == 422, answer.text
     (error,) = answer.json()["errors"]
@@ -79,17 +85,19 @@ def test_effects_that_cannot_be_are_refused(api: Api, route: str, effects: Any, 
     assert said in error["message"]
 
 
-def test_a_gene_of_an_effect_that_is_not_included_says_so(api: Api) -> None:
-    answer = api.client.post("/v1/runs", json={"dataset_id": api.upload()["id"], "genes": ["camera_shift.x"]})
+def test_a_gene_of_an_effect_that_is_not_included_says_so(shared: tuple[Api, str]) -> None:
+    api, dataset = shared
+    answer = api.client.post("/v1/runs", json={"dataset_id": dataset, "genes": ["camera_shift.x"]})
     assert answer.status_code == 422
     (error,) = answer.json()["errors"]
     assert error["where"] == "body.genes.0"
     assert "effect 'camera_shift', which the request does not include; name it in 'effects'" in error["message"]
 
 
-def test_a_simulation_says_the_same_of_such_a_gene_and_lists_the_known_ones_once(api: Api) -> None:
+def test_a_simulation_says_the_same_of_such_a_gene_and_lists_the_known_ones_once(shared: tuple[Api, str]) -> None:
+    api, dataset = shared
     genome = {"stifness": 1.0, "camera_shift.x": 1e-3, "dampng": 1.0}
-    body = {"dataset_id": api.upload()["id"], "recording": "slow", "genome": genome}
+    body = {"dataset_id": dataset, "recording": "slow", "genome": genome}
     answer = api.client.post("/v1/simulations", json=body)
     assert answer.status_code == 422
     first, shift, last = answer.json()["errors"]

@@ -40,29 +40,30 @@ GROUPS = {
 }
 
 
-def simulate(api: Api, **body: Any) -> httpx.Response:
-    return api.client.post("/v1/simulations", json={"dataset_id": api.upload()["id"], "recording": "slow"} | body)
+def simulate(shared: tuple[Api, str], **body: Any) -> httpx.Response:
+    api, dataset = shared
+    return api.client.post("/v1/simulations", json={"dataset_id": dataset, "recording": "slow"} | body)
 
 
-def test_loads_come_only_when_asked_for(api: Api) -> None:
-    assert "outputs" not in simulate(api).json()
-    assert "outputs" not in simulate(api, outputs=False).json()
-    assert "outputs" not in simulate(api, outputs=[]).json()
-    whole = simulate(api, outputs=True).json()["outputs"]
+def test_loads_come_only_when_asked_for(shared: tuple[Api, str]) -> None:
+    assert "outputs" not in simulate(shared).json()
+    assert "outputs" not in simulate(shared, outputs=False).json()
+    assert "outputs" not in simulate(shared, outputs=[]).json()
+    whole = simulate(shared, outputs=True).json()["outputs"]
     assert set(whole) == {"phase", "drive_phase", "numerics"}.union(*GROUPS.values())
     assert whole["numerics"] == {"steps_per_beat": 96, "beats": 5, "estimated_error_mm": 0.02}
     valid(Outputs, whole)
 
 
 @pytest.mark.parametrize("name", OUTPUT_NAMES)
-def test_each_name_brings_its_own(api: Api, name: str) -> None:
-    found = simulate(api, outputs=[name, name]).json()["outputs"]
+def test_each_name_brings_its_own(shared: tuple[Api, str], name: str) -> None:
+    found = simulate(shared, outputs=[name, name]).json()["outputs"]
     assert set(found) == {"phase", "drive_phase", "numerics"} | GROUPS[name]
 
 
-def test_the_beat_begins_at_the_upstroke_crossing(api: Api) -> None:
+def test_the_beat_begins_at_the_upstroke_crossing(shared: tuple[Api, str]) -> None:
     """The toy's crossing is a quarter of the drive's beat: there its torque, a cosine of the drive, zero."""
-    outputs = simulate(api, outputs=["motors"], genome={"stiffness": 2.0}).json()["outputs"]
+    outputs = simulate(shared, outputs=["motors"], genome={"stiffness": 2.0}).json()["outputs"]
     assert outputs["phase"] == sorted(outputs["phase"])
     assert outputs["phase"][0] == 0
     assert outputs["drive_phase"][0] == 0.25
@@ -71,8 +72,8 @@ def test_the_beat_begins_at_the_upstroke_crossing(api: Api) -> None:
     assert outputs["motor_angle_deg"]["rear"] == pytest.approx(np.degrees(0.25 * np.array(torque)), abs=1e-4)
 
 
-def test_averages_and_units(api: Api) -> None:
-    answer = simulate(api, outputs=["averages", "strips", "connectors"], genome={"stiffness": 2.0}).json()["outputs"]
+def test_averages_and_units(shared: tuple[Api, str]) -> None:
+    answer = simulate(shared, outputs=["averages", "strips", "connectors"], genome={"stiffness": 2.0}).json()["outputs"]
     means = answer["averages"]
     assert means["lift_n"] == pytest.approx(2.0)
     assert means["thrust_n"] == pytest.approx(0.2)
@@ -88,8 +89,8 @@ def test_averages_and_units(api: Api) -> None:
 
 
 @pytest.mark.parametrize("outputs", ["motors", ["torque"], [1], 1, None, ["motors"] * 9])
-def test_unknown_outputs_are_refused_and_the_known_ones_named(api: Api, outputs: Any) -> None:
-    answer = simulate(api, outputs=outputs)
+def test_unknown_outputs_are_refused_and_the_known_ones_named(shared: tuple[Api, str], outputs: Any) -> None:
+    answer = simulate(shared, outputs=outputs)
     assert answer.status_code == 422
     (error,) = answer.json()["errors"]
     assert error["where"] == "body.outputs"
@@ -121,20 +122,21 @@ def test_before_the_first_generation_only_the_nominal_wing_has_loads(api: Api, g
     gate.let(1)
 
 
-def test_a_failed_simulation_is_a_conflict(api: Api) -> None:
-    answer = simulate(api, outputs=True, genome={"stiffness": 9.5})
+def test_a_failed_simulation_is_a_conflict(shared: tuple[Api, str]) -> None:
+    answer = simulate(shared, outputs=True, genome={"stiffness": 9.5})
     assert answer.status_code == 409
     assert "diverged" in answer.json()["detail"]
 
 
-def under(api: Api, **body: Any) -> httpx.Response:
-    return api.client.post("/v1/loads", json={"dataset_id": api.upload()["id"], "recording": "slow"} | body)
+def under(shared: tuple[Api, str], **body: Any) -> httpx.Response:
+    api, dataset = shared
+    return api.client.post("/v1/loads", json={"dataset_id": dataset, "recording": "slow"} | body)
 
 
-def test_loads_under_another_condition(api: Api) -> None:
+def test_loads_under_another_condition(shared: tuple[Api, str]) -> None:
     """The toy's torque grows with the flap frequency, which is 3 Hz in its recordings."""
-    answer = valid(Loads, under(api).json())
-    faster = valid(Loads, under(api, condition={"flap_frequency_hz": 6.0}, outputs=["averages"]).json())
+    answer = valid(Loads, under(shared).json())
+    faster = valid(Loads, under(shared, condition={"flap_frequency_hz": 6.0}, outputs=["averages"]).json())
     assert answer.outputs.averages is not None
     assert faster.outputs.averages is not None
     assert "connectors" not in faster.outputs
@@ -161,8 +163,8 @@ def test_a_changed_condition_is_the_recorded_one_in_all_that_is_not_named() -> N
         ({"outputs": ["nope"]}, "body.outputs"),
     ],
 )
-def test_loads_that_cannot_be(api: Api, body: Json, where: str) -> None:
-    answer = under(api, **body)
+def test_loads_that_cannot_be(shared: tuple[Api, str], body: Json, where: str) -> None:
+    answer = under(shared, **body)
     assert answer.status_code == 422
     assert answer.json()["errors"][0]["where"].startswith(where)
 

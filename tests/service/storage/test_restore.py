@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import sqlite3
 from contextlib import closing
 from pathlib import Path
@@ -36,10 +37,10 @@ def edit_schema(path: Path, *statements: str) -> None:
     edit(path, "PRAGMA writable_schema=ON", *statements)
 
 
-@pytest.fixture
-def copy(tmp_path: Path) -> Path:
+@pytest.fixture(scope="module")
+def original(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A backup with data of two owners, and the keys of both."""
-    folder = tmp_path / "source"
+    folder = tmp_path_factory.mktemp("original") / "source"
     admin = made(folder, "root", "admin")
     made(folder, "ann", "read", "write")
     database = Database(folder)
@@ -52,7 +53,13 @@ def copy(tmp_path: Path) -> Path:
         api.client.headers["Authorization"] = f"Bearer {admin}"
         run = api.submit(api.upload()["id"])["id"]
         api.finish(run)
-        return snapshot(folder).rename(tmp_path / "copy.sqlite3")
+        return snapshot(folder)
+
+
+@pytest.fixture
+def copy(original: Path, tmp_path: Path) -> Path:
+    """The backup as a file of its own, which a test may spoil."""
+    return Path(shutil.copy2(original, tmp_path / "copy.sqlite3"))
 
 
 def good_keys(folder: Path) -> list[str]:
