@@ -7,7 +7,8 @@ import numpy as np
 from wingfit.records.array_types import Array, Float
 
 HARMONICS = 2
-LEAST_BEATS = 1.5  # in a recording, of the lowest frequency that is tried
+LEAST_BEATS = 1.5  # in a recording, of a frequency that is found; lower ones are tried, which may explain it better
+TRIED_BEATS = 1.0
 LEAST_EXPLAINED = 0.8  # of the variance, by the harmonics of the frequency; with less, no frequency is clear
 PARTS = (
     (0.0, 1.0),
@@ -82,7 +83,7 @@ def _of_part(since: Array, values: Array) -> float | None:
         return None
     since = since - since[0]
     values = _without_drift(since, values)
-    lowest = LEAST_BEATS / since[-1]
+    lowest = TRIED_BEATS / since[-1]
     highest = 0.25 / float(np.median(np.diff(since)))
     if highest <= lowest:
         return None
@@ -97,6 +98,8 @@ def _of_part(since: Array, values: Array) -> float | None:
     step = tried[1] - tried[0]
     near = np.linspace(max(lowest, tried[best] - step), tried[best] + step, 41)
     found = float(near[int(np.argmax([_explained(since, values, one) for one in near]))])
+    if found * since[-1] < LEAST_BEATS:
+        return None
     first = _explained(since, values, found, 1) - _explained(since, values, found, 0)
     return found if first >= LEAST_FIRST * _explained(since, values, found) else None
 
