@@ -50,7 +50,8 @@ def flap_frequency(times: Float[Array, " T"], positions: Float[Array, "T M 3"]) 
 
 def _bridged(times: Array, column: Array) -> Array:
     seen = np.isfinite(column)
-    return np.interp(times, times[seen], column[seen])
+    bridged: Array = np.interp(times, times[seen], column[seen])
+    return bridged
 
 
 def _thinned(since: Array, values: Array) -> tuple[Array, Array]:
@@ -69,12 +70,14 @@ def _thinned(since: Array, values: Array) -> tuple[Array, Array]:
 
 def _means(rows: Array, step: int) -> Array:
     whole = len(rows) // step * step
-    return rows[:whole].reshape(-1, step, *rows.shape[1:]).mean(axis=1)
+    means: Array = rows[:whole].reshape(-1, step, *rows.shape[1:]).mean(axis=1)
+    return means
 
 
 def _without_drift(since: Array, values: Array) -> Array:
     drift = np.column_stack([np.ones_like(since), since])
-    return values - drift @ np.linalg.lstsq(drift, values, rcond=None)[0]
+    left: Array = values - drift @ np.linalg.lstsq(drift, values, rcond=None)[0]
+    return left
 
 
 def _of_part(since: Array, values: Array) -> float | None:
