@@ -8,15 +8,20 @@ from dataclasses import dataclass
 import numpy as np
 
 from wingfit.importers.options import question
+from wingfit.importers.start.hinge import Hinge, find_hinge
 from wingfit.importers.tracks import ImportedTracks
-from wingfit.records.array_types import Array, Float
-from wingfit.records.errors import DatasetError
+from wingfit.records.array_types import Array
+from wingfit.records.errors import DatasetError, fail
 
-_STEADY = 0.03  # radius of a marker about the hinge: standard deviation over mean, at most, for a hinge that is found
 _OTHER_SIDE = 0.25  # of the outermost distance: markers so far on the other side belong to another wing
 _MARGIN = 0.08  # of the span, by which the assumed planform is larger than the area of the markers
 _LEAST_CHORD = 0.15  # of the span
+_LEAST_FLAP = 0.2  # of the variance of the flap angle, by the frequency
+_MOST_DRIFT = 3.0  # of the peak-to-peak flapping of the middle of the markers; a wing that folds has up to 2
+_STILL = 1e-6  # rad: a flap angle that varies less is that of a wing at rest
 _THICKNESS = (0.04, 0.008)  # at root and tip, of the span
+_FIXED = 0.2  # of that flapping: with more drift, the circles are not about a fixed point
+_LEAST_ROWS = 8
 _THINNEST = 1e-5  # m
 _AREAL_DENSITY = 1.0  # kg/m^2
 
@@ -41,14 +46,25 @@ class FirstWing:
 def describe_wing(tracks: ImportedTracks, frequency: float, name: str) -> FirstWing:
     """Return the description of a rigid wing whose markers moved as ``tracks``, which are in the axes of the wing.
 
-    The flap angle is a cosine of ``frequency`` (Hz) about the mean pose, in which the markers rest. The hinge is the
-    common centre of the markers' circles in the y-z plane (least squares after Kasa 1976), if they are circles; else it
-    is assumed. The planform is assumed as the rectangle around the markers at rest.
+    The flap angle is a cosine of ``frequency`` (Hz) about the mean pose, in which the markers rest. The hinge is that
+    of :func:`find_hinge`. The planform is assumed as the rectangle around the markers at rest. DatasetError for markers
+    that do not flap at ``frequency``, that drift away with a body, or that are on a wing to which y points in.
     """
     places = tracks.positions
-    hinge, source = _hinge(places)
+    drift, flapping = _drift(tracks, frequency)
+    _refuse_drift(tracks, drift, flapping)
+    found = find_hinge(tracks, frequency, drifts=drift > _FIXED * flapping)
+    _refuse_other_side(tracks, found)
+    hinge, source = found.place, found.source
     arms = places[..., 1] - hinge[0] + 1j * (places[..., 2] - hinge[1])
     flap = _flap(tracks.times, arms, frequency)
+    if flap.explained < _LEAST_FLAP:
+        message = (
+            f"does not flap at {frequency:.4g} Hz, which explains {100 * flap.explained:.0f} % of the variance of the "
+            "flap angle; choose markers and a part of the recording that flap, or give another frequency: "
+            "--flap-frequency-hz 5"
+        )
+        raise DatasetError([question("flap_frequency_hz", tracks.file, frequency, message)])
     level = np.nanmean(arms * np.exp(-1j * flap.angle)[:, None], axis=0)
     rest = np.column_stack([np.nanmean(places[..., 0], axis=0), level.real + hinge[0], level.imag + hinge[1]])
     amplitude = float(np.degrees(flap.amplitude))
@@ -84,7 +100,7 @@ def describe_wing(tracks: ImportedTracks, frequency: float, name: str) -> FirstW
     size = f"{1e3 * (tip - root):.0f} mm x {1e3 * chord:.0f} mm, flat"
     facts = (
         Fact("rest positions", f"{len(rest)} markers, in their mean pose", "tracks"),
-        Fact("flap angle", f"{amplitude:.1f} deg to both sides of the mean", "tracks"),
+        Fact("flap angle", f"{amplitude:.1f} deg to both sides of the mean", found.angles),
         Fact("hinge", where, source),
         Fact("planform", size, "assumed: a rectangle around the markers"),
         Fact("mass", f"{_AREAL_DENSITY:g} kg/m^2", "assumed"),
@@ -106,35 +122,57 @@ def refuse_two_wings(tracks: ImportedTracks) -> None:
     raise DatasetError([question("markers", tracks.file, None, message)])
 
 
-def _hinge(places: Float[Array, "T M 3"]) -> tuple[Array, str]:
-    """Return y and z (m) of the hinge, and where they are from."""
-    count = places.shape[1]
-    rows, right = [], []
-    for m in range(count):
-        seen = places[:, m, 1:][np.isfinite(places[:, m]).all(axis=1)]
-        one = np.zeros((len(seen), count))
-        one[:, m] = 1.0
-        rows.append(np.column_stack([2 * seen, one]))
-        right.append((seen**2).sum(axis=1))
-    centre = np.linalg.lstsq(np.vstack(rows), np.concatenate(right), rcond=None)[0][:2]
-    radius = np.hypot(places[..., 1] - centre[0], places[..., 2] - centre[1])
-    middle = np.nanmedian(places[..., 1], axis=0)
-    inside = float(middle.min())
-    if centre[0] < inside and (np.nanstd(radius, axis=0) < _STEADY * np.nanmean(radius, axis=0)).all():
-        return np.round(centre, 6) + 0.0, "from the tracks: the markers move on circles about it"
-    if inside > 0:
-        return np.zeros(2), "assumed: the origin of the axes"
-    span = float(middle.max()) - inside
-    height = float(np.nanmedian(places[:, int(np.argmin(middle)), 2]))
-    return np.array([inside - 0.1 * span, height]), "assumed: beside the innermost marker"
+def _drift(tracks: ImportedTracks, frequency: float) -> tuple[float, float]:
+    """Return how far (m) the middle of the markers moves away, and its flapping from peak to peak (m)."""
+    middle, times = _middle(tracks)
+    if len(times) < _LEAST_ROWS:
+        return 0.0, 0.0
+    turn = 2 * np.pi * frequency * times
+    basis = np.column_stack([np.ones_like(times), times - times[0], np.cos(turn), np.sin(turn)])
+    found = np.linalg.lstsq(basis, middle, rcond=None)[0]
+    return float(np.linalg.norm(found[1]) * np.ptp(times)), 2 * float(np.sqrt((found[2:] ** 2).sum()))
+
+
+def _refuse_drift(tracks: ImportedTracks, drift: float, flapping: float) -> None:
+    """Raise DatasetError if a ``drift`` (m) is most of the motion, and more than the ``flapping`` (m)."""
+    if drift <= _MOST_DRIFT * flapping:
+        return
+    extent = float(np.ptp(_middle(tracks)[0], axis=0).max())
+    if drift <= 0.5 * extent:
+        return
+    message = (
+        f"has markers that move away by {drift:.3g} m while they flap by {flapping:.3g} m, as on a body that moves; a "
+        "wing is described in the axes of its body: subtract the positions of a marker at the root of the wing, or "
+        "import a part in which the body rests"
+    )
+    raise fail(tracks.file, f"{drift:.3g} m", message)
+
+
+def _middle(tracks: ImportedTracks) -> tuple[Array, Array]:
+    """Return the middle of the markers [N, 3] (m) and the times [N] (s), where all are seen."""
+    complete = np.isfinite(tracks.positions).all(axis=(1, 2))
+    return tracks.positions[complete].mean(axis=1), tracks.times[complete]
+
+
+def _refuse_other_side(tracks: ImportedTracks, hinge: Hinge) -> None:
+    """Raise DatasetError if the markers swing about a hinge that is farther out than they are."""
+    farthest = float(np.nanmedian(tracks.positions[..., 1], axis=0).max())
+    if not hinge.found or hinge.place[0] <= farthest:
+        return
+    message = (
+        f"has markers that move on circles about y = {hinge.place[0]:.3g} m, farther out than all of them (at most "
+        f"{farthest:.3g} m): y points to the body; exchange 'in' and 'out' in --axes"
+    )
+    raise DatasetError([question("axes", tracks.file, None, message)])
 
 
 @dataclass(frozen=True)
 class _Flap:
-    """The flap angle about its mean, ``angle`` [T], and its ``amplitude``, rad."""
+    """The flap angle about its mean, ``angle`` [T], and its ``amplitude``, rad; ``explained``: of its variance."""
 
     angle: Array
     amplitude: float
+    explained: float
 
 
 def _flap(times: Array, arms: Array, frequency: float) -> _Flap:
@@ -149,4 +187,7 @@ def _flap(times: Array, arms: Array, frequency: float) -> _Flap:
     turn = 2 * np.pi * frequency * times
     basis = np.column_stack([np.ones_like(turn), np.cos(turn), np.sin(turn)])
     found = np.linalg.lstsq(basis[seen], common[seen], rcond=None)[0]
-    return _Flap(basis[:, 1:] @ found[1:], float(np.hypot(found[1], found[2])))
+    flap = basis[:, 1:] @ found[1:]
+    moved, left = common[seen] - common[seen].mean(), common[seen] - found[0] - flap[seen]
+    still = float(np.ptp(common[seen])) < _STILL
+    return _Flap(flap, float(np.hypot(found[1], found[2])), 0.0 if still else 1 - float(left @ left / (moved @ moved)))

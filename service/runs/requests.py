@@ -151,7 +151,8 @@ class RunIn(JobSettings):
     rig: RigIn | None = None
     name: Title | None = None
     mode: Annotated[
-        Mode | None, Field(description="null: staged for a wing, local for a vehicle, joint for series")
+        Mode | None,
+        Field(description="null: staged for a wing, joint for a rigid one and for series, local for a vehicle"),
     ] = None
     method: Annotated[
         Method | None, Field(description="null: genetic for a wing, gauss_newton for a vehicle, auto for series")

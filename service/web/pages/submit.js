@@ -100,7 +100,7 @@ async function check(form) {
 export const randomKey = () => [...crypto.getRandomValues(new Uint8Array(16))].map((b) => b.toString(16).padStart(2, "0")).join("");
 
 function values(form) {
-  const body = { dataset_id: form.dataset_id.value, method: form.method.value, mode: form.mode.value };
+  const body = { dataset_id: form.dataset_id.value, method: form.method.value, mode: form.mode.value || null };
   const forces = isForces(chosenDataset(form));
   if (forces) Object.assign(body, { preset: form.preset.value, without: unticked("terms"), axes: ticked("axes") });
   else body.division = form.division.value;
@@ -132,7 +132,9 @@ async function showFieldsFor(form) {
   const forces = isForces(dataset);
   for (const node of form.querySelectorAll("[data-kind]")) node.hidden = node.dataset.kind !== (forces ? "forces" : "tracks");
   options(form.method, CHOICES, forces ? ["gauss_newton", "auto", "genetic", "cma_es"] : ["genetic", "auto", "cma_es", "gauss_newton"]);
-  options(form.mode, MODES, forces ? ["local", "joint"] : ["staged", "joint", "local"]);
+  // Only the server knows the default of a wing: that of a rigid one, which has no stages, is another.
+  const byDefault = forces ? "local" : "staged, or joint for a rigid wing";
+  options(form.mode, { ...MODES, "": `default: ${byDefault}` }, forces ? ["", "local", "joint"] : ["", "staged", "joint", "local"]);
   showMethodFields(form);
   await showEffectChoices(form, forces ? "vehicle" : "wing");
   if (!forces) return;

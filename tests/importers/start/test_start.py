@@ -12,6 +12,7 @@ from tests.importers.reading import read
 from wingfit.checks import examine
 from wingfit.importers.start import Conditions, Start, start_dataset
 from wingfit.importers.start.frequency import flap_frequency
+from wingfit.importers.tracks import ImportedTracks
 from wingfit.records import Dataset, DatasetError
 
 HAWKS = Path(__file__).parents[4] / "shared" / "data" / "hawk" / "2024-06-03-TestBilateralMarkers.csv"
@@ -83,7 +84,12 @@ def test_a_frequency_that_the_tracks_do_not_show_is_asked_for() -> None:
     tracks = read("time_s,tip_x_m,tip_y_m,tip_z_m\n" + "\n".join(rows), axes=AXES)
     with pytest.raises(DatasetError, match="--flap-frequency-hz"):
         start_dataset([tracks], "wing", Conditions())
-    assert start_dataset([tracks], "wing", Conditions(flap_frequency_hz=5.0)).flap_frequency_hz == (5.0,)
+    with pytest.raises(DatasetError, match="does not flap at 5 Hz, which explains"):
+        start_dataset([tracks], "wing", Conditions(flap_frequency_hz=5.0))
+    short = read(wing_table(seconds=0.4), axes=AXES)
+    with pytest.raises(DatasetError, match="--flap-frequency-hz"):
+        start_dataset([short], "wing", Conditions())
+    assert start_dataset([short], "wing", Conditions(flap_frequency_hz=3.3)).flap_frequency_hz == (3.3,)
 
 
 def test_the_frequency_of_a_beat_that_stops_is_found() -> None:
@@ -119,3 +125,79 @@ def test_flights_of_hawks_become_datasets_that_no_check_refuses(name: str, hertz
         assert dataset.recordings[0].name == name
         assert dataset.recordings[0].condition.flap_frequency == pytest.approx(hertz, rel=0.12)
         assert not [str(one) for one in examine(dataset) if one.certain]
+
+
+def tracks_of(
+    hertz: float = 5.0,
+    rate: float = 200.0,
+    beats: float = 10.0,
+    *,
+    noise: float = 0.0,
+    drift: float = 0.0,
+    side: int = 1,
+    distances: tuple[float, ...] = (0.1, 0.2, 0.45),
+    seen: float = 1.0,
+) -> ImportedTracks:
+    """Tracks of markers at ``distances`` (m) from HINGE that flap by 30 deg; ``drift`` upwards, m/s."""
+    rng = np.random.default_rng(5)
+    times = np.arange(int(beats * rate / hertz)) / rate
+    angle = np.radians(30) * np.cos(2 * np.pi * hertz * times)
+    columns = [times]
+    for m, r in enumerate(distances):
+        y, z = side * (HINGE[0] + r * np.cos(angle)), HINGE[1] + r * np.sin(angle) + drift * times
+        place = [0.02 * m + 0 * times, y, z]
+        gone = rng.random(len(times)) > seen
+        columns += [np.where(gone, np.nan, one + noise * rng.standard_normal(len(times))) for one in place]
+    names = ",".join(f"m{m}_{axis}_m" for m in range(len(distances)) for axis in "xyz")
+    rows = "\n".join(",".join(f"{value:.6f}" for value in row) for row in np.column_stack(columns))
+    return read(f"time_s,{names}\n{rows}", axes=AXES)
+
+
+@pytest.mark.parametrize(
+    ("hertz", "rate", "beats"), [(5.0, 200.0, 300.0), (40.0, 200.0, 10.0), (5.0, 2000.0, 100.0), (5.0, 200.0, 1.6)]
+)
+def test_the_frequency_is_right_in_long_fast_and_short_recordings(hertz: float, rate: float, beats: float) -> None:
+    start = start_dataset([tracks_of(hertz, rate, beats)], "wing", Conditions())
+    assert start.flap_frequency_hz == pytest.approx((hertz,), rel=0.01)
+
+
+@pytest.mark.parametrize(("hertz", "beats"), [(60.0, 100.0), (90.0, 100.0), (5.0, 1.3)])
+def test_a_beat_too_fast_for_the_camera_or_too_short_is_asked_for(hertz: float, beats: float) -> None:
+    tracks = tracks_of(hertz, 200.0, beats)
+    with pytest.raises(DatasetError, match="shows no clear flap frequency"):
+        start_dataset([tracks], "wing", Conditions())
+
+
+def described(tracks: ImportedTracks) -> dict[str, str]:
+    return {one.what: f"{one.value}; {one.source}" for one in start_dataset([tracks], "wing", Conditions()).facts}
+
+
+def test_gaps_do_not_hide_the_frequency() -> None:
+    assert described(tracks_of(seen=0.85))["flap angle"].startswith("30.0 deg")
+
+
+@pytest.mark.parametrize(
+    ("noise", "distances"), [(0.01, (0.1, 0.2, 0.45)), (0.001, (0.002, 0.3, 0.45)), (0.001, (0.3,))]
+)
+def test_noise_and_a_marker_at_the_hinge_do_not_move_the_hinge(noise: float, distances: tuple[float, ...]) -> None:
+    dataset = described(tracks_of(noise=noise, distances=distances))
+    assert "from the tracks" in dataset["hinge"]
+    assert float(dataset["hinge"].split()[1]) == pytest.approx(1e3 * HINGE[0], abs=10)
+    assert float(dataset["flap angle"].split()[0]) == pytest.approx(30, rel=0.04)
+
+
+def test_a_body_that_moves_is_refused_or_its_hinge_assumed() -> None:
+    assert "assumed" in described(tracks_of(drift=0.05))["hinge"]
+    assert "not exact" in described(tracks_of(drift=0.05))["flap angle"]
+    with pytest.raises(DatasetError, match="as on a body that moves"):
+        start_dataset([tracks_of(drift=1.0)], "wing", Conditions())
+
+
+def test_a_wing_on_the_other_side_is_refused() -> None:
+    with pytest.raises(DatasetError, match="exchange 'in' and 'out' in --axes"):
+        start_dataset([tracks_of(side=-1)], "wing", Conditions())
+
+
+def test_a_frequency_at_which_nothing_moves_is_refused() -> None:
+    with pytest.raises(DatasetError, match="does not flap at 40 Hz, which explains 0 %"):
+        start_dataset([tracks_of()], "wing", Conditions(flap_frequency_hz=40.0))

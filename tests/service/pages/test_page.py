@@ -168,6 +168,7 @@ def test_the_form_shows_what_the_server_says_and_then_starts(
     run_id = seen.page.evaluate("location.hash").removeprefix("#run=")
     spec = server.api.run(run_id)["spec"]
     assert (spec["seed"], spec["accuracy_mm"], spec["effects"]) == (4, 0.05, ["camera_shift"])
+    assert spec["mode"] == "staged", "the default of a wing with rods, which the form leaves to the server"
     seen.wait("document.getElementById('run-about').textContent.includes('with camera shift')")
     seen.page.wait_for_selector("#copy-curl")
     seen.page.click("#copy-curl")

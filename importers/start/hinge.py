@@ -1,0 +1,132 @@
+"""The hinge of a wing: the common centre of the circles on which its markers move."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from wingfit.importers.tracks import ImportedTracks
+from wingfit.records.array_types import Array, Float, Mask
+
+_NEAR = 0.1  # of the largest radius: markers so near the hinge show no circle
+_STEADY = 0.03  # of the radii: what they vary with time and flap angle, at most, for a hinge that is found
+_SCATTER = 0.04  # of the radii: what they vary at all, at most
+_CERTAIN = 0.1  # of the largest radius: standard error of the centre, at most
+_EXACT = 0.01  # of the largest radius: a standard error that is worth mentioning
+_STEPS = 10
+_HARMONICS = 4
+_ROWS_EACH = 4  # rows for each coefficient of a motion that repeats, at least
+_WHITE = 0.3  # autocorrelation of noise over one row, at most
+
+
+@dataclass(frozen=True)
+class Hinge:
+    """A hinge at ``place`` (y and z, m); ``found`` from the tracks, or assumed; ``source`` says which."""
+
+    place: Array
+    source: str
+    found: bool
+
+    @property
+    def angles(self) -> str:
+        """Return where angles about the hinge are from."""
+        return "tracks" if self.found else "tracks, about the assumed hinge: not exact"
+
+
+def find_hinge(tracks: ImportedTracks, frequency: float, *, drifts: bool) -> Hinge:
+    """Return the common centre of the circles on which the markers move in the y-z plane, if they are circles.
+
+    They are if their radii vary neither with time nor with the harmonics of ``frequency`` (Hz). Otherwise, or if the
+    body ``drifts``, the hinge is assumed, in the origin or beside the innermost marker.
+    """
+    measured = tracks.positions[..., 1:]
+    planar = _without_noise(tracks.times, measured, frequency)
+    noise = float(np.sqrt(np.nanmean((measured - planar) ** 2)))
+    middle = np.nanmedian(planar, axis=0)
+    inside = float(middle[:, 0].min())
+    centre = _first_centre(planar)
+    for _ in range(_STEPS):
+        step, error = _step(planar, centre, noise)
+        centre = centre + step
+    radii = np.hypot(*np.moveaxis(planar - centre, 2, 0))
+    mean = np.nanmean(radii, axis=0)
+    far = mean > _NEAR * mean.max()
+    beside = centre[0] < middle[far, 0].min() or centre[0] > middle[far, 0].max()
+    if not drifts and beside and error < _CERTAIN * mean.max() and _are_steady(tracks.times, radii[:, far], frequency):
+        exact = f", to {1e3 * error:.2g} mm" if error > _EXACT * mean.max() else ""
+        source = f"from the tracks: the markers move on circles about it{exact}"
+        return Hinge(np.round(centre, 6) + 0.0, source, True)
+    if inside > 0:
+        return Hinge(np.zeros(2), "assumed: the origin of the axes", False)
+    span = float(middle[:, 0].max()) - inside
+    place = np.array([inside - 0.1 * span, middle[np.argmin(middle[:, 0]), 1]])
+    return Hinge(place, "assumed: beside the innermost marker", False)
+
+
+def _without_noise(times: Array, planar: Float[Array, "T M 2"], frequency: float) -> Float[Array, "T M 2"]:
+    """Return the part that repeats with ``frequency`` (Hz), if the rest is noise from row to row; else all.
+
+    Noise that is not small beside the height of an arc moves its centre.
+    """
+    order = np.arange(1, _HARMONICS + 1)
+    turn = 2 * np.pi * frequency * times[:, None] * order
+    basis = np.column_stack([np.ones_like(times), np.cos(turn), np.sin(turn)])
+    columns = planar.reshape(len(times), -1)
+    seen = np.isfinite(columns)
+    if seen.sum(axis=0).min() < _ROWS_EACH * basis.shape[1]:
+        return planar
+    repeated, before, rest = np.full_like(columns, np.nan), 0.0, 0.0
+    for k, there in enumerate(seen.T):
+        fitted = basis[there] @ np.linalg.lstsq(basis[there], columns[there, k], rcond=None)[0]
+        repeated[there, k] = fitted
+        left = columns[there, k] - fitted
+        before, rest = before + float(left[1:] @ left[:-1]), rest + float(left @ left)
+    return repeated.reshape(planar.shape) if before < _WHITE * rest else planar
+
+
+def _first_centre(planar: Float[Array, "T M 2"]) -> Array:
+    """Return y and z (m) of the centre with the least algebraic misfit (Kasa 1976), which noise pulls inwards."""
+    count = planar.shape[1]
+    rows, right = [], []
+    for m in range(count):
+        seen = planar[:, m][np.isfinite(planar[:, m]).all(axis=1)]
+        one = np.zeros((len(seen), count))
+        one[:, m] = 1.0
+        rows.append(np.column_stack([2 * seen, one]))
+        right.append((seen**2).sum(axis=1))
+    found: Array = np.linalg.lstsq(np.vstack(rows), np.concatenate(right), rcond=None)[0][:2]
+    return found
+
+
+def _step(planar: Float[Array, "T M 2"], centre: Array, noise: float) -> tuple[Array, float]:
+    """Return a Gauss-Newton step (m) to the least geometric misfit, and the standard error (m) of the centre.
+
+    ``noise`` (m) of a coordinate, which is no longer in ``planar``.
+    """
+    away = planar - centre
+    radii = np.hypot(away[..., 0], away[..., 1])
+    means = np.nanmean(radii, axis=0)
+    far = means > _NEAR * means.max()
+    unit = away[:, far] / np.maximum(radii[:, far], 1e-12)[..., None]
+    jacobian = (unit - np.nanmean(unit, axis=0)).reshape(-1, 2)
+    misfit = (radii - means)[:, far].ravel()
+    seen: Mask = np.isfinite(misfit)
+    jacobian, misfit = jacobian[seen], misfit[seen]
+    step = np.linalg.lstsq(jacobian, misfit, rcond=None)[0]
+    least = float(np.linalg.svd(jacobian, compute_uv=False)[-1])
+    scatter = float(np.sqrt((misfit**2).mean() + noise**2))
+    return step, scatter / max(least, 1e-12)
+
+
+def _are_steady(times: Array, radii: Float[Array, "T M"], frequency: float) -> bool:
+    turn = 2 * np.pi * frequency * times[:, None] * np.array([1.0, 2.0])
+    basis = np.column_stack([np.ones_like(times), times, np.cos(turn), np.sin(turn)])
+    varied, scatter, size = 0.0, 0.0, 0.0
+    for column in radii.T:
+        seen = np.isfinite(column)
+        fitted = basis[seen] @ np.linalg.lstsq(basis[seen], column[seen], rcond=None)[0]
+        varied += float(fitted.var())
+        scatter += float(column[seen].var())
+        size += float(column[seen].mean()) ** 2
+    return varied < _STEADY**2 * size and scatter < _SCATTER**2 * size
