@@ -84,7 +84,7 @@ def test_an_individual_that_fails_from_a_warm_start_starts_from_rest() -> None:
     wing = FlexibleWing(robird_wing(), "4")
     nominal, blank = np.array([g.nominal for g in wing.genes]), blank_recording(wing.wing, vacuum(10.0, 0.05, 3.0))
     model = wing.with_effects("stroke_amplitude")
-    genomes = np.append(nominal, 0.0) + np.eye(len(nominal) + 1)[-1] * np.array([[0.01], [0.4]])
+    genomes = np.array([[*nominal, part, 0.0] for part in (0.01, 0.4)])
     found, exact = (one.beats(genomes, blank) for one in (model.beside(genomes[0]), replace(model, numerics=FINE)))
     assert [beat.reason for beat in found] == [None, None]
     assert max(error(a, b) for a, b in zip(found, exact, strict=True)) < model.numerics.accuracy

@@ -119,7 +119,7 @@ def test_wing_and_vehicle_stand_side_by_side(seen: Seen, api: Api, dataset: dict
     seen.wait("!document.querySelector('[data-kind=tracks]').hidden")
     assert not seen.page.is_visible("[name=preset]")
     modes = seen.page.evaluate("[...document.querySelector('[name=mode]').options].map((o) => o.value)")
-    assert modes == ["staged", "joint", "local"]
+    assert modes == ["", "staged", "joint", "local"]
     seen.page.select_option("[name=division]", "4")
     seen.page.click("#submit-form [type=submit]")
     seen.wait("location.hash.startsWith('#run=')")
