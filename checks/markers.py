@@ -152,7 +152,10 @@ def _exchanged(tracked: Tracked) -> Mistake | None:
     if len(seen) < 3:
         return None
     distances = np.linalg.norm(now[seen][:, None] - own[seen][None], axis=2)
-    rows, columns = linear_sum_assignment(distances**2)
+    squares = distances**2
+    if not np.isfinite(squares).all():  # positions beyond 1e150 m, which other checks find
+        return None
+    rows, columns = linear_sum_assignment(squares)
     wrong = np.flatnonzero(rows != columns)
     if len(wrong) < 2:
         return None
