@@ -153,7 +153,7 @@ def _exchanged(tracked: Tracked) -> Mistake | None:
         return None
     distances = np.linalg.norm(now[seen][:, None] - own[seen][None], axis=2)
     squares = distances**2
-    if not np.isfinite(squares).all():  # positions beyond 1e150 m, which other checks find
+    if not np.isfinite(squares).all():  # positions beyond 1e150 m
         return None
     rows, columns = linear_sum_assignment(squares)
     wrong = np.flatnonzero(rows != columns)

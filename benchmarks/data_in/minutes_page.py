@@ -21,7 +21,7 @@ NAMES = ("chromium-headless-shell", "chromium", "chromium-browser", "google-chro
 SECONDS = 120.0
 SHOWN = "!document.getElementById('import-result').hidden"
 STORED = "location.hash.startsWith('#dataset=') && document.body.innerText.includes('Recordings')"
-ASKED = "[...document.querySelectorAll('#import-asked .field:not(.answered)')].map((node) => node.dataset.option)"
+QUESTIONS = "[...document.querySelectorAll('#import-asked .field:not(.answered)')].map((node) => node.dataset.option)"
 # The text that is shown, rows of tables with tabs between their cells; entries of closed lists are not shown.
 TEXT = """(() => {
   const texts = [];
@@ -93,8 +93,8 @@ def walked(data: Path, source: Source, url: str, person: Person, result: dict[st
 def _answer(walk: Walk, source: Source) -> None:
     """Answer the questions of the form until the tracks are shown; first the axes, if the file shows a wing."""
     known = {"unit": source.unit, "time_unit": source.time_unit, "rows": source.also, "repeated": "gaps"}
-    walk.until(f"{SHOWN} || {ASKED}.length > 0")
-    while asked := walk.page.evaluate(ASKED):
+    walk.until(f"{SHOWN} || {QUESTIONS}.length > 0")
+    while asked := walk.page.evaluate(QUESTIONS):
         for option in asked:
             place = f"#import-asked [name={option}]"
             if walk.page.get_attribute(place, "type") == "checkbox":
@@ -102,7 +102,7 @@ def _answer(walk: Walk, source: Source) -> None:
             else:
                 first = "(node) => [...node.options].find((one) => one.value).value"
                 walk.select(place, known.get(option) or str(walk.page.eval_on_selector(place, first)))
-            walk.until(f"!{ASKED}.includes('{option}')")
+            walk.until(f"!{QUESTIONS}.includes('{option}')")
     walk.until(SHOWN)
     if source.axes:
         for part in source.axes.split(", "):

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 import typer
@@ -52,9 +54,13 @@ def started(
             "no dataset was written", f"{len(faults)} error{'s' if len(faults) > 1 else ''}", errors=faults
         ) from None
     try:
-        (dataset / "recordings").mkdir(parents=True)
-        for name, text in start.files.items():
-            (dataset / name).write_text(text, encoding="utf-8", newline="\n")
+        dataset.parent.mkdir(parents=True, exist_ok=True)
+        with TemporaryDirectory(dir=dataset.parent, prefix=f".{dataset.name}.") as scratch:
+            partial = Path(scratch) / dataset.name  # so that a failure leaves no part of a dataset
+            (partial / "recordings").mkdir(parents=True)
+            for name, text in start.files.items():
+                (partial / name).write_text(text, encoding="utf-8", newline="\n")
+            partial.rename(dataset)
     except OSError as error:
         raise WingfitError(f"the dataset cannot be written to {dataset}", error.strerror or str(error)) from error
     return start
@@ -69,7 +75,8 @@ def show(start: Start, dataset: Path) -> None:
         note(f"replace what is assumed by what you know, in {dataset / 'dataset.yaml'} (docs/formats.md)")
     else:
         note("for a dataset of a wing, say where the axes of the file point: --axes 'x aft, y out, z up'")
+    folder = shlex.quote(str(dataset))
     say(
-        f"next: wingfit datasets check {dataset}; then, with a server ('wingfit serve'): "
-        f"wingfit datasets upload {dataset}"
+        f"next: wingfit datasets check {folder}; then, with a server ('wingfit serve'): "
+        f"wingfit datasets upload {folder}"
     )

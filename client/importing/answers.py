@@ -112,9 +112,13 @@ class DescribedFact(TypedDict):
 
 
 class FirstDescription(TypedDict):
-    """A description from tracks alone: ``yaml`` is the key ``wing`` of dataset.yaml, or ``rig`` and ``channels``."""
+    """A description from tracks alone: ``yaml`` is the key ``wing`` of dataset.yaml, or ``rig`` and ``channels``.
+
+    ``conditions``: keys of a recording of a wing in dataset.yaml that are assumed.
+    """
 
     kind: Literal["wing", "series"]
     yaml: str
     flap_frequency_hz: float | None
+    conditions: dict[str, str | float]
     facts: list[DescribedFact]

@@ -8,8 +8,9 @@ marked as assumed.
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 
@@ -22,7 +23,10 @@ from wingfit.records.array_types import Array, Float
 from wingfit.records.errors import DatasetError, Faults, fail
 from wingfit.records.limits import MAX_QUANTITIES
 
-PRESSURE_MBAR, TEMPERATURE_C = 1013.25, 20
+ASSUMED: Mapping[str, str | float] = MappingProxyType(
+    {"rig": "wind_tunnel", "phase_lag_deg": 0, "pressure_mbar": 1013.25, "temperature_c": 20}
+)
+"""Conditions of a recording, in the units of dataset.yaml, that tracks do not show; there is no rear rod."""
 _HEAD = """\
 # First description, from the tracks alone. Replace what is marked ASSUMED by what you know (docs/formats.md).
 format_version: 1
@@ -83,7 +87,7 @@ def start_dataset(found: Sequence[ImportedTracks], name: str, given: Conditions)
     rates = [_frequency(one, given) for one in found]
     wing = describe_wing(found[0], rates[0], name)
     source = "user: --flap-frequency-hz" if given.flap_frequency_hz else "tracks; count the beats to confirm it"
-    air = f"{PRESSURE_MBAR:g} mbar, {TEMPERATURE_C} deg C"
+    air = f"{ASSUMED['pressure_mbar']} mbar, {ASSUMED['temperature_c']} deg C"
     facts = (
         Fact("flap frequency", ", ".join(f"{rate:.4g} Hz" for rate in rates), source),
         *wing.facts,
@@ -92,11 +96,11 @@ def start_dataset(found: Sequence[ImportedTracks], name: str, given: Conditions)
     )
     text = _HEAD.format(**head, about=_WING) + wing.yaml + "recordings:        # ASSUMED: pressure, temperature"
     text += ", airspeed\n" if given.airspeed_m_s is None else "\n"
+    assumed = ", ".join(f"{key}: {value}" for key, value in ASSUMED.items())
     for called, rate in zip(names, rates, strict=True):
         text += (
-            f"  - {{name: {json.dumps(called)}, rig: wind_tunnel, flap_frequency_hz: {rate:.5g}, phase_lag_deg: 0,\n"
-            f"     pressure_mbar: {PRESSURE_MBAR:g}, temperature_c: {TEMPERATURE_C}, "
-            f"airspeed_m_s: {given.airspeed_m_s or 0:g}}}\n"
+            f"  - {{name: {json.dumps(called)}, flap_frequency_hz: {rate:.5g}, {assumed},\n"
+            f"     airspeed_m_s: {given.airspeed_m_s or 0:g}}}\n"
         )
     return Start("wing", wing.yaml, {"dataset.yaml": text} | tables, facts, tuple(rates))
 

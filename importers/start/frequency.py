@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from wingfit.importers.start.harmonics import columns
 from wingfit.records.array_types import Array, Float
 
 HARMONICS = 2
@@ -109,7 +110,6 @@ def _of_part(since: Array, values: Array) -> float | None:
 
 def _explained(times: Array, values: Array, frequency: float, harmonics: int = HARMONICS) -> float:
     """Return the part of the squares of ``values`` [T, C] that a line and harmonics of ``frequency`` (Hz) explain."""
-    turn = 2 * np.pi * frequency * times[:, None] * np.arange(1, harmonics + 1)
-    basis, _ = np.linalg.qr(np.column_stack([np.ones_like(times), times, np.cos(turn), np.sin(turn)]))
+    basis, _ = np.linalg.qr(columns(times, frequency, harmonics, drifts=True))
     left = values - basis @ (basis.T @ values)
     return 1.0 - float((left**2).sum() / (values**2).sum())

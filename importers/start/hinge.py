@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wingfit.importers.start.harmonics import columns
 from wingfit.importers.tracks import ImportedTracks
 from wingfit.records.array_types import Array, Float, Mask
 
@@ -69,18 +70,16 @@ def _without_noise(times: Array, planar: Float[Array, "T M 2"], frequency: float
 
     Noise that is not small beside the height of an arc moves its centre.
     """
-    order = np.arange(1, _HARMONICS + 1)
-    turn = 2 * np.pi * frequency * times[:, None] * order
-    basis = np.column_stack([np.ones_like(times), np.cos(turn), np.sin(turn)])
-    columns = planar.reshape(len(times), -1)
-    seen = np.isfinite(columns)
+    basis = columns(times, frequency, _HARMONICS)
+    values = planar.reshape(len(times), -1)
+    seen = np.isfinite(values)
     if seen.sum(axis=0).min() < _ROWS_EACH * basis.shape[1]:
         return planar
-    repeated, before, rest = np.full_like(columns, np.nan), 0.0, 0.0
+    repeated, before, rest = np.full_like(values, np.nan), 0.0, 0.0
     for k, there in enumerate(seen.T):
-        fitted = basis[there] @ np.linalg.lstsq(basis[there], columns[there, k], rcond=None)[0]
+        fitted = basis[there] @ np.linalg.lstsq(basis[there], values[there, k], rcond=None)[0]
         repeated[there, k] = fitted
-        left = columns[there, k] - fitted
+        left = values[there, k] - fitted
         before, rest = before + float(left[1:] @ left[:-1]), rest + float(left @ left)
     return repeated.reshape(planar.shape) if before < _WHITE * rest else planar
 
@@ -120,8 +119,7 @@ def _step(planar: Float[Array, "T M 2"], centre: Array, noise: float) -> tuple[A
 
 
 def _are_steady(times: Array, radii: Float[Array, "T M"], frequency: float) -> bool:
-    turn = 2 * np.pi * frequency * times[:, None] * np.array([1.0, 2.0])
-    basis = np.column_stack([np.ones_like(times), times, np.cos(turn), np.sin(turn)])
+    basis = columns(times, frequency, 2, drifts=True)
     varied, scatter, size = 0.0, 0.0, 0.0
     for column in radii.T:
         seen = np.isfinite(column)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wingfit.importers.options import question
+from wingfit.importers.start.harmonics import columns
 from wingfit.importers.start.hinge import Hinge, find_hinge
 from wingfit.importers.tracks import ImportedTracks
 from wingfit.records.array_types import Array
@@ -127,8 +128,7 @@ def _drift(tracks: ImportedTracks, frequency: float) -> tuple[float, float]:
     middle, times = _middle(tracks)
     if len(times) < _LEAST_ROWS:
         return 0.0, 0.0
-    turn = 2 * np.pi * frequency * times
-    basis = np.column_stack([np.ones_like(times), times - times[0], np.cos(turn), np.sin(turn)])
+    basis = columns(times, frequency, 1, drifts=True)
     found = np.linalg.lstsq(basis, middle, rcond=None)[0]
     return float(np.linalg.norm(found[1]) * np.ptp(times)), 2 * float(np.sqrt((found[2:] ** 2).sum()))
 
@@ -184,8 +184,7 @@ def _flap(times: Array, arms: Array, frequency: float) -> _Flap:
     total = np.maximum(weight.sum(axis=1), 1e-30)
     common = (np.nan_to_num(angles) * weight).sum(axis=1) / total
     seen = weight.sum(axis=1) > 0
-    turn = 2 * np.pi * frequency * times
-    basis = np.column_stack([np.ones_like(turn), np.cos(turn), np.sin(turn)])
+    basis = columns(times, frequency, 1)
     found = np.linalg.lstsq(basis[seen], common[seen], rcond=None)[0]
     flap = basis[:, 1:] @ found[1:]
     moved, left = common[seen] - common[seen].mean(), common[seen] - found[0] - flap[seen]

@@ -10,7 +10,7 @@ from wingfit.client.importing import answers as i
 from wingfit.client.importing.questions import ImportQuestion
 from wingfit.importers.inspection import Inspection, preview_frames, ranges
 from wingfit.importers.raw import Raw
-from wingfit.importers.start import Start
+from wingfit.importers.start import ASSUMED, Start
 from wingfit.importers.summary import as_json
 from wingfit.importers.tracks import ImportedTracks
 
@@ -36,6 +36,7 @@ def description(start: Start) -> i.FirstDescription:
         "kind": "wing" if start.kind == "wing" else "series",
         "yaml": start.yaml,
         "flap_frequency_hz": start.flap_frequency_hz[0] if start.flap_frequency_hz else None,
+        "conditions": dict(ASSUMED) if start.kind == "wing" else {},
         "facts": [{"what": one.what, "value": one.value, "source": one.source} for one in start.facts],
     }
 

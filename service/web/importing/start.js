@@ -8,9 +8,6 @@ import { inWords } from "./form.js";
 import { chosenNames, chosenSources } from "./understood.js";
 import { zip } from "./zip.js";
 
-const ASSUMED = { rig: "wind_tunnel", phase_lag_deg: "0", pressure_mbar: "1013.25", temperature_c: "20" };
-const CONDITIONS = [["Rig", "wind tunnel"], ["Phase lag", "0 deg; there is no rear rod"], ["Air", "1013.25 mbar, 20 °C"]];
-
 let hooks = {};
 
 export function setUpStart(given) {
@@ -51,13 +48,15 @@ async function describe() {
     const dataset = $("import-dataset");
     const rows = found.facts.map(({ what, value, source }) => [capital(what), value, source]);
     if (!recording.namedItem("flap_frequency_hz").value.trim()) recording.namedItem("flap_frequency_hz").value = found.flap_frequency_hz.toPrecision(5);
-    for (const [name, value] of Object.entries(ASSUMED)) {
+    for (const [name, value] of Object.entries(found.conditions)) {
       if (!recording.namedItem(name).value) recording.namedItem(name).value = value;
     }
     if (!dataset.description.value.trim()) dataset.description.value = found.yaml;
     else toast("The description in step 5 is kept; empty it to have it described anew");
     if (!dataset.elements.namedItem("name").value.trim()) dataset.elements.namedItem("name").value = recording.namedItem("name").value;
-    const shown = [...rows.filter(([what]) => what !== "Air"), ...CONDITIONS.map(([what, value]) => [what, value, "assumed, where the field was empty"])];
+    const { rig, phase_lag_deg: lag, pressure_mbar: mbar, temperature_c: celsius } = found.conditions;
+    const conditions = [["Rig", rig.replace("_", " ")], ["Phase lag", `${lag} deg; there is no rear rod`], ["Air", `${mbar} mbar, ${celsius} °C`]];
+    const shown = [...rows.filter(([what]) => what !== "Air"), ...conditions.map((pair) => [...pair, "assumed, where the field was empty"])];
     $("import-described").querySelector("tbody").replaceChildren(...shown.map((cells) => el("tr", {}, ...cells.map((text) => el("td", { className: "prose" }, text)))));
     $("import-described").hidden = false;
   } catch (error) {

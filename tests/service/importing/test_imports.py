@@ -262,12 +262,13 @@ def test_a_wing_is_described_by_its_tracks(api: Api) -> None:
     found = valid(FirstDescription, post(api, wing_table(), path, "hawk 1.csv", axes="x aft, y out, z up").json())
     assert found.kind == "wing"
     assert found.flap_frequency_hz == pytest.approx(FREQUENCY, rel=0.01)
+    assert found.conditions["pressure_mbar"] == 1013.25
     assert found.yaml.startswith('wing:\n  name: "hawk_1"\n  structure: rigid')
     assert {"planform", "mass"} <= {one.what for one in found.facts if one.source.startswith("assumed")}
     stated = post(api, wing_table(), path, axes="x aft, y out, z up", flap_frequency_hz=3).json()
     assert stated["flap_frequency_hz"] == 3
     series = valid(FirstDescription, post(api, wing_table(), path).json())
-    assert (series.kind, series.flap_frequency_hz) == ("series", None)
+    assert (series.kind, series.flap_frequency_hz, series.conditions) == ("series", None, {})
     assert "channels:" in series.yaml
     two = problem(post(api, wing_table(both=True), path, axes="x aft, y out, z up"))
     assert "--markers in,mid,tip" in two.errors[0].message
