@@ -70,6 +70,10 @@ def test_a_hawk_is_described_and_calibrated() -> None:
     assert found.before is not None
     assert found.after is not None
     assert found.after < found.before  # a real wing also folds on the upstroke, which no rigid wing does
-    assert [gene.name for gene in found.genes if gene.searched] == ["stroke_amplitude.part", "stroke_bias.angle"]
+    assert [gene.name for gene in found.genes if gene.searched] == [
+        "stroke_amplitude.part",
+        "stroke_amplitude.linkage",
+        "stroke_bias.angle",
+    ]
     amplitude = 35.0 * (1 + next(gene.best for gene in found.genes if gene.name == "stroke_amplitude.part"))
     assert 38.0 < amplitude < 48.0  # deg
