@@ -25,7 +25,9 @@ Samples = dict[tuple[str, tuple[tuple[str, str], ...]], float]
 
 
 def samples(client: httpx.Client) -> Samples:
-    answer = client.get("/v1/metrics")
+    deadline = time.monotonic() + 20
+    while (answer := client.get("/v1/metrics")).status_code == 503 and time.monotonic() < deadline:
+        time.sleep(0.2)  # on a busy machine the metrics may not be ready in time
     assert answer.headers["Content-Type"].startswith("text/plain; version=")
     families = text_string_to_metric_families(answer.text)
     return {(s.name, tuple(sorted(s.labels.items()))): s.value for family in families for s in family.samples}
