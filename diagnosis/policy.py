@@ -58,7 +58,12 @@ class Policy:
     imitation: float = _threshold(
         2.0, "effective samples, relative", "how steeply a hypothesis that leaves more becomes improbable"
     )
-    single: float = _threshold(0.85, "probability", "share of all effects from which one hypothesis is named")
+    single: float = _threshold(
+        0.9,
+        "probability",
+        "share of all effects from which one hypothesis is named: above that of two that fit alike, and of which one "
+        "has a gene more (0.88), so that the cost of a gene alone never decides",
+    )
     listed: float = _threshold(
         0.75, "probability", "share of the library in all missing physics, below which the verdict is unnamed"
     )

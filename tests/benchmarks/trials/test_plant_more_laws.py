@@ -46,7 +46,7 @@ NEAREST: dict[str, Genes] = {
     "viscous": lambda p: {"friction": 0.39 * p["strength"], "pressure": 3.46 * p["strength"]},
     "downwash": lambda p: {"share": p["strength"]},
     "added_mass_error": lambda p: {"part": p["strength"]},
-    "body_drag": lambda p: {"area": p["strength"]},
+    "body_drag": lambda p: {"area": p["strength"], "slender": 1.0},
     "tail_lift": lambda p: {"constant": 0.0, "slope": p["strength"]},
     "varying_coefficients": lambda p: {
         "lift_by_frequency": -p["strength"],

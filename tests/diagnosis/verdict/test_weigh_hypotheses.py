@@ -196,8 +196,15 @@ def test_the_summary_lists_alternatives_and_additional_effects() -> None:
     either, more = (summary(decide(weigh(data(), refit(2.0), r, 0.0, 40)), suspects, texts) for r in (alike, nested))
     assert "cannot distinguish: the a with the c or the a with the b." in either
     assert "The model is missing the a. Whether the b is missing as well is undecided." in more
-    rival = decide(weigh(data(), refit(2.0), [refit(0.30, ("a",)), refit(0.30, ("b",), 2)], 0.0, 40))
+    rival = decide(weigh(data(), refit(2.0), [refit(0.30, ("a",)), refit(0.31, ("b",), 2)], 0.0, 40))
     assert "The model is missing the a. Less probable alternatives: the b." in summary(rival, suspects, texts)
+
+
+@pytest.mark.parametrize(("genes", "verdict"), [(1, "ambiguous"), (2, "ambiguous"), (3, "named")])
+def test_the_cost_of_one_gene_decides_nothing(genes: int, verdict: str) -> None:
+    """Of two effects that fit alike, one with a gene more is no less likely the cause; with two more it is."""
+    rivals = [refit(0.30, ("a",)), refit(0.30, ("b",), genes)]
+    assert decide(weigh(data(), refit(2.0), rivals, 0.0, 40)).verdict == verdict
 
 
 def test_the_location_of_a_cause_has_an_interval() -> None:

@@ -27,3 +27,25 @@ def test_it_meets_the_air_that_there_is() -> None:
     after = flown(DELFLY, rec, airspeed_error__part=0.1, residual_air__density=0.05, body_drag__area=0.4)
     drag = 0.4 * AREA * 0.5 * (density(rec) + 0.05) * 2.2**2
     np.testing.assert_allclose(np.hypot(*(after - before).T), drag, rtol=1e-5)
+
+
+@pytest.mark.parametrize("pitch", [0.0, 0.4, math.pi / 4, 1.4, math.pi / 2, -0.3])
+def test_components_of_the_stream_act_independently_on_a_slender_body(pitch: float) -> None:
+    """Axial drag and cross-flow (Allen and Perkins 1951), each by the square of its component; bluff at right angles."""
+    rec = recording(12.5, 2.0, pitch)
+    more = flown(DELFLY, rec, body_drag__area=0.4, body_drag__slender=1.0) - flown(DELFLY, rec)
+    along, across = 2.0 * math.cos(pitch), 2.0 * math.sin(pitch)
+    force = -0.4 * AREA * 0.5 * density(rec) * np.array([along * abs(along), across * abs(across)])
+    np.testing.assert_allclose(more, np.broadcast_to(force, more.shape), atol=2e-6 * np.abs(force).max())
+
+
+def test_a_slender_body_takes_power_from_the_stream() -> None:
+    """The force is against the stream, and smaller than on a bluff body, by 1 - 2^-1/2 at 45 degrees."""
+    rec = recording(12.5, 2.0, math.pi / 4)
+    plain = flown(DELFLY, rec)
+    bluff, half, slender = (
+        lift_drag(flown(DELFLY, rec, body_drag__area=0.4, body_drag__slender=s) - plain, math.pi / 4)[:, 1]
+        for s in (0.0, 0.5, 1.0)
+    )
+    np.testing.assert_allclose(slender / bluff, math.sqrt(0.5), rtol=1e-5)
+    np.testing.assert_allclose(half, 0.5 * (bluff + slender), rtol=1e-5)
