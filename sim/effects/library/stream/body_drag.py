@@ -41,7 +41,8 @@ EFFECT = effect_of_air(
     law="(X, Z)' = (X, Z) - area (rho / 2) V^2 S (f(cos alpha), f(sin alpha))\n"
     "f(u) = u (1 - slender + slender |u|)",
     source="Hoerner (1965), Fluid-Dynamic Drag, ch. 3 and 13: drag of bodies, in proportion to the dynamic pressure; "
-    "Allen and Perkins (1951), NACA Report 1048: axial drag and cross-flow of a slender body; Armanini et al. (2016), section 2.2: the model has forces of the wings only",
+    "Allen and Perkins (1951), NACA Report 1048: axial drag and cross-flow of a slender body; "
+    "Armanini et al. (2016), section 2.2: the model has forces of the wings only",
     signature="a constant force against the stream, which grows with the square of the airspeed",
     confused_with=("balance_offset", "tail_lift", "airspeed_error"),
     vehicle=_vehicle,

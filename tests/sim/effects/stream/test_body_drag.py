@@ -31,7 +31,7 @@ def test_it_meets_the_air_that_there_is() -> None:
 
 @pytest.mark.parametrize("pitch", [0.0, 0.4, math.pi / 4, 1.4, math.pi / 2, -0.3])
 def test_components_of_the_stream_act_independently_on_a_slender_body(pitch: float) -> None:
-    """Axial drag and cross-flow (Allen and Perkins 1951), each by the square of its component; bluff at right angles."""
+    """Axial drag and cross-flow (Allen and Perkins 1951), each by the square of its component."""
     rec = recording(12.5, 2.0, pitch)
     more = flown(DELFLY, rec, body_drag__area=0.4, body_drag__slender=1.0) - flown(DELFLY, rec)
     along, across = 2.0 * math.cos(pitch), 2.0 * math.sin(pitch)
