@@ -17,6 +17,7 @@ from wingfit.records.dataset import AnyKind
 Verdict = Literal["adequate", "named", "partly named", "ambiguous", "unnamed", "measurement fault"]
 VERDICTS: tuple[Verdict, ...] = ("adequate", "named", "partly named", "ambiguous", "unnamed", "measurement fault")
 NAMING: tuple[Verdict, ...] = ("named", "partly named", "measurement fault")  # those with certain effects
+CONFIDENT = 0.75  # probability from which a text calls a model adequate; below, it says that it may not be
 Numbers = tuple[float, ...]
 Table = tuple[tuple[float, ...], ...]
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from wingfit.diagnosis.finding import VERDICTS, Finding
+from wingfit.diagnosis.finding import CONFIDENT, VERDICTS, Finding
 from wingfit.report import beat_maps, location, misfits, number_format, ranking, svg, tables, wing_map
 from wingfit.report.layout import figure, panels, render
 from wingfit.report.markup import Markup, tag
@@ -48,6 +48,8 @@ def headline(finding: Finding) -> str:
     together = " + ".join(named)
     if finding.verdict == "ambiguous" and named:
         return f"Missing physics: {listed(named, 'or')}; these recordings cannot distinguish them"
+    if finding.verdict == "adequate" and finding.probabilities.get("adequate", 1.0) < CONFIDENT:
+        return "The model may be adequate: these recordings show no missing physics, and cannot exclude it"
     return {
         "adequate": "The model is adequate: these recordings show no missing physics",
         "named": f"Missing physics: {together or 'a known effect'}",

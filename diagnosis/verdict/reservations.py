@@ -72,7 +72,7 @@ def noise_sentence(data: WhitenedData, decision: Decision, nominal: Refit) -> st
     """Return a sentence on a noise that may hide missing physics, if the model is called adequate; else empty."""
     if decision.verdict != "adequate" or not noise_may_hide(data, nominal.fit):
         return ""
-    return " But the noise is not known well enough to exclude it: see the remarks."
+    return " The noise is not known well enough: see the remarks."
 
 
 def judged_by_accepted_error(

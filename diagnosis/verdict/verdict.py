@@ -11,7 +11,7 @@ from wingfit.diagnosis.evidence.intervals import gene_values
 from wingfit.diagnosis.evidence.refit import Refit
 from wingfit.diagnosis.evidence.screen import Trial
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
-from wingfit.diagnosis.finding import NAMING, VERDICTS, Hypothesis, Verdict
+from wingfit.diagnosis.finding import CONFIDENT, NAMING, VERDICTS, Hypothesis, Verdict
 from wingfit.diagnosis.verdict.weigh_hypotheses import HypothesisWeights
 from wingfit.rigs.suspect import Suspect
 
@@ -159,6 +159,12 @@ def summary(decision: Decision, suspects: Mapping[str, Suspect], texts: Mapping[
     names, nearest = (_titles(suspects, found) for found in (decision.named, decision.best.names))
     start = f"The misfit of the refitted nominal model is {texts['before']}; the noise is {texts['noise']}."
     if decision.verdict == "adequate":
+        probability = decision.probabilities["adequate"]
+        if probability < CONFIDENT:
+            return (
+                f"The model may be adequate (probability {probability:.2f}): these recordings show no missing physics, "
+                f"and cannot exclude it. {start}"
+            )
         return f"The model is adequate: these recordings show no missing physics. {start}"
     if decision.verdict == "unnamed":
         return f"Physics is missing that no effect of the library explains: {texts['where']}. {start} " + (

@@ -91,7 +91,7 @@ def weigh(
     total = weight.sum() + other
     probabilities, unknown = weight / total, float(other / total)
     if noise_may_hide(data, nominal.fit):  # as far as no hypothesis has shown how large the noise is
-        doubted = max(probabilities[0] - policy.doubted_noise, 0.0)
+        doubted = max(float(probabilities[0]) - policy.doubted_noise, 0.0)
         probabilities[0], unknown = probabilities[0] - doubted, unknown + doubted
     return HypothesisWeights(hypotheses, evidence - evidence[0], probabilities, unknown, excess, data.policy)
 

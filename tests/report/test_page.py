@@ -120,6 +120,12 @@ def test_the_verdict_comes_first(verdict: Verdict, headline: str) -> None:
     assert shown.texts.count("0.9 %") >= 4
 
 
+def test_a_doubtful_adequate_model_is_not_headed_as_adequate() -> None:
+    finding = with_verdict(wing_finding(), "adequate")
+    doubtful = replace(finding, probabilities=finding.probabilities | {"adequate": 0.6, "unnamed": 0.4})
+    assert "<h1>The model may be adequate: these recordings show no missing physics, and cannot" in html(doubtful)
+
+
 def test_the_numbers_shown_are_those_given() -> None:
     text = page(wing_finding()).text
     for said in (

@@ -200,6 +200,18 @@ def test_the_summary_lists_alternatives_and_additional_effects() -> None:
     assert "The model is missing the a. Less probable alternatives: the b." in summary(rival, suspects, texts)
 
 
+def test_a_summary_calls_a_model_adequate_only_if_it_is_likely() -> None:
+    texts = dict.fromkeys(("before", "after", "noise", "where", "held_out"), "")
+    refits, found = (refit(1.0),), []
+    for unknown in (0.05, 0.4):
+        shares = np.array([1.0 - unknown])
+        decision = decide(HypothesisWeights(refits, np.log(shares), shares, unknown, np.array([1.0])))
+        assert decision.verdict == "adequate"
+        found.append(summary(decision, {}, texts))
+    assert found[0].startswith("The model is adequate: ")
+    assert found[1].startswith("The model may be adequate (probability 0.60): ")
+
+
 @pytest.mark.parametrize(("genes", "verdict"), [(1, "ambiguous"), (2, "ambiguous"), (3, "named")])
 def test_the_cost_of_one_gene_decides_nothing(genes: int, verdict: str) -> None:
     """Of two effects that fit alike, one with a gene more is no less likely the cause; with two more it is."""
