@@ -9,14 +9,15 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
+from tests.diagnosis.verdict.refits import data, refit
 from wingfit.diagnosis.evidence.refit import Refit
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.finding import Interval
-from wingfit.diagnosis.location.differences import _variables, cause_location
+from wingfit.diagnosis.location.differences import _variables
 from wingfit.diagnosis.policy import POLICY
 from wingfit.diagnosis.search import _unconverged
 from wingfit.diagnosis.verdict import weigh_hypotheses
-from wingfit.diagnosis.verdict.verdict import _explained_fraction, decide, summary
+from wingfit.diagnosis.verdict.verdict import _explained_fraction, decide
 from wingfit.diagnosis.verdict.weigh_hypotheses import (
     HypothesisWeights,
     nominal_refuted,
@@ -25,49 +26,6 @@ from wingfit.diagnosis.verdict.weigh_hypotheses import (
     weigh,
 )
 from wingfit.records import Condition
-
-
-def refit(
-    left: float,
-    names: tuple[str, ...] = (),
-    genes: int = 1,
-    family: str = "structure",
-    predicted: float | None = None,
-    drift: float = 1.0,
-) -> Refit:
-    """A refit with a residual of ``left`` noises (RMS), cross-validated to the same unless ``predicted``.
-
-    ``drift``: mean square of the slow change of the beat that it leaves.
-    """
-    trials = tuple(
-        SimpleNamespace(suspect=SimpleNamespace(name=n, family=family, genes=(), size_genes=()), freedom=genes)
-        for n in names
-    )
-    fit = SimpleNamespace(coefficients=drift)
-    return Refit(cast("Any", trials), cast("Any", fit), left**2, (left if predicted is None else predicted) ** 2)
-
-
-def data(
-    recordings: int = 6, excess_standard_error: float = 0.0, drift: float = 0.0, mean: float = 0.0
-) -> WhitenedData:
-    return cast(
-        "WhitenedData",
-        SimpleNamespace(
-            noise=1.0,
-            effective_samples=6.0 * recordings,
-            excess_standard_error=excess_standard_error,
-            accepted=0.0,
-            gene_cost=POLICY.gene_cost,
-            kind="tracks",
-            policy=POLICY,
-            drift=drift,
-            noise_of_recordings=np.ones(recordings),
-            uncertainty_of_beats=np.zeros(recordings),
-            tolerance=POLICY.tolerance,
-            change_of_beat=float,
-            mean_beat_excess=lambda _: mean,
-        ),
-    )
 
 
 def verdict(nominal: float, *others: Refit, floor: float = 0.0) -> tuple[str, tuple[str, ...]]:
@@ -188,43 +146,11 @@ def test_alternatives_are_listed_only_for_a_verdict_on_effects() -> None:
     assert decide(weigh(data(), refit(3.0), [refit(2.2, ("a",)), refit(2.2, ("b",))], 0.0, 40)).alternatives == ()
 
 
-def test_the_summary_lists_alternatives_and_additional_effects() -> None:
-    suspects = cast("Any", {name: SimpleNamespace(title=f"The {name}") for name in "abc"})
-    texts = dict.fromkeys(("before", "after", "noise", "where", "held_out"), "")
-    alike = [refit(0.30, ("a", "c"), 1), refit(0.30, ("a", "b"), 1)]
-    nested = [refit(0.46, ("a",)), refit(0.30, ("a", "b"), 1)]
-    either, more = (summary(decide(weigh(data(), refit(2.0), r, 0.0, 40)), suspects, texts) for r in (alike, nested))
-    assert "cannot distinguish: the a with the c or the a with the b." in either
-    assert "The model is missing the a. Whether the b is missing as well is undecided." in more
-    rival = decide(weigh(data(), refit(2.0), [refit(0.30, ("a",)), refit(0.31, ("b",), 2)], 0.0, 40))
-    assert "The model is missing the a. Less probable alternatives: the b." in summary(rival, suspects, texts)
-
-
-def test_a_summary_calls_a_model_adequate_only_if_it_is_likely() -> None:
-    texts = dict.fromkeys(("before", "after", "noise", "where", "held_out"), "")
-    refits, found = (refit(1.0),), []
-    for unknown in (0.05, 0.4):
-        shares = np.array([1.0 - unknown])
-        decision = decide(HypothesisWeights(refits, np.log(shares), shares, unknown, np.array([1.0])))
-        assert decision.verdict == "adequate"
-        found.append(summary(decision, {}, texts))
-    assert found[0].startswith("The model is adequate: ")
-    assert found[1].startswith("The model may be adequate (probability 0.60): ")
-
-
 @pytest.mark.parametrize(("genes", "verdict"), [(1, "ambiguous"), (2, "ambiguous"), (3, "named")])
 def test_the_cost_of_one_gene_decides_nothing(genes: int, verdict: str) -> None:
     """Of two effects that fit alike, one with a gene more is no less likely the cause; with two more it is."""
     rivals = [refit(0.30, ("a",)), refit(0.30, ("b",), genes)]
     assert decide(weigh(data(), refit(2.0), rivals, 0.0, 40)).verdict == verdict
-
-
-def test_the_location_of_a_cause_has_an_interval() -> None:
-    span, phase = Interval(0.85, 0.37, 0.9), Interval(1.25, 1.2, 1.3)
-    assert cause_location(span, Interval(0.5, None, None), phase) == (
-        "; its cause acts at 85 % of the span (37 to 90 %), 50 % of the chord, 0.25 of the beat (0.20 to 0.30)"
-    )
-    assert cause_location(None, None, None) == ""
 
 
 @pytest.mark.parametrize(
