@@ -65,7 +65,8 @@ def _shared_remarks(data: WhitenedData) -> tuple[str, ...]:
     remark = (
         f"part of what differs between the beats of {', '.join(found)} is a motion that the markers share, not the "
         "noise of single markers: a motion that changes (a stiffness or motor that drifts, beats of different size), "
-        "or cameras that turn; missing physics may hide in it; record more beats"
+        "a vibration that is not locked to the beat (a strobe shows it at another frequency), or cameras that turn; "
+        "missing physics may hide in it; record more beats"
     )
     return (remark,) if found else ()
 

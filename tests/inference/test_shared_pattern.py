@@ -61,3 +61,13 @@ def test_few_markers_or_frames_show_nothing() -> None:
     assert part(np.zeros(same.shape)) == 0.0
     rarely = np.repeat(np.random.default_rng(2).uniform(size=(FRAMES, MARKERS)) > 0.8, 3, axis=1)
     assert part(same, rarely) == 0.0
+
+
+@pytest.mark.parametrize("vibration_hz", [7.3, 37.3, 101.0])
+def test_a_vibration_under_a_strobe_is_found_whatever_its_apparent_frequency(vibration_hz: float) -> None:
+    """A frame of every beat of 3 Hz, 27/28 of a beat later: the vibration is in the frames at an alias."""
+    times = np.arange(FRAMES) * 27.0 / 28.0 / 3.0
+    bent = np.zeros((FRAMES, MARKERS, 3))
+    bent[:, :, 2] = np.sin(2.0 * np.pi * vibration_hz * times)[:, None] * Y**2
+    bent *= np.sqrt(1.0 / np.mean(bent**2))  # as large as the noise
+    assert part(bent.reshape(FRAMES, -1) + noise(5, 0.0)) > 0.3
