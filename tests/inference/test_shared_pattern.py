@@ -69,5 +69,6 @@ def test_a_vibration_under_a_strobe_is_found_whatever_its_apparent_frequency(vib
     times = np.arange(FRAMES) * 27.0 / 28.0 / 3.0
     bent = np.zeros((FRAMES, MARKERS, 3))
     bent[:, :, 2] = np.sin(2.0 * np.pi * vibration_hz * times)[:, None] * Y**2
+    bent -= bent.mean(axis=1, keepdims=True)
     bent *= np.sqrt(1.0 / np.mean(bent**2))  # as large as the noise
     assert part(bent.reshape(FRAMES, -1) + noise(5, 0.0)) > 0.3
