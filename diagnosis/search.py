@@ -21,7 +21,7 @@ from wingfit.diagnosis.evidence.refit import (
     refit_with,
     strongest_trials,
 )
-from wingfit.diagnosis.evidence.screen import Trial, score_tests
+from wingfit.diagnosis.evidence.screen import Trial, positions_of, score_tests, units_at_position
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.refinement import MAX_CONTINUED, refine_with_effects
 from wingfit.diagnosis.search_state import SearchState
@@ -134,9 +134,10 @@ def _look_alikes(state: SearchState, best: Refit) -> list[StartPoint]:
     starts = []
     for part in best.trials:
         others = [trial for trial in best.trials if trial is not part]
-        for name in part.suspect.confused_with:
-            if name in found and name not in best.names:
-                starts += start_points(found[name], others, best)
+        for name, trial in found.items():
+            alike = name in part.suspect.confused_with or part.suspect.name in trial.suspect.confused_with
+            if alike and name not in best.names:
+                starts += start_points(trial, others, best)
     return starts
 
 
@@ -218,7 +219,8 @@ def _refits_from_estimates(state: SearchState) -> Steps:
     """Refit from the estimates of the genes: suspects with the strongest score tests there, and those with a location.
 
     At the nominal fit a score test cannot see what the nominal genes have absorbed, such as a heavy mass. Suspects with
-    a location and, on series, those that act within the simulation are also fitted from a large size.
+    a location and, on series, those that act within the simulation are also fitted from a large size. Choices, such as
+    the start of the beat, change so much that a score test says little: those that fit better there are fitted too.
     """
     if state.initial_fit is None:
         raise ValueError("the nominal model has not been fitted")
@@ -228,6 +230,7 @@ def _refits_from_estimates(state: SearchState) -> Steps:
         found.append(trials)
         yield 0.74, f"score test of {suspect.name} at the estimates"
     starts = [entry for trial in _restart_trials(state.data, found) for entry in start_points(trial)]
+    starts += _choices(state.data, initial, found)
     if state.data.kind == "series":
         starts += [large_start(trial) for trial in _inner_trials(state)]
     else:
@@ -241,6 +244,25 @@ def _restart_trials(data: WhitenedData, found: Sequence[list[Trial]]) -> list[Tr
     strongest = strongest_trials(data, found, MAX_RESTARTED)
     others = [trials[0] for trials in found if trials and all(trials[0] is not one for one in strongest)]
     return strongest + [one for one in others if _has_location(one.suspect)]
+
+
+def _choices(data: WhitenedData, initial: Fit, found: Sequence[list[Trial]]) -> list[StartPoint]:
+    """Return starts at each position of the suspects in ``found`` that are choices and fit better than ``initial``.
+
+    Each has the shape with which it fits best while no gene adapts: to genes that may adapt without a limit, a wrong
+    choice looks like a change of theirs.
+    """
+    starts = []
+
+    def left(trial: Trial) -> float:
+        return float(np.linalg.norm((initial.coefficients + trial.changes) / data.scale, axis=-1).min())
+
+    for trials in found:
+        if trials and trials[0].suspect.positions:
+            best = min(trials, key=left)
+            if left(best) < float(np.linalg.norm(initial.coefficients / data.scale)):
+                starts += [StartPoint((best,), units_at_position(best, *one)) for one in positions_of(best.suspect)]
+    return starts
 
 
 def _has_location(suspect: Suspect) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Literal
 
@@ -44,6 +44,10 @@ class Condition:
     airspeed: float = 0.0
     angle_of_attack: float = 0.0
     gravity: float = STANDARD_GRAVITY
+
+    def __post_init__(self) -> None:
+        for one in fields(self):  # whole numbers would make arrays of whole numbers
+            object.__setattr__(self, one.name, float(getattr(self, one.name)))
 
 
 @dataclass(frozen=True)

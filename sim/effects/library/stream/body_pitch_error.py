@@ -17,6 +17,6 @@ EFFECT = effect_of_air(
     law="alpha' = alpha + angle",
     source="Armanini et al. (2016), Table 4 and Eqs. 18 and 19: the body pitch gives the direction of the stream",
     signature="mean forces change with the direction of the stream, most in a fast stream and least in hover",
-    confused_with=("balance_tilt", "airspeed_error", "tail_lift"),
+    confused_with=("balance_tilt", "airspeed_error", "tail_lift", "wing_pitch_zero", "zero_lift_angle"),
     vehicle=_vehicle,
 )

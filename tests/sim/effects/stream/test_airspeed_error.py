@@ -52,3 +52,12 @@ def test_it_is_the_airspeed_times_one_and_the_part(part: float) -> None:
 def test_without_a_stream_there_is_none() -> None:
     np.testing.assert_array_equal(driven(0.0, part=0.3), driven(0.0))
     np.testing.assert_array_equal(flown(0.0, part=0.3), flown(0.0))
+
+
+def test_a_condition_in_whole_numbers_is_a_condition() -> None:
+    whole = recording(12, 2, 1)
+    assert isinstance(whole.condition.airspeed, float)
+    np.testing.assert_array_equal(
+        flown(DELFLY, whole, airspeed_error__part=0.1),
+        flown(DELFLY, recording(12.0, 2.0, 1.0), airspeed_error__part=0.1),
+    )
