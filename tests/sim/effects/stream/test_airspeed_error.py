@@ -55,9 +55,12 @@ def test_without_a_stream_there_is_none() -> None:
 
 
 def test_a_condition_in_whole_numbers_is_a_condition() -> None:
-    whole = recording(12, 2, 1)
-    assert isinstance(whole.condition.airspeed, float)
-    np.testing.assert_array_equal(
-        flown(DELFLY, whole, airspeed_error__part=0.1),
-        flown(DELFLY, recording(12.0, 2.0, 1.0), airspeed_error__part=0.1),
+    model, recording = vehicle_model().with_effects("airspeed_error"), force_recording()
+    genome = np.array([[*own(vehicle_model()), 0.1]])
+    whole, same = (
+        replace(recording, condition=replace(recording.condition, airspeed=speed, flap_frequency=frequency))
+        for speed, frequency in ((2, 12), (2.0, 12.0))
     )
+    assert isinstance(whole.condition.airspeed, float)
+    found, expected = (model.observe(genome, one).channels for one in (whole, same))
+    np.testing.assert_array_equal(found, expected)
