@@ -16,7 +16,7 @@ EFFECT = fault_of_recordings(
     title="Scale error",
     size=(
         Parameter(
-            "part", "1", -0.1, 0.1, 0.01, "relative error of recorded lengths or forces; positive if they are too large"
+            "part", "1", -0.3, 0.3, 0.01, "relative error of recorded lengths or forces; positive if they are too large"
         ),
     ),
     law="p' = (1 + part) p          tracks\nF' = (1 + part) F          forces",
@@ -24,6 +24,6 @@ EFFECT = fault_of_recordings(
     "length; AIAA R-091A (2020): gain of a balance",
     signature="the whole wing is larger, at rest as in motion, or all forces are larger, by the same factor in every "
     "condition",
-    confused_with=("stroke_amplitude", "camera_shift", "lens_distortion"),
+    confused_with=("stroke_amplitude", "camera_shift", "lens_distortion", "added_mass_error"),
     observe=_observe,
 )
