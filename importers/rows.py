@@ -63,19 +63,21 @@ def _coded(rows: Iterable[Row], lines: Index, places: Sequence[int]) -> dict[int
     """
     most = min(len(lines) // 2, _MOST_VALUES)
     wanted = set(lines.tolist())
-    codes = {k: dict[str, int]() for k in range(len(places))}
-    found = {k: array("i") for k in codes}
+    live = [(k, place, dict[str, int](), array("i")) for k, place in enumerate(places)]
     for line, cells in rows:
         if line not in wanted:
             continue
-        for k in [*codes]:
-            text = cells[places[k]].strip()
-            code = codes[k].setdefault(text, len(codes[k]))
-            if code == len(codes[k]) - 1 and (len(codes[k]) > most or not _may_name(text)):
-                del codes[k], found[k]
-            else:
-                found[k].append(code)
-    return {k: ([*codes[k]], np.array(found[k], dtype=np.int64)) for k in codes}
+        ended = set[int]()
+        for k, place, codes, found in live:
+            text = cells[place].strip()
+            code = codes.get(text)
+            if code is None:
+                code = codes[text] = len(codes)
+                if len(codes) > most or not _may_name(text):
+                    ended.add(k)
+            found.append(code)
+        live = [one for one in live if one[0] not in ended] if ended else live
+    return {k: ([*codes], np.array(found, dtype=np.int64)) for k, _, codes, found in live}
 
 
 def _may_name(text: str) -> bool:

@@ -78,11 +78,16 @@ def _without_noise(times: Array, planar: Float[Array, "T M 2"], frequency: float
     if seen.sum(axis=0).min() < _ROWS_EACH * basis.shape[1]:
         return planar
     repeated, before, rest = np.full_like(values, np.nan), 0.0, 0.0
-    for k, there in enumerate(seen.T):
-        fitted = basis[there] @ np.linalg.lstsq(basis[there], values[there, k], rcond=None)[0]
-        repeated[there, k] = fitted
-        left = values[there, k] - fitted
-        before, rest = before + float(left[1:] @ left[:-1]), rest + float(left @ left)
+    alike: dict[bytes, list[int]] = {}  # columns with the same gaps, which are fitted at once
+    for k in range(values.shape[1]):
+        alike.setdefault(seen[:, k].tobytes(), []).append(k)
+    for chosen in alike.values():
+        there = np.flatnonzero(seen[:, chosen[0]])
+        measured = values[np.ix_(there, chosen)]
+        fitted = basis[there] @ np.linalg.lstsq(basis[there], measured, rcond=None)[0]
+        repeated[np.ix_(there, chosen)] = fitted
+        left = measured - fitted
+        before, rest = before + float((left[1:] * left[:-1]).sum()), rest + float((left**2).sum())
     return repeated.reshape(planar.shape) if before < _WHITE * rest else planar
 
 
