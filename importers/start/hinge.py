@@ -81,7 +81,7 @@ def _without_noise(times: Array, planar: Float[Array, "T M 2"], frequency: float
     alike: dict[bytes, list[int]] = {}  # columns with the same gaps, which are fitted at once
     for k in range(values.shape[1]):
         alike.setdefault(seen[:, k].tobytes(), []).append(k)
-    for chosen in alike.values():
+    for chosen in map(np.array, alike.values()):
         there = np.flatnonzero(seen[:, chosen[0]])
         measured = values[np.ix_(there, chosen)]
         fitted = basis[there] @ np.linalg.lstsq(basis[there], measured, rcond=None)[0]
