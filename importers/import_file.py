@@ -96,17 +96,18 @@ def inspect_bytes(raw: bytes, file: str, given: Given) -> Inspection:
         found.reader, found.raw = _read(raw, file, given)
         found.tracks = resolve(found.raw, found.reader, given, file)
     except DatasetError as error:
-        found.error = error
+        # Without its traceback, whose frames hold the file: it would stay in memory until garbage is collected.
+        found.error = DatasetError(error.errors, error.count)
     return found
 
 
 def _read(raw: bytes, file: str, given: Given) -> tuple[Reader, Raw]:
     source = open_source(raw, file)
     reader = recognise(source, given.format)
-    if reader.name != "plain" and (given.columns or given.rows):
-        option = "--columns" if given.columns else "--rows"
-        message = f"is for plain tables, but {file} is {reader.title}; leave it out, or add --format plain"
-        raise fail(option, given.columns or given.rows, message)
+    for option, value in (("--columns", given.columns), ("--rows", given.rows)):
+        if value is not None and reader.name != "plain":
+            message = f"is for plain tables, but {file} is {reader.title}; leave it out, or add --format plain"
+            raise fail(option, value, message)
     contents = reader.read(source, given)
     if source.encoding and not raw.rstrip(b"\0").endswith((b"\n", b"\r")):
         contents.remarks.append("the last line has no line end; if the file was cut off, its last number is not whole")

@@ -13,7 +13,8 @@ import numpy as np
 
 from wingfit.importers.options import ask
 from wingfit.records.array_types import Mask
-from wingfit.records.errors import Faults, nearest, shown
+from wingfit.records.errors import Faults, check_most, counted, fail, nearest, shown
+from wingfit.records.limits import MAX_MARKERS
 
 _UNLABELLED = re.compile(
     r"|\*\d*|(?:unlabell?ed|unidentified|uname)[\s_*\-]*\d*|new[\s_]\d{3,}|(?:.*:)?\*\d+", re.IGNORECASE
@@ -43,14 +44,19 @@ class Names:
         """
         faults, used = Faults(), np.zeros(len(self.markers), dtype=np.bool_)
         pairs = [*zip(self.markers, self.labels, strict=True)]
-        for part in filter(None, (piece.strip() for piece in text.split(","))):
+        parts = [*dict.fromkeys(filter(None, (piece.strip() for piece in text.split(","))))]
+        if not parts:
+            message = f"is {shown(text)!r}, which names no marker; write it like 'tip,root', or leave it out for all"
+            raise fail("--markers", text, message)
+        check_most("--markers", "has", len(parts), MAX_MARKERS, "names", "write several as one with *: 'right_*'")
+        for part in parts:
             found = [fnmatchcase(name, part) or fnmatchcase(label, part) for name, label in pairs]
             if not any(found):
                 message = f"no marker is called {shown(part)!r} ({nearest(part, self.markers)})"
                 faults.add("--markers", part, f"{message}; * stands for any letters: 'right_*'")
             used |= found
-        if not used.any() and not faults.faults:
-            faults.add("--markers", text, "names no marker; write it like 'tip,root'")
+            if faults.full:
+                break
         faults.raise_any()
         return self._only(used, "that --markers does not name")
 
@@ -64,7 +70,7 @@ class Names:
             keep=[self.keep[k] for k in chosen],
             labels=tuple(self.labels[k] for k in chosen),
             markers=tuple(self.markers[k] for k in chosen),
-            remarks=(*self.remarks, f"not imported: {len(left)} markers {why} ({listed(left)})"),
+            remarks=(*self.remarks, f"not imported: {counted(len(left), 'marker')} {why} ({listed(left)})"),
         )
 
 
@@ -81,9 +87,9 @@ def names_of(labels: Sequence[str], file: str, *, keep_unlabelled: bool) -> Name
         keep = [m for m in keep if not _UNLABELLED.fullmatch(labels[m].strip())]
         if len(keep) < len(labels):
             left = len(labels) - len(keep)
-            remarks.append(f"not imported: {left} unlabelled markers; --keep-unlabelled imports them")
+            remarks.append(f"not imported: {counted(left, 'unlabelled marker')}; to import all: --keep-unlabelled")
     if not keep:
-        message = f"all {len(labels)} markers are unlabelled; label them, or give --keep-unlabelled"
+        message = f"no marker of {len(labels)} has a label; label those of the wing, or give --keep-unlabelled"
         raise ask("keep_unlabelled", file, len(labels), message)
     chosen = [labels[m].strip() for m in keep]
     _check_repeated([label for label in chosen if not _UNLABELLED.fullmatch(label)], file)

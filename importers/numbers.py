@@ -18,7 +18,7 @@ from wingfit.importers.limits import MAX_TRACK_VALUES
 from wingfit.importers.options import Decimal, question
 from wingfit.importers.source import SEPARATORS, Row, Source
 from wingfit.records.array_types import Array, Float, Index, Int
-from wingfit.records.errors import Faults, check_most, fail, shown
+from wingfit.records.errors import Faults, check_most, counted, fail, shown
 from wingfit.records.limits import MAX_MARKERS, MAX_ROWS
 
 EMPTY = math.nan
@@ -126,7 +126,9 @@ def read_columns(
     faults.raise_any()
     if not lines:
         if left_out:
-            message = f"no row has these values ({left_out} rows were read); compare them with the cells of the file"
+            message = (
+                f"no row has these values ({counted(left_out, 'row')} read); compare them with the cells of the file"
+            )
             raise fail("--rows", 0, message)
         raise fail(source.file, 0, "has no frames: no line of numbers was read; export it again")
     return np.frombuffer(numbers, dtype=np.float64).reshape(len(lines), -1), np.array(lines, dtype=np.int64)
@@ -204,7 +206,7 @@ def _not_a_number(text: str, decimal: Decimal) -> str:
 
 def _ragged(cells: list[str], width: int) -> str:
     cause = "the line is cut off" if len(cells) < width else "decimal commas, or a separator too many"
-    return f"has {len(cells)} cells where the header has {width}; {cause}: export the file again"
+    return f"has {counted(len(cells), 'cell')} where the header has {width}; {cause}: export the file again"
 
 
 def whole_numbers(values: Float[Array, " T"], lines: Int[Index, " T"], name: str, source: Source) -> Int[Index, " T"]:

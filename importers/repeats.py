@@ -9,7 +9,7 @@ import numpy as np
 from wingfit.importers.options import REPEATED, Given, ask
 from wingfit.importers.raw import Raw
 from wingfit.records.array_types import Array, Index, Mask
-from wingfit.records.errors import DatasetError
+from wingfit.records.errors import DatasetError, counted
 
 _LISTED = 4
 
@@ -48,7 +48,8 @@ def without_repeats(raw: Raw, given: Given) -> Raw:
     if len(starts) == len(order):
         return raw
     positions = raw.positions[starts]
-    remark = f"{len(order) - len(starts)} rows repeat the time of the row before; the first row is kept"
+    repeats = f"in {counted(len(order) - len(starts), 'row')} the time is that of the row before"
+    remark = f"{repeats}; the first row is kept"
     if given.repeated == "gaps":
         differ = _differing(raw, order)
         seen: Mask = np.all(np.isfinite(raw.positions), axis=2)
@@ -57,8 +58,7 @@ def without_repeats(raw: Raw, given: Given) -> Raw:
             fill: Mask = seen[row] & ~np.all(np.isfinite(positions[group[row]]), axis=1)
             positions[group[row], fill] = raw.positions[row, fill]
         positions[differ] = np.nan
-        gaps = f"{int(differ.sum())} positions that differ there are gaps"
-        remark = f"{len(order) - len(starts)} rows repeat the time of the row before and are merged with it; {gaps}"
+        remark = f"{repeats}; they are merged, with {counted(int(differ.sum()), 'gap')} where they differ"
     return replace(
         raw,
         positions=positions,

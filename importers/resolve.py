@@ -16,7 +16,7 @@ from wingfit.importers.repeats import without_repeats
 from wingfit.importers.times import resolve_times
 from wingfit.importers.tracks import Gaps, ImportedTracks, Statement
 from wingfit.records.array_types import Array, Mask
-from wingfit.records.errors import DatasetError, Faults, fail, shown
+from wingfit.records.errors import DatasetError, Faults, counted, fail, shown
 from wingfit.records.limits import MIN_FRAMES
 
 _PIXELS = "px"
@@ -42,7 +42,7 @@ def resolve(raw: Raw, reader: Reader, given: Given, file: str) -> ImportedTracks
     if unit is None or timing is None:
         raise fail(file, None, "unit and rate are missing")
     names = names_of(raw.labels, file, keep_unlabelled=given.keep_unlabelled)
-    names = names.chosen(given.markers) if given.markers else names
+    names = names if given.markers is None else names.chosen(given.markers)
     invalid = None if raw.invalid is None else raw.invalid[:, names.keep]
     positions, gaps = _without_gaps(raw.positions[:, names.keep], invalid, given)
     numerator, denominator = UNITS[unit.value]
@@ -86,14 +86,16 @@ def _check_counts(raw: Raw, given: Given, file: str) -> None:
     """Raise DatasetError if there are too few frames, or not as many as the file states."""
     frames = len(raw.positions)
     if raw.frame_count and raw.frame_count.value != frames:
-        difference = f"has {frames} frames, but states {raw.frame_count.value} ({raw.frame_count.where})"
+        difference = f"has {counted(frames, 'frame')}, but states {raw.frame_count.value} ({raw.frame_count.where})"
         if not given.incomplete:
             cause = "it is cut off" if frames < raw.frame_count.value else "it was edited"
-            remedy = f"export it again, or give --incomplete to import the {frames} frames that are there"
+            remedy = "export it again, or give --incomplete to import what is there"
             raise ask("incomplete", file, frames, f"{difference}, so {cause}; {remedy}")
         raw.remarks.append(f"the file {difference}; these are imported")
     if frames < MIN_FRAMES:
-        raise fail(file, frames, f"has {frames} frames; at least {MIN_FRAMES} are needed: export a longer part")
+        raise fail(
+            file, frames, f"has {counted(frames, 'frame')}; at least {MIN_FRAMES} are needed: export a longer part"
+        )
 
 
 def _unit(raw: Raw, given: Given, file: str, faults: Faults) -> Statement | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Iterable, Sequence
 from itertools import combinations
 
@@ -15,6 +16,7 @@ _MOST_COLUMNS = 12  # that are tried
 _MOST_CHOICES = 500
 _MOST_REPEATS = 0.1  # of the rows of one recording
 _LONGEST = 80  # characters of a value
+_MOST_VALUES = 20_000  # different ones in a column
 
 
 def row_choices(
@@ -33,9 +35,8 @@ def row_choices(
     several such columns, those are taken for which it does for most rows, then those with the fewest values. None are
     returned if there are no such columns.
     """
-    texts = _texts(rows, lines, [header.index(name) for name in columns])
-    coded = [np.unique(text, return_inverse=True) for text in texts]
-    repeated = [k for k, (values, _) in enumerate(coded) if _may_name(values.tolist(), len(lines))][:_MOST_COLUMNS]
+    coded = _coded(rows, lines, [header.index(name) for name in columns])
+    repeated = [k for k, (values, _) in coded.items() if len(values) > 1][:_MOST_COLUMNS]
     for count in (1, 2):
         tried = []
         for chosen in combinations(repeated, count):
@@ -48,25 +49,40 @@ def row_choices(
             _, _, chosen, first = min(tried, key=lambda one: one[:3])
             before = [given] if given else []
             return [
-                ",".join([*before, *(f"{columns[k]}={texts[k][at]}" for k in chosen)]) for at in first[:_MOST_CHOICES]
+                ",".join([*before, *(f"{columns[k]}={coded[k][0][coded[k][1][at]]}" for k in chosen)])
+                for at in first[:_MOST_CHOICES]
             ]
     return []
 
 
-def _texts(rows: Iterable[Row], lines: Index, places: Sequence[int]) -> list[list[str]]:
-    """Return the cells in the columns ``places`` of the rows at ``lines``, by column."""
-    wanted, found = set(lines.tolist()), [list[str]() for _ in places]
+def _coded(rows: Iterable[Row], lines: Index, places: Sequence[int]) -> dict[int, tuple[list[str], Index]]:
+    """Return the different cells in columns of the rows at ``lines``, and for each row the index of its cell [T].
+
+    The keys are indices in ``places``, the columns. One is left out if its cells cannot name recordings in the option
+    ``rows``; all cells of a large file would not fit in memory.
+    """
+    most = min(len(lines) // 2, _MOST_VALUES)
+    wanted = set(lines.tolist())
+    live = [(k, place, dict[str, int](), array("i")) for k, place in enumerate(places)]
     for line, cells in rows:
-        if line in wanted:
-            for texts, place in zip(found, places, strict=True):
-                texts.append(cells[place].strip()[: _LONGEST + 1])
-    return found
+        if line not in wanted:
+            continue
+        ended = set[int]()
+        for k, place, codes, found in live:
+            text = cells[place].strip()
+            code = codes.get(text)
+            if code is None:
+                code = codes[text] = len(codes)
+                if len(codes) > most or not _may_name(text):
+                    ended.add(k)
+            found.append(code)
+        live = [one for one in live if one[0] not in ended] if ended else live
+    return {k: ([*codes], np.array(found, dtype=np.int64)) for k, _, codes, found in live}
 
 
-def _may_name(values: Sequence[str], count: int) -> bool:
-    """Return whether ``values``, the different ones of ``count`` rows, can name recordings in the option ``rows``."""
-    plain = all(value and "," not in value and "=" not in value and len(value) <= _LONGEST for value in values)
-    return plain and 1 < len(values) <= count / 2
+def _may_name(text: str) -> bool:
+    """Return whether a cell with ``text`` can name a recording in the option ``rows``."""
+    return bool(text) and "," not in text and "=" not in text and len(text) <= _LONGEST
 
 
 def _recordings(group: Index, order: Array | Index) -> tuple[Index, Index]:

@@ -20,6 +20,7 @@ MAX_CELLS = 20_000  # in a line: more than 1000 markers with all that programs w
 _CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f]")
 _LINE_END = re.compile(r"\r\n|\n|\r")
 _MAX_LINE = 2**20  # characters
+_MAX_BLANK = 2**20  # rows without a cell, one after another: a spreadsheet has as many rows in all
 
 Row = tuple[int, list[str]]
 
@@ -65,11 +66,13 @@ class Source:
 
     def rows(self, separator: str, start: int = 1) -> Iterator[Row]:
         """Yield (line from 1, cells) of each line from ``start`` on; DatasetError for text that is no table."""
-        reader, line = csv.reader(self._lines(), delimiter=separator, strict=True), 0
+        reader, line, blank = csv.reader(self._lines(), delimiter=separator, strict=True), 0, 0
         try:
             for row in reader:
                 line = reader.line_num
                 check_most(self.at(line), "has", len(row), MAX_CELLS, "cells", "export fewer markers")
+                blank = 0 if any(row) else blank + 1
+                check_most(self.at(line), "ends", blank, _MAX_BLANK, "empty lines", "remove them")
                 if line >= start:
                     yield line, row
         except csv.Error as error:

@@ -14,7 +14,7 @@ from wingfit.importers.raw import Raw, Stated
 from wingfit.importers.repeats import repeated
 from wingfit.importers.tracks import Statement
 from wingfit.records.array_types import Array, Float
-from wingfit.records.errors import DatasetError, Faults, fail
+from wingfit.records.errors import DatasetError, Faults, counted, fail
 
 _SAME_RATE = 1e-4  # relative: "119.88" and 119.8801 are the same rate, 119.88 and 120 are not
 _MOST_DECIMALS = 9
@@ -56,6 +56,7 @@ def resolve_times(raw: Raw, given: Given, file: str, faults: Faults) -> Timing |
         return None
     _check_times(printed, raw, file)
     steps = np.diff(printed)
+    _check_steps(steps, raw, file)
     uneven = steps.max() - steps.min() > 2 * _resolution(printed) + _DRIFT * float(np.abs(printed).max())
     spread = f"times are not evenly spaced: {1e3 * steps.min():.4g} to {1e3 * steps.max():.4g} ms apart"
     return Timing(printed, [stated], [spread] if uneven else [])
@@ -135,7 +136,8 @@ def _from_rate(raw: Raw, rate: Statement | None, given: Given, file: str, faults
         statements.append(Statement("first frame", str(start), "file", "numbers of frames"))
         missing = int(raw.frames[-1]) - start + 1 - len(raw.frames)
         if missing:
-            remarks.append(f"{missing} frames between the first and the last are not in the file; times count them")
+            between = f"{counted(missing, 'frame')} between the first and the last"
+            remarks.append(f"the file lacks {between}, which the times count")
     return Timing(numbers / hertz, statements, remarks)
 
 
@@ -256,6 +258,16 @@ def _check_times(times: Array, raw: Raw, file: str, unit: str = " s") -> None:
             raise repeated(raw, times, file, unit)
         message += ", or give those of one recording: --rows COLUMN=VALUE"
         raise _time_fault(raw, at, file, float(times[at]), message)
+
+
+def _check_steps(steps: Array, raw: Raw, file: str) -> None:
+    """Raise DatasetError if no camera takes frames as fast, or as slowly, as times that are ``steps`` (s) apart."""
+    least = float(steps.min())
+    if least * (1 + _SAME_RATE) >= 1 / MAX_RATE and least <= (1 + _SAME_RATE) / MIN_RATE:
+        return
+    limits = f"must lie in [{1 / MAX_RATE:g}, {1 / MIN_RATE:g}] s"
+    message = f"{raw.row_word} are {least:.4g} s apart, which {limits}; check the unit of the times (--time-unit)"
+    raise fail(f"{file}, {raw.times_where}", least, message)
 
 
 def _choices(values: Sequence[str]) -> str:

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from wingfit.records.limits import MAX_ERRORS
 
 _SHOWN = 80
+_COMPARED = 1000  # names, of which at most _COMPARED_LENGTH characters: comparing more takes seconds
+_COMPARED_LENGTH = 200
 
 
 @dataclass(frozen=True)
@@ -96,6 +98,11 @@ def check_most(where: str, what: str, found: float, most: float, unit: str, reme
         raise fail(where, number, f"{what} {number} {unit}; at most {most:.9g} {unit} are read: {remedy}".lstrip())
 
 
+def counted(count: int, noun: str) -> str:
+    """Return ``count`` with its ``noun``, of which the plural ends in s: "1 frame", "2 frames"."""
+    return f"{count} {noun}{'' if count == 1 else 's'}"
+
+
 def shown(value: object) -> str | None:
     """Return ``value`` as text of at most 80 characters for a message ("list of 3" for a container); None for None."""
     if value is None:
@@ -109,7 +116,7 @@ def shown(value: object) -> str | None:
 def nearest(name: str, known: Iterable[str]) -> str:
     """Return a hint about the unknown ``name``: the most similar of the ``known`` names, or a list of these."""
     names = list(known)
-    close = difflib.get_close_matches(name, names, 1, 0.6)
+    close = difflib.get_close_matches(name[:_COMPARED_LENGTH], names[:_COMPARED], 1, 0.6)
     if close:
         return f"did you mean {close[0]!r}?"
     listed = ", ".join(names[:12]) + (", ..." if len(names) > 12 else "")

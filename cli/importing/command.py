@@ -115,7 +115,7 @@ def import_(
     for tracks in found:
         results.show(tracks)
     if started is not None and dataset is not None:
-        start.show(started, dataset)
+        start.show(started, dataset, found[0].frame)
     elif not targets:
         note("nothing was written; to write the tracks, add: --output FILE.csv; to write a dataset: --dataset FOLDER")
 
@@ -139,7 +139,7 @@ def _targets(files: list[Path], output: Path | None, *, force: bool) -> list[Pat
         if target.exists() and file.exists() and target.samefile(file):
             raise typer.BadParameter(f"{target} is the file that is read; name another", param_hint="--output")
         if target.exists() and not force:
-            message = f"{target} exists; name another file or folder, or overwrite it with --force"
+            message = f"{str(target)!r} exists; name another file or folder, or overwrite it with --force"
             raise typer.BadParameter(message, param_hint="--output")
     return targets
 

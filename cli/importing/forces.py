@@ -83,7 +83,9 @@ def _check_target(path: Path | None, source: Path, *, force: bool) -> None:
     if source.exists() and path.samefile(source):
         raise typer.BadParameter(f"{path} is the file that is read; name another", param_hint="--output")
     if not force:
-        raise typer.BadParameter(f"{path} exists; name another, or overwrite it with --force", param_hint="--output")
+        raise typer.BadParameter(
+            f"{str(path)!r} exists; name another, or overwrite it with --force", param_hint="--output"
+        )
 
 
 def _show(found: ImportedForces) -> None:

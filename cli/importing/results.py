@@ -11,6 +11,7 @@ from wingfit.client.transport import WingfitError
 from wingfit.importers import ImportedTracks
 from wingfit.importers.summary import MarkerSummary, summaries
 from wingfit.importers.summary import as_json as tracks_json
+from wingfit.records.errors import counted
 
 NOT_GIVEN = "of the file; how they lie in the wing is not stated"
 
@@ -35,7 +36,7 @@ def as_json(tracks: ImportedTracks, written: Path | None) -> dict[str, Any]:
 
 def show(tracks: ImportedTracks) -> None:
     """Print the facts and who stated them, the gaps, and a row for each marker."""
-    frames = f"{len(tracks.markers)} markers, {len(tracks.times)} frames, {number(tracks.duration_s)} s"
+    frames = f"{counted(len(tracks.markers), 'marker')}, {len(tracks.times)} frames, {number(tracks.duration_s)} s"
     say(f"{tracks.file}: {tracks.title}, {frames}, {number(tracks.rate_hz)} frames per second")
     facts = [[one.fact, one.value, f"{one.by}: {one.where}"] for one in tracks.statements]
     if tracks.frame == "file":

@@ -19,10 +19,14 @@ if TYPE_CHECKING:
 
 def check(dataset: Path | None, output: Path | None, flap_frequency_hz: float | None, airspeed: float | None) -> None:
     """Raise a usage error for options that do not go together, or have impossible values."""
-    for option, value, most in (("--flap-frequency-hz", flap_frequency_hz, 1e4), ("--airspeed-m-s", airspeed, 1e3)):
+    from wingfit.importers.start import MAX_FREQUENCY, MIN_FREQUENCY
+
+    for option, value, least, most in (
+        ("--flap-frequency-hz", flap_frequency_hz, MIN_FREQUENCY, MAX_FREQUENCY),
+        ("--airspeed-m-s", airspeed, 0.0, 1e3),
+    ):
         if value is not None and dataset is None:
             raise typer.BadParameter("is for --dataset FOLDER; add it", param_hint=option)
-        least = 0.0 if option == "--airspeed-m-s" else 1e-3
         if value is not None and not least <= value <= most:
             raise typer.BadParameter(f"is {value:g}; it must lie in [{least:g}, {most:g}]", param_hint=option)
     if dataset is None:
@@ -30,7 +34,7 @@ def check(dataset: Path | None, output: Path | None, flap_frequency_hz: float | 
     if output is not None:
         raise typer.BadParameter("the dataset has the tables in it; leave out --output", param_hint="--dataset")
     if dataset.exists():
-        raise typer.BadParameter(f"{dataset} exists; name a new folder", param_hint="--dataset")
+        raise typer.BadParameter(f"{str(dataset)!r} exists; name a new folder", param_hint="--dataset")
 
 
 def started(
@@ -66,13 +70,15 @@ def started(
     return start
 
 
-def show(start: Start, dataset: Path) -> None:
-    """Print what was described, from where, and what to do next."""
+def show(start: Start, dataset: Path, frame: str) -> None:
+    """Print what was described, from where, and what to do next; ``frame``: of the positions."""
     what = "the wing, described from its tracks" if start.kind == "wing" else "series of positions, without a wing"
     say(f"dataset written to {dataset}: {what}")
     table(["described", "value", "source"], [[one.what, one.value, one.source] for one in start.facts])
     if start.kind == "wing":
         note(f"replace what is assumed by what you know, in {dataset / 'dataset.yaml'} (docs/formats.md)")
+    elif frame == "body":
+        note("the positions are in body axes; a wing is described only in its own: x aft, y out along it, z up")
     else:
         note("for a dataset of a wing, say where the axes of the file point: --axes 'x aft, y out, z up'")
     folder = shlex.quote(str(dataset))

@@ -143,7 +143,7 @@ def _check_new(path: Path | None, option: str, source: Path, *, force: bool) -> 
     if source.exists() and path.samefile(source):
         raise typer.BadParameter(f"{path} is the file that is read; name another", param_hint=option)
     if not force:
-        raise typer.BadParameter(f"{path} exists; name another, or overwrite it with --force", param_hint=option)
+        raise typer.BadParameter(f"{str(path)!r} exists; name another, or overwrite it with --force", param_hint=option)
 
 
 def _refused(title: str, error: ValueError) -> WingfitError:
@@ -190,5 +190,5 @@ def _show(found: WingTemplate) -> None:
     ]
     table(["measure", ">value", "unit", "of one wing"], rows)
     if found.markers:
-        say(f"{len(found.markers)} markers")
+        say(f"{len(found.markers)} marker{'' if len(found.markers) == 1 else 's'}")
     remarks(f"{found.file}: {one}" for one in found.remarks)

@@ -16,7 +16,7 @@ from wingfit.importers.raw import Raw
 from wingfit.importers.times import resolve_times
 from wingfit.records.array_types import Array, Float
 from wingfit.records.dataset import ForceAxis
-from wingfit.records.errors import DatasetError, Faults, fail, shown
+from wingfit.records.errors import DatasetError, Faults, counted, fail, shown
 from wingfit.records.files.table import write_table
 from wingfit.records.limits import MIN_FRAMES, UNEVEN_STEPS
 
@@ -134,7 +134,9 @@ def resolve(channels: Channels, options: ForceOptions, file: str) -> ImportedFor
     """Return the forces in newtons and body axes; DatasetError lists missing and contradicting options."""
     count = len(channels.lines)
     if count < MIN_FRAMES:
-        raise fail(file, count, f"has {count} samples; at least {MIN_FRAMES} are needed: export a longer part")
+        raise fail(
+            file, count, f"has {counted(count, 'sample')}; at least {MIN_FRAMES} are needed: export a longer part"
+        )
     faults, facts = Faults(), list[ForceFact]()
     factors = _units(channels, options, file, facts, faults)
     given = Given(rate_hz=options.rate_hz, time_unit=options.time_unit)

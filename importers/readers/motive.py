@@ -16,7 +16,7 @@ from wingfit.importers.numbers import Layout, count_of, positive_of, read_sample
 from wingfit.importers.options import Given
 from wingfit.importers.raw import Raw, Reader, Stated, raw_of
 from wingfit.importers.source import Source, separator_of
-from wingfit.records.errors import fail
+from wingfit.records.errors import counted, fail
 
 _RATES = ("Export Frame Rate", "Capture Frame Rate")
 _DATA = 2  # columns before the data
@@ -89,7 +89,7 @@ def _layout(source: Source, line: int, separator: str) -> tuple[Layout, list[str
         listed = ", ".join(others) or "nothing"
         message = f"there are no columns of type Marker, only {listed}; export with Markers switched on"
         raise fail(source.file, listed, message)
-    left = [f"not imported: {count} columns of {name}" for name, count in others.items() if count]
+    left = [f"not imported: {counted(count, 'column')} of {name}" for name, count in others.items() if count]
     shown = [f"{_cell(names, k)} {axis}" if k >= _DATA else axis for k, axis in enumerate(axes)]
     return Layout(labels, columns, shown, time=1, frame=0), left
 

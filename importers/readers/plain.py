@@ -9,7 +9,7 @@ column is what: "time=t; tip=a,b,c; root=d,e,f". A column of times is called tim
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 from wingfit.importers.numbers import Layout, number_of, read_samples, separated_by
@@ -17,17 +17,16 @@ from wingfit.importers.options import Given, ask, pairs_of, unit_of
 from wingfit.importers.raw import Raw, Reader, Stated, raw_of
 from wingfit.importers.rows import row_choices
 from wingfit.importers.source import Source, separator_of
-from wingfit.records.errors import DatasetError, Faults, fail, nearest
+from wingfit.records.errors import DatasetError, Faults, counted, fail, nearest
 
 _UNIT = r"(?:[\s_.]*[\[(]?(?P<unit>mm|cm|um|µm|m|in|ft|px)[\])]?)?"
-_PATTERNS = tuple(
-    re.compile(pattern, re.IGNORECASE)
-    for pattern in (
-        rf"(?P<marker>.+?)[\s_.:\-]*_xyz_(?P<axis>[123]){_UNIT}",
-        rf"(?P<marker>.*?[^\s_.:\-])?[\s_.:\-]*(?P<axis>[xyz]){_UNIT}",
-        rf"(?P<axis>[xyz])[\s_.:\-]+(?P<marker>.+?){_UNIT}",
-    )
-)
+# How the name of a column of a marker ends, or starts, with its axis; each is found in a time linear in the length of
+# the name, as the names of an upload are not trusted.
+_NUMBERED = re.compile(rf"_xyz_(?P<axis>[123]){_UNIT}\Z", re.IGNORECASE)
+_AT_END = re.compile(rf"(?P<axis>[xyz]){_UNIT}\Z", re.IGNORECASE)
+_AT_START = re.compile(r"(?P<axis>[xyz])[\s_.:\-]+", re.IGNORECASE)
+_END = re.compile(rf"{_UNIT}\Z", re.IGNORECASE)
+_BETWEEN = re.compile(r"[\s_.:\-]")  # characters between a marker and its axis
 _TIME = re.compile(
     r"(?:time|times|timestamp|t|seconds|sec)(?:[\s_.]*[\[(]?(?P<unit>seconds|sec|s|ms|us|µs)[\])]?)?", re.IGNORECASE
 )
@@ -65,9 +64,9 @@ def read(source: Source, given: Given) -> Raw:
     separator = separator_of(source.head[line - 1])
     header = source.cells(line, separator)
     _check_header(source, header, line, separator)
-    found = _by_option(source, header, given.columns) if given.columns else _by_name(source, header, line)
+    found = _by_name(source, header, line) if given.columns is None else _by_option(source, header, given.columns)
     layout = Layout([*found.markers], [*found.markers.values()], header, time=found.time, frame=found.frame)
-    keep = _row_filter(source, header, line, given.rows) if given.rows else None
+    keep = None if given.rows is None else _row_filter(source, header, line, given.rows)
     raw = raw_of(layout, read_samples(source.rows(separator, line + 1), layout, source, given.decimal, keep))
     if found.time is not None:
         raw.times_where = f"column {header[found.time]!r}"
@@ -120,12 +119,9 @@ def _by_name(source: Source, header: list[str], line: int) -> _Found:
     for index, name in enumerate(header):
         if _special(found, name, index, source.at(line, index + 1), faults):
             continue
-        for kind, pattern in enumerate(_PATTERNS):
-            match = pattern.fullmatch(name) if len(name) <= _LONGEST else None
-            if match:
-                axis = match["axis"].lower().translate(str.maketrans("123", "xyz"))
-                key = (kind, match["marker"] or ONLY_MARKER, (match["unit"] or "").lower())
-                groups.setdefault(key, {}).setdefault(axis, index)
+        for kind, (marker, axis, unit) in _meanings(name) if len(name) <= _LONGEST else ():
+            axis = axis.lower().translate(str.maketrans("123", "xyz"))
+            groups.setdefault((kind, marker, (unit or "").lower()), {}).setdefault(axis, index)
     _complete(found, groups, header, source.at(line), faults)
     faults.raise_any()
     if not found.markers:
@@ -137,6 +133,26 @@ def _by_name(source: Source, header: list[str], line: int) -> _Found:
         raise fail(source.at(line), listed, message)
     found.units.discard("")
     return found
+
+
+def _meanings(name: str) -> Iterator[tuple[int, tuple[str, str, str | None]]]:
+    """Yield what a column called ``name`` may be: the kind of name, and marker, axis and unit."""
+    if (found := _NUMBERED.search(name, 1)) and (marker := _stripped(name[: found.start()])):
+        yield 0, (marker, found["axis"], found["unit"])
+    if found := _AT_END.search(name):
+        yield 1, (_stripped(name[: found.start()]) or ONLY_MARKER, found["axis"], found["unit"])
+    if (found := _AT_START.match(name)) and found.end() < len(name):
+        end = _END.search(name, found.end() + 1)
+        assert end is not None  # noqa: S101  # it matches the end of any text
+        yield 2, (name[found.end() : end.start()], found["axis"], end["unit"])
+
+
+def _stripped(name: str) -> str:
+    """Return ``name`` without the characters at its end that separate marker and axis."""
+    end = len(name)
+    while end and _BETWEEN.match(name[end - 1]):
+        end -= 1
+    return name[:end]
 
 
 def _special(found: _Found, name: str, index: int, where: str, faults: Faults) -> bool:
@@ -169,8 +185,11 @@ def _complete(
             found.units.add(known := unit_of(unit) or "" if unit else "")
             found.unit_examples.setdefault(known, label)
             used |= places
-    for (kind, label, unit), columns in groups.items():
-        others = [more for key, more in groups.items() if key[:2] == (kind, label) and key[2] != unit]
+    alike: dict[tuple[int, str], list[dict[str, int]]] = {}
+    for (kind, label, _unit), columns in groups.items():
+        alike.setdefault((kind, label), []).append(columns)
+    for (kind, label, _unit), columns in groups.items():
+        others = [more for more in alike[kind, label] if more is not columns]
         together = set(columns).union(*others)
         if len(columns) < 3 and together == set("xyz") and not used & set(columns.values()):
             used |= {at for group in (columns, *others) for at in group.values()}
@@ -200,23 +219,26 @@ def _no_marker(
 def _by_option(source: Source, header: list[str], text: str) -> _Found:
     """Return the use of the columns as the option ``--columns`` states it."""
     found, faults = _Found(), Faults()
+    place = {name: index for index, name in enumerate(header) if name}
     for label, value in pairs_of("--columns", text, ";", _EXAMPLE):
         names = [name.strip() for name in value.split(",")]
         for name in names:
-            if name not in header:
+            if name not in place and not faults.full:
                 faults.add("--columns", name, f"{source.file} has no column {name!r}; {nearest(name, header)}")
         if label in ("time", "frame") and len(names) == 1:
-            column = header.index(names[0]) if names[0] in header else None
+            column = place.get(names[0])
             found.time = column if label == "time" else found.time
             found.frame = column if label == "frame" else found.frame
             match = _TIME.fullmatch(names[0]) if label == "time" else None
             found.time_unit = _TIME_UNITS[match["unit"].lower()] if match and match["unit"] else found.time_unit
         elif len(names) != 3:
-            faults.add("--columns", value, f"{label!r} has {len(names)} columns; give three, those of x, y and z")
+            faults.add(
+                "--columns", value, f"{label!r} has {counted(len(names), 'column')}; give three, those of x, y and z"
+            )
         elif label in found.markers:
             faults.add("--columns", label, f"names {label!r} twice; keep one")
-        elif all(name in header for name in names):
-            found.markers[label] = (header.index(names[0]), header.index(names[1]), header.index(names[2]))
+        elif all(name in place for name in names):
+            found.markers[label] = (place[names[0]], place[names[1]], place[names[2]])
     faults.raise_any()
     if not found.markers:
         raise fail("--columns", text, f"names no marker; write it like {_EXAMPLE!r}")

@@ -12,7 +12,7 @@ from wingfit.importers.numbers import Layout, count_of, positive_of, read_sample
 from wingfit.importers.options import Given
 from wingfit.importers.raw import Raw, Reader, Stated, raw_of
 from wingfit.importers.source import Source, separator_of
-from wingfit.records.errors import fail
+from wingfit.records.errors import counted, fail
 
 _FIXED = 2  # columns before the first marker
 
@@ -68,7 +68,9 @@ def _layout(source: Source, separator: str, stated: dict[str, str]) -> Layout:
     if stated.get("NumMarkers"):
         count = count_of(stated["NumMarkers"], source.at(3, "NumMarkers"))
         if count != len(labels):
-            message = f"names {len(labels)} markers, but NumMarkers in line 3 is {count}; export the file again"
+            message = (
+                f"names {counted(len(labels), 'marker')}, but NumMarkers in line 3 is {count}; export the file again"
+            )
             raise fail(source.at(4), len(labels), message)
     columns = [(_FIXED + 3 * m, _FIXED + 3 * m + 1, _FIXED + 3 * m + 2) for m in range(len(labels))]
     names = ["Frame#", "Time", *(f"{label} {axis}" for label in labels for axis in "XYZ")]

@@ -20,13 +20,14 @@ from wingfit.importers.start.frequency import flap_frequency
 from wingfit.importers.start.wing import Fact, describe_wing, refuse_two_wings
 from wingfit.importers.tracks import DECIMALS, ImportedTracks
 from wingfit.records.array_types import Array, Float
-from wingfit.records.errors import DatasetError, Faults, fail
+from wingfit.records.errors import DatasetError, Faults, counted, fail
 from wingfit.records.limits import MAX_QUANTITIES
 
 ASSUMED: Mapping[str, str | float] = MappingProxyType(
     {"rig": "wind_tunnel", "phase_lag_deg": 0, "pressure_mbar": 1013.25, "temperature_c": 20}
 )
 """Conditions of a recording, in the units of dataset.yaml, that tracks do not show; there is no rear rod."""
+MIN_FREQUENCY, MAX_FREQUENCY = 0.01, 1000.0  # Hz, those of dataset.yaml
 _HEAD = """\
 # First description, from the tracks alone. Replace what is marked ASSUMED by what you know (docs/formats.md).
 format_version: 1
@@ -136,7 +137,8 @@ def _series(channels: Sequence[str], left_out: Sequence[str], name: str) -> tupl
     lines += [f"  - {{name: {json.dumps(channel)}, unit: m}}" for channel in channels]
     facts = [Fact("channels", f"{len(channels)}: x, y and z of the markers", "tracks")]
     if left_out:
-        facts.append(Fact("left out", f"{len(left_out)} coordinates that never change: {listed(left_out)}", "tracks"))
+        many = f"{counted(len(left_out), 'coordinate')} that never change{'s' if len(left_out) == 1 else ''}"
+        facts.append(Fact("left out", f"{many}: {listed(left_out)}", "tracks"))
     return "\n".join([*lines, ""]), tuple(facts)
 
 
@@ -151,7 +153,7 @@ def _columns(csv: str, channels: Sequence[str]) -> str:
 
 def _frequency(tracks: ImportedTracks, given: Conditions) -> float:
     rate = given.flap_frequency_hz or flap_frequency(tracks.times, tracks.positions)
-    if rate is None:
+    if rate is None or not MIN_FREQUENCY <= rate <= MAX_FREQUENCY:
         message = "shows no clear flap frequency; add it: --flap-frequency-hz 5"
         raise DatasetError([question("flap_frequency_hz", tracks.file, None, message)])
     return rate

@@ -21,6 +21,7 @@ PARTS = (
     (0.66, 1.0),
 )  # of a recording that are tried: a bird flaps, then glides
 LEAST_ROWS = 24
+LEAST_MOTION = 1e-9  # m: markers that move less are at rest
 LEAST_SEEN = 0.65  # of the rows, of a column that is used; its gaps are bridged by straight lines
 AS_GOOD = 0.9  # of the variance that the best frequency explains: multiples of a beat explain as much as the beat
 # Of what both harmonics explain, by the first: with less, a higher frequency, which is not tried, explains it.
@@ -83,7 +84,7 @@ def _without_drift(since: Array, values: Array) -> Array:
 
 def _of_part(since: Array, values: Array) -> float | None:
     """Return the frequency (Hz) of ``values`` [T, C] at the times ``since`` (s); None if none is clear."""
-    if len(since) < LEAST_ROWS or not np.ptp(values, axis=0).max() > 0:
+    if len(since) < LEAST_ROWS or not np.ptp(values, axis=0).max() > LEAST_MOTION:
         return None
     since = since - since[0]
     values = _without_drift(since, values)

@@ -8,11 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from wingfit.importers.options import question
+from wingfit.importers.start.correlation import correlated_rows
 from wingfit.importers.start.harmonics import columns
 from wingfit.importers.start.hinge import Hinge, find_hinge
 from wingfit.importers.tracks import ImportedTracks
-from wingfit.records.array_types import Array
-from wingfit.records.errors import DatasetError, fail
+from wingfit.records.array_types import Array, Float
+from wingfit.records.errors import DatasetError, counted, fail
+from wingfit.records.limits import IMPLAUSIBLE_SPANS
 
 _OTHER_SIDE = 0.25  # of the outermost distance: markers so far on the other side belong to another wing
 _MARGIN = 0.08  # of the span, by which the assumed planform is larger than the area of the markers
@@ -25,6 +27,10 @@ _FIXED = 0.2  # of that flapping: with more drift, the circles are not about a f
 _LEAST_ROWS = 8
 _THINNEST = 1e-5  # m
 _AREAL_DENSITY = 1.0  # kg/m^2
+# Of a wing, m: positions are rounded to 1e-6 m, and dataset.yaml has limits (docs/formats.md).
+_LEAST_SIZE, _LARGEST_SIZE = 1e-4, 10.0
+_LARGEST_CHORD, _THICKEST, _FARTHEST = 5.0, 0.5, 9.0
+_NOISY = 0.05  # of the flap angle: a standard error at which the user measures it
 
 
 @dataclass(frozen=True)
@@ -52,11 +58,13 @@ def describe_wing(tracks: ImportedTracks, frequency: float, name: str) -> FirstW
     that do not flap at ``frequency``, that drift away with a body, or that are on a wing to which y points in.
     """
     places = tracks.positions
+    extent = float(np.max(np.nanmax(places, axis=(0, 1)) - np.nanmin(places, axis=(0, 1))))
+    _check_size(tracks, "extent", min(extent, _LARGEST_SIZE), _LARGEST_SIZE)  # a larger one may be that of a flight
     drift, flapping = _drift(tracks, frequency)
     _refuse_drift(tracks, drift, flapping)
     found = find_hinge(tracks, frequency, drifts=drift > _FIXED * flapping)
     _refuse_other_side(tracks, found)
-    hinge, source = found.place, found.source
+    hinge = found.place
     arms = places[..., 1] - hinge[0] + 1j * (places[..., 2] - hinge[1])
     flap = _flap(tracks.times, arms, frequency)
     if flap.explained < _LEAST_FLAP:
@@ -70,11 +78,14 @@ def describe_wing(tracks: ImportedTracks, frequency: float, name: str) -> FirstW
     rest = np.column_stack([np.nanmean(places[..., 0], axis=0), level.real + hinge[0], level.imag + hinge[1]])
     amplitude = float(np.degrees(flap.amplitude))
     root, tip = min(float(hinge[0]), float(rest[:, 1].min())), float(rest[:, 1].max())
+    _check_size(tracks, "span", tip - root, _LARGEST_SIZE)
     margin = _MARGIN * (tip - root)
     tip += margin
     front, back = float(rest[:, 0].min()) - margin, float(rest[:, 0].max()) + margin
-    chord = max(back - front, _LEAST_CHORD * (tip - root))
+    chord = max(back - front, _LEAST_CHORD * (tip - root), _LEAST_SIZE)
+    _check_size(tracks, "chord", chord, _LARGEST_CHORD)
     front = 0.5 * (front + back - chord)
+    _check_place(tracks, rest, hinge, tip - root)
     nearest = tracks.markers[int(np.argmin(np.abs(level)))]
     lines = [
         "wing:",
@@ -83,7 +94,7 @@ def describe_wing(tracks: ImportedTracks, frequency: float, name: str) -> FirstW
         "  stations:                       # ASSUMED: the rectangle around the markers; replace it by your planform",
         *(
             f"    - {{y_m: {y:.6f}, leading_edge_m: {front:.6f}, chord_m: {chord:.6f}, "
-            f"thickness_m: {max(part * (tip - root), _THINNEST):.6f}}}"
+            f"thickness_m: {min(max(part * (tip - root), _THINNEST), _THICKEST):.6f}}}"
             for y, part in zip((root, tip), _THICKNESS, strict=True)
         ),
         f"  materials: {{foam_density_kg_m3: 0, skin_areal_density_kg_m2: {_AREAL_DENSITY:g}}}   # ASSUMED",
@@ -93,20 +104,70 @@ def describe_wing(tracks: ImportedTracks, frequency: float, name: str) -> FirstW
             for marker, (x, y, z) in zip(tracks.markers, rest.tolist(), strict=True)
         ),
         f"  reference_markers: [{json.dumps(nearest)}]",
-        f"  hinge: {{y_m: {hinge[0]:.6f}, z_m: {hinge[1]:.6f}}}   # {source}",
+        f"  hinge: {{y_m: {hinge[0]:.6f}, z_m: {hinge[1]:.6f}}}   # {found.source}",
         f"  drive: {{kind: fourier, mean_deg: 0, cosine_deg: [0], sine_deg: [{amplitude:.2f}]}}",
         "",
     ]
-    where = f"y {1e3 * hinge[0]:.0f} mm, z {1e3 * hinge[1]:.0f} mm"
-    size = f"{1e3 * (tip - root):.0f} mm x {1e3 * chord:.0f} mm, flat"
+    digits = max(0, 2 - int(np.log10(1e3 * (tip - root))))
+    where = f"y {_millimetres(hinge[0], digits)}, z {_millimetres(hinge[1], digits)}"
+    where += "" if found.error is None else f", standard error {_at_least(1e3 * found.error)} mm"
+    size = f"{_millimetres(tip - root, digits)} x {_millimetres(chord, digits)}, flat"
     facts = (
-        Fact("rest positions", f"{len(rest)} markers, in their mean pose", "tracks"),
-        Fact("flap angle", f"{amplitude:.1f} deg to both sides of the mean", found.angles),
-        Fact("hinge", where, source),
+        Fact("rest positions", f"{counted(len(rest), 'marker')}, in the mean pose", "tracks"),
+        _flap_fact(flap, found, float(np.nanmean(np.abs(level)))),
+        Fact("hinge", where, found.source),
         Fact("planform", size, "assumed: a rectangle around the markers"),
         Fact("mass", f"{_AREAL_DENSITY:g} kg/m^2", "assumed"),
     )
     return FirstWing("\n".join(lines), facts)
+
+
+def _flap_fact(flap: _Flap, hinge: Hinge, arm: float) -> Fact:
+    """Return the flap angle with its standard error; ``arm``: mean distance of the markers from the hinge, m."""
+    value = f"{np.degrees(flap.amplitude):.1f} deg to both sides of the mean"
+    source = f"tracks: a cosine explains {100 * flap.explained:.0f} % of its variance"
+    if hinge.error is None:
+        return Fact("flap angle", value, f"{source}, about the assumed hinge: not exact, larger if it is farther out")
+    # A hinge that is farther in makes the arms longer, and the angle smaller in proportion.
+    error = float(np.hypot(flap.error, flap.amplitude * hinge.error / arm))
+    noisy = "; measure it, or export a longer part" if error > _NOISY * flap.amplitude else ""
+    return Fact("flap angle", f"{value}, standard error {_at_least(np.degrees(error))} deg", source + noisy)
+
+
+def _at_least(error: float) -> str:
+    """Return a standard error as text; 0.01 mm or deg is the least that recordings can have."""
+    return f"{max(float(error), 0.01):.2g}"
+
+
+def _millimetres(metres: float, digits: int) -> str:
+    return f"{round(1e3 * float(metres), digits) + 0.0:.{digits}f} mm"
+
+
+def _check_size(tracks: ImportedTracks, what: str, size: float, most: float) -> None:
+    """Raise DatasetError if a wing with these markers has an implausible ``size`` (m): ``what``."""
+    if _LEAST_SIZE <= size <= most:
+        return
+    message = (
+        f"has the markers of a wing with {what} {size:.3g} m; it must be {_LEAST_SIZE:g} to {most:g} m: check the unit "
+        "of positions (--unit), or choose the markers of one wing: --markers"
+    )
+    raise fail(tracks.file, f"{size:.3g} m", message)
+
+
+def _check_place(tracks: ImportedTracks, rest: Float[Array, "M 3"], hinge: Array, span: float) -> None:
+    """Raise DatasetError if a marker at ``rest`` (m) is farther from ``hinge`` or origin than a dataset allows."""
+    for what, away, most in (
+        ("the origin", rest, _FARTHEST),
+        (f"the hinge of a wing with {span:.3g} m span", rest - [0.0, *hinge], IMPLAUSIBLE_SPANS * span),
+    ):
+        farthest = int(np.argmax(np.abs(away).max(axis=1)))
+        distance = float(np.abs(away[farthest]).max())
+        if distance > most:
+            message = (
+                f"has the marker {tracks.markers[farthest]} {distance:.3g} m from {what}; at most {most:.3g} m are "
+                "read: subtract the position of the root of the wing from all, or check their unit (--unit)"
+            )
+            raise fail(tracks.file, f"{distance:.3g} m", message)
 
 
 def refuse_two_wings(tracks: ImportedTracks) -> None:
@@ -168,10 +229,14 @@ def _refuse_other_side(tracks: ImportedTracks, hinge: Hinge) -> None:
 
 @dataclass(frozen=True)
 class _Flap:
-    """The flap angle about its mean, ``angle`` [T], and its ``amplitude``, rad; ``explained``: of its variance."""
+    """The flap angle about its mean, ``angle`` [T], and its ``amplitude`` with its standard ``error``, rad.
+
+    ``explained``: of its variance, by the harmonic.
+    """
 
     angle: Array
     amplitude: float
+    error: float
     explained: float
 
 
@@ -189,4 +254,6 @@ def _flap(times: Array, arms: Array, frequency: float) -> _Flap:
     flap = basis[:, 1:] @ found[1:]
     moved, left = common[seen] - common[seen].mean(), common[seen] - found[0] - flap[seen]
     still = float(np.ptp(common[seen])) < _STILL
-    return _Flap(flap, float(np.hypot(found[1], found[2])), 0.0 if still else 1 - float(left @ left / (moved @ moved)))
+    error = float(np.sqrt(2 * correlated_rows(left[:, None]) * left @ left) / len(left)) if not still else 0.0
+    explained = 0.0 if still else 1 - float(left @ left / (moved @ moved))
+    return _Flap(flap, float(np.hypot(found[1], found[2])), error, explained)

@@ -14,7 +14,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from wingfit.service.auth.authentication import API
 from wingfit.service.http.problems import ProblemError, response
 
-UPLOAD_PATHS = frozenset({"/v1/datasets", "/v1/imports", "/v1/imports/table"})
+UPLOAD_PATHS = frozenset({"/v1/datasets", "/v1/imports", "/v1/imports/table", "/v1/imports/description"})
 UPLOAD_LIMIT = 64 * 2**20
 # Boundaries and headers of the multipart form around the file.
 FORM_OVERHEAD = 64 * 2**10

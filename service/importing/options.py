@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Awaitable, Callable
 from typing import Annotated, Literal
 
 from fastapi import Form, Request
@@ -13,11 +14,39 @@ from wingfit.service.http.problems import error_item, invalid
 
 LONGEST = 50_000
 FILE = "file"
-FLAP_FREQUENCY = "flap_frequency_hz"  # of the description alone
+
+
+def only_fields(*more: str) -> Callable[[Request], Awaitable[None]]:
+    """Return a dependency that refuses what would be ignored in a form of the fields ``more``, options and a file.
+
+    Its 422 lists fields that do not exist, because a misspelt one would be ignored, fields that stand twice, of which
+    one would be ignored, and empty ones, which would count as not given.
+    """
+    known = (FILE, *Given.names(), *more)
+
+    async def check(request: Request) -> None:
+        form = await request.form()
+        faults, seen = [], set[str]()
+        for name, value in form.multi_items():
+            where, text = f"body.{name[:200]}", value if isinstance(value, str) else None
+            if name not in known:
+                faults.append(error_item(where, text, f"unknown field; known: {', '.join(known)}"))
+            elif name in seen:
+                faults.append(error_item(where, text, "stands more than once in the form; send it once"))
+            elif text == "":
+                faults.append(error_item(where, text, "is empty; give a value, or leave the field out"))
+            seen.add(name)
+        if faults:
+            raise invalid("the form has fields that cannot be used", faults)
+        if FILE not in seen or isinstance(form[FILE], str):
+            found = request.headers.get("Content-Type", "none")[:200]
+            message = f"no file was sent (content type: {found}); send it as the field 'file' of multipart/form-data"
+            raise invalid("the request has no file", [error_item(f"body.{FILE}", None, message)])
+
+    return check
 
 
 async def options(
-    request: Request,
     unit: Annotated[
         Literal["m", "cm", "mm", "um", "in", "ft"] | None,
         Form(description="unit of positions, if the file does not state it"),
@@ -64,21 +93,8 @@ async def options(
         Form(description="rows with the same time: merge them, with gaps where they differ; or keep the first"),
     ] = None,
 ) -> Given:
-    """Return the options of the form; a 422 lists fields that do not exist, because a misspelt one would be ignored."""
-    known = (*Given.names(), *([FLAP_FREQUENCY] if request.url.path.endswith("/description") else []))
-    form = await request.form()
-    faults = [
-        error_item(f"body.{name[:200]}", value if isinstance(value, str) else None, f"unknown field; {_known(known)}")
-        for name, value in form.multi_items()
-        if name != FILE and name not in known
-    ]
-    if faults:
-        raise invalid("the form has unknown fields", faults)
+    """Return the options of the form."""
     return Given(
         unit, rate_hz, axes, format, time_unit, decimal, columns, rows, keep_zeros, keep_unlabelled, incomplete,
         markers, repeated,
     )  # fmt: skip
-
-
-def _known(names: tuple[str, ...]) -> str:
-    return f"known: {', '.join((FILE, *names))}"

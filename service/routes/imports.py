@@ -13,7 +13,7 @@ from wingfit.client.importing.answers import FirstDescription, TrackImport
 from wingfit.importers import Given, inspect_bytes
 from wingfit.importers.inspection import Inspection
 from wingfit.importers.markers import allowed
-from wingfit.importers.start import Conditions, start_dataset
+from wingfit.importers.start import MAX_FREQUENCY, MIN_FREQUENCY, Conditions, start_dataset
 from wingfit.records.errors import DatasetError
 from wingfit.service.container import READ_SLOT
 from wingfit.service.http import csv_text
@@ -21,10 +21,11 @@ from wingfit.service.http import responses as http
 from wingfit.service.http.problems import ProblemError, error_item, invalid
 from wingfit.service.http.request_limits import UPLOAD_LIMIT
 from wingfit.service.importing import views
-from wingfit.service.importing.options import options
+from wingfit.service.importing.options import only_fields, options
 
 router = APIRouter(prefix="/v1/imports", tags=["imports"])
 Options = Annotated[Given, Depends(options)]
+_FIELDS, _AND_FREQUENCY = Depends(only_fields()), Depends(only_fields("flap_frequency_hz"))
 _EXAMPLE = "time_s,tip_x_m,tip_y_m,tip_z_m\n0.0,0.02,0.48,0.003\n0.005,,,\n"
 
 
@@ -33,7 +34,7 @@ _EXAMPLE = "time_s,tip_x_m,tip_y_m,tip_z_m\n0.0,0.02,0.48,0.003\n0.005,,,\n"
     response_model=TrackImport,
     responses=http.errors(400, 413),
     summary="Read a file of a tracking system",
-    dependencies=[READ_SLOT],
+    dependencies=[_FIELDS, READ_SLOT],
 )
 def import_file(file: UploadFile, given: Options) -> Response:
     """Return what was understood of the file, the options that it does not state, and a preview of the tracks."""
@@ -54,7 +55,7 @@ def import_file(file: UploadFile, given: Options) -> Response:
         **http.errors(400, 413),
     },
     summary="Convert a file of a tracking system",
-    dependencies=[READ_SLOT],
+    dependencies=[_FIELDS, READ_SLOT],
 )
 def import_table(file: UploadFile, given: Options) -> Response:
     """Return the tracks as the table of a recording: times in seconds, positions in metres, empty cells in gaps."""
@@ -71,13 +72,14 @@ def import_table(file: UploadFile, given: Options) -> Response:
     response_model=FirstDescription,
     responses=http.errors(400, 413),
     summary="Describe a wing by its tracks",
-    dependencies=[READ_SLOT],
+    dependencies=[_AND_FREQUENCY, READ_SLOT],
 )
 def import_description(
     file: UploadFile,
     given: Options,
     flap_frequency_hz: Annotated[
-        float | None, Form(gt=0, le=1e4, description="flap frequency, if the tracks do not show it clearly")
+        float | None,
+        Form(ge=MIN_FREQUENCY, le=MAX_FREQUENCY, description="flap frequency, if the tracks do not show it clearly"),
     ] = None,
 ) -> Response:
     """Return a first description of the rig by its tracks alone, for dataset.yaml; what is assumed is marked in it.
@@ -91,7 +93,7 @@ def import_description(
     try:
         start = start_dataset([found.tracks], name, Conditions(flap_frequency_hz, rows=given.rows))
     except DatasetError as error:
-        found.error = error
+        found.error = DatasetError(error.errors, error.count)  # without its traceback, which holds the tracks
         raise _refused(found) from None
     return Response(to_json(views.description(start)), media_type=http.JSON)
 

@@ -95,7 +95,7 @@ def test_a_file_that_is_cut_off_is_refused() -> None:
         (b"", "empty (0 bytes)"),
         (b"\n\n", "empty"),
         (b"time_s,a_x_m,a_y_m,a_z_m\n", "no frames"),
-        (b"time_s,a_x_m,a_y_m,a_z_m\n0,1,2,3\n", "has 1 frames; at least 8"),
+        (b"time_s,a_x_m,a_y_m,a_z_m\n0,1,2,3\n", "has 1 frame; at least 8"),
         (b"0,1,2,3\n1,1,2,3\n", "numbers instead of names"),
         (b"hello world\nthis is text\n", "has one column"),
         (b"time_s,a_x_m,a_x_m,a_z_m\n0,1,2,3\n", "is also column 2"),

@@ -26,7 +26,7 @@ REPEATED = rows(0, 0.1, 0.2, 0.2, 0.3, 0.4, 0.4, 0.5, 0.6, 0.7, other=(3,))
 def test_only_the_named_markers_are_imported() -> None:
     found = read(rows(*np.arange(10) / 10), markers="t*")
     assert found.markers == ("tip",)
-    assert any("1 markers that --markers does not name (root)" in one for one in found.remarks)
+    assert any("1 marker that --markers does not name (root)" in one for one in found.remarks)
     assert read(rows(*np.arange(10) / 10), markers="root,tip").markers == ("tip", "root")
     assert "no marker is called 'tpi' (did you mean 'tip'?)" in refused(rows(*np.arange(10) / 10), markers="tpi,root")
 
@@ -49,7 +49,7 @@ def test_rows_with_the_same_time_are_merged_with_gaps_where_they_differ() -> Non
     assert np.isfinite(found.positions[4]).all(), "equal positions are one"
     first = read(REPEATED, repeated="first")
     assert first.positions[2, 0].tolist() == [1, 2, 3]
-    assert any("2 rows repeat" in one for one in first.remarks)
+    assert any("in 2 rows the time is that of the row before" in one for one in first.remarks)
 
 
 def test_a_position_that_only_one_of_the_rows_has_is_kept() -> None:

@@ -111,3 +111,12 @@ def test_a_whole_dataset_is_written(wingfit: Wingfit, tmp_path: Path) -> None:
     assert "series of positions, without a wing" in out
     assert "--axes" in err
     assert package.load_dataset(tmp_path / "positions").kind == "series"
+    body = ("--axes", "x nose, y right, z down", "--dataset", tmp_path / "body", "--markers", "tip")
+    code, out, err = wingfit(tmp_path / "a.csv", *body)
+    assert (code, "--axes" in err) == (0, False), "they are given"
+    assert "in body axes" in err
+    assert "1 marker, 120 frames" in out
+    code, _, err = wingfit(tmp_path / "a.csv", "--markers", "")
+    assert (code, "'', which names no marker" in err) == (1, True)
+    code, _, err = wingfit(*words[:-1], tmp_path / "body")
+    assert (code, "body' exists; name" in " ".join(err.replace("│", " ").split()).replace(" ' ", "' ")) == (2, True)

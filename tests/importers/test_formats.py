@@ -101,7 +101,7 @@ def test_rows_of_a_plain_table_can_be_chosen() -> None:
     content = "run,time_s,tip_x_m,tip_y_m,tip_z_m\n" + "\n".join(rows).replace(",a,", ",1,").replace(",b,", ",2,")
     assert "line 12, column 'time_s': 0 s follows 0.9 s" in refused(content)
     assert read(content, rows="run=b").positions[0, 0].tolist() == [2.0, 0.0, 0.5]
-    assert "--rows: no row has these values (20 rows were read)" in refused(content, rows="run=c")
+    assert "--rows: no row has these values (20 rows read)" in refused(content, rows="run=c")
     assert "no column 'walk'" in refused(content, rows="walk=c")
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import re
 import socket
 from collections.abc import Iterator
 from contextlib import ExitStack
@@ -35,6 +36,7 @@ REFUSALS = [case for case in refusals(0) if case.format != SLOW]
 SEVERAL = "run,side,clock,u,v,w\n" + "".join(
     f"{run},{side},{t},{t},2,3\n" for run in ("a", "b") for side in ("left", "right") for t in range(10)
 )
+AXES = "x aft, y out, z up"
 SEVERAL_OPTIONS = {"columns": "time=clock; tip=u,v,w", "unit": "mm", "time_unit": "ms"}
 
 
@@ -274,6 +276,75 @@ def test_a_wing_is_described_by_its_tracks(api: Api) -> None:
     assert "--markers in,mid,tip" in two.errors[0].message
     assert problem(post(api, "tip_x,tip_y,tip_z\n" + "1,2,3\n" * 9, path)).questions[0].option == "unit"
     assert "unknown field" in problem(post(api, wing_table(), flap_frequency_hz=3)).errors[0].message
+
+
+def form(*fields: tuple[str, str | bytes, str | None]) -> dict[str, Any]:
+    """A form of (name, value, name of the file), in this order."""
+    parts = [
+        f'--x\r\nContent-Disposition: form-data; name="{name}"{f"; filename={file!r}" if file else ""}\r\n\r\n'.encode()
+        + (value.encode() if isinstance(value, str) else value)
+        + b"\r\n"
+        for name, value, file in fields
+    ]
+    return {"content": b"".join(parts) + b"--x--\r\n", "headers": {"Content-Type": "multipart/form-data; boundary=x"}}
+
+
+FILE = ("file", text_writers.trc(flapping()), "trial.trc")
+PATHS = ("/v1/imports", "/v1/imports/table", "/v1/imports/description")
+
+
+@pytest.mark.parametrize("path", PATHS)
+@pytest.mark.parametrize(
+    ("fields", "where", "words"),
+    [
+        ([FILE, FILE], "body.file", "more than once"),
+        ([FILE, ("axes", AXES, None), ("axes", "x aft, y in, z up", None)], "body.axes", "more than once"),
+        ([FILE, ("markers", "", None)], "body.markers", "is empty"),
+        ([FILE, ("axes", "", None)], "body.axes", "is empty"),
+        ([FILE, ("axes[]", AXES, None)], "body.axes[]", "unknown field"),
+        ([("unit", "m", None)], "body.file", "send it as the field 'file' of multipart/form-data"),
+        ([("file", "time_s,a_x_m", None)], "body.file", "send it as the field 'file' of multipart/form-data"),
+    ],
+)
+def test_forms_of_which_a_part_would_be_ignored_are_refused(
+    api: Api, path: str, fields: Any, where: str, words: str
+) -> None:
+    refused = problem(api.client.post(path, **form(*fields)))
+    assert [one.where for one in refused.errors] == [where]
+    assert words in refused.errors[0].message
+
+
+def test_a_body_that_is_no_form_is_refused_with_the_form_to_send(api: Api) -> None:
+    for path in PATHS:
+        refused = problem(api.client.post(path, json={"file": "a.csv"}))
+        assert "content type: application/json" in refused.errors[0].message
+
+
+def test_the_flap_frequency_is_a_field_of_the_description_alone(api: Api) -> None:
+    for path in PATHS[:2]:
+        assert "unknown field" in problem(post(api, wing_table(), path, flap_frequency_hz=3)).errors[0].message
+    for hertz in ("0", "1001", "nan"):
+        refused = problem(post(api, wing_table(), PATHS[2], axes=AXES, flap_frequency_hz=hertz))
+        assert refused.errors[0].where == "body.flap_frequency_hz"
+
+
+def test_files_larger_than_other_bodies_are_read_by_every_route(api: Api) -> None:
+    large = wing_table(rate=4000.0, seconds=4.5)
+    assert len(large) > request_limits.BODY_LIMIT
+    for path in PATHS:
+        assert post(api, large, path, axes=AXES).status_code == 200, path
+
+
+@pytest.mark.parametrize(
+    "name", ["../../x.csv", "a\nb.csv", "%0d%0aSet-Cookie: a.csv", "ü\u202ee.csv", "..", "x\0.csv"]
+)
+def test_names_of_files_stay_names(api: Api, name: str) -> None:
+    table = post(api, wing_table(), "/v1/imports/table", name)
+    assert table.status_code == 200
+    assert re.fullmatch(r'attachment; filename="[A-Za-z0-9._-]+\.csv"', table.headers["Content-Disposition"])
+    assert "Set-Cookie" not in table.headers
+    found = post(api, wing_table(), "/v1/imports/description", name, axes=AXES).json()
+    assert re.match(r'wing:\n  name: "[A-Za-z0-9._-]+"\n', found["yaml"])
 
 
 def test_the_client_asks_for_a_description(api: Api, tmp_path: Path) -> None:
