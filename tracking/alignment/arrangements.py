@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
+from scipy.stats import norm
 
 from wingfit.records.array_types import Array, Index, Mask
 from wingfit.tracking.alignment.candidates import Candidate, Layout, candidates, gate_of, start_of, with_all
@@ -20,10 +23,21 @@ DISTINCT = 12.0
 _NEAR = 2.0  # candidates whose misfit is up to as many times the best one's are fitted
 _MOST = 3  # candidates that are fitted
 _CUT = 9.0 * np.log1p(100.0 / 9.0)  # cost of a sample that fits no marker, 10 standard deviations away
-_LARGEST_SCATTER = 0.01  # of rest positions, spans
 _ROUNDS = 4  # of relabelling
 _FIRST_STEPS, _STEPS = 8, 40
 LEAST_MARKERS = 4
+
+
+class Costs(NamedTuple):
+    """Minus twice a log-likelihood: of the ``frames`` [T], and of the described ``rest`` positions."""
+
+    frames: Array
+    rest: float
+
+    @property
+    def total(self) -> float:
+        """Of everything."""
+        return float(self.frames.sum()) + self.rest
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,27 +49,30 @@ class Arrangement:
         doubtful: [K] whether another marker is nearly as near.
         away: [K, M] RMS distance of each track from each marker, m.
         fit: of the matched tracks, in the order of ``marker``'s tracks.
-        samples: [K] count of the frames that show each track.
+        seen: [T, K] whether each frame shows each track.
     """
 
     marker: Index
     doubtful: Mask
     away: Array
     fit: Fit
-    samples: Index
+    seen: Mask
 
-    def cost(self, described: Array, noise: float, memory: float, span: float, every: Mask) -> float:
+    def costs(self, described: Array, noise: float, memory: float, every: Mask) -> Costs:
         """Minus twice the log-likelihood of the tracks in ``every`` [K] under a common ``noise`` (m) and ``memory``.
 
         A sample costs at most what one that fits no marker costs. So do all those of tracks that are no marker.
         """
         squares = (self.fit.residuals**2).sum(axis=-1) / noise**2
-        data = np.nansum(np.minimum(9 * np.log1p(squares / 9), _CUT))
-        data += _CUT * self.samples[every & (self.marker < 0)].sum()
+        data = np.nansum(np.minimum(9 * np.log1p(squares / 9), _CUT), axis=1)
+        data += _CUT * self.seen[:, every & (self.marker < 0)].sum(axis=1)
+        jitter = self.fit.jitter_costs * self.fit.memory
         moves = self.fit.rest - described[self.marker[self.marker >= 0]]
         scatter = self.fit.scatter
-        rest = (moves**2).sum() / scatter**2 + 6 * len(moves) * np.log(scatter / (_LARGEST_SCATTER * span))
-        return float(data / memory + rest)
+        # Integrated over frame and rest positions (Laplace): else a scatter that goes to zero would win.
+        rest = (moves**2).sum() / scatter**2 + 2 * moves.size * np.log(scatter)
+        rest -= np.linalg.slogdet(self.fit.covariance)[1]
+        return Costs((data + jitter) / memory, float(rest))
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,7 +143,7 @@ class Search:
                 return None
             here = self._fitted(here, marker, rest, _STEPS)
         doubtful = doubtful | self._exchangeable(marker, here, named)
-        return Arrangement(marker, doubtful, away, here, np.isfinite(self.tracks[..., 0]).sum(axis=0))
+        return Arrangement(marker, doubtful, away, here, np.isfinite(self.tracks[..., 0]))
 
 
 def _with_given(marker: Index, given: Index) -> Index:
@@ -137,10 +154,34 @@ def _with_given(marker: Index, given: Index) -> Index:
     return found
 
 
-def ranked(found: Sequence[Arrangement], described: Array, span: float) -> list[tuple[float, Arrangement]]:
-    """Return the arrangements, best first, each with by how much its cost exceeds the best one's."""
+def ranked(found: Sequence[Arrangement], described: Array) -> list[tuple[float, Arrangement]]:
+    """Return the arrangements, best first, each with by how much its cost exceeds the best one's.
+
+    For the other side than the best one's, the excess is at most what its scatter between the frames allows.
+    """
     noise, memory = min(one.fit.noise for one in found), max(one.fit.memory for one in found)
     every = np.any([one.marker >= 0 for one in found], axis=0)
-    costs = [one.cost(described, noise, memory, span, every) for one in found]
-    order = np.argsort(costs)
-    return [(costs[k] - costs[order[0]], found[k]) for k in order]
+    costs = [one.costs(described, noise, memory, every) for one in found]
+    best = min(range(len(found)), key=lambda k: costs[k].total)
+    right = found[best].fit.right
+    excess = [
+        one.total - costs[best].total if arranged.fit.right == right else sure_of(costs[best], one, memory)
+        for one, arranged in zip(costs, found, strict=True)
+    ]
+    return [(excess[k], found[k]) for k in np.argsort(excess, kind="stable")]
+
+
+def sure_of(less: Costs, more: Costs, memory: float) -> float:
+    """Return twice the ln of the odds for the model with ``less`` cost than another one, with ``more``.
+
+    Both models are wrong in detail, and errors that markers of a frame share, or neighbouring frames, let the
+    difference of their log-likelihoods vary more than the likelihoods say. So the odds are at most those that the
+    difference is positive, if its standard error is that of a sum over frames (Vuong 1989, with the covariances of
+    Newey and West 1987 up to two ``memory``).
+    """
+    each = more.frames - less.frames
+    total, e = more.total - less.total, each - each.mean()
+    lags = min(math.ceil(2 * memory), len(e) - 1)
+    shared = sum((1 - k / (lags + 1)) * float(e[:-k] @ e[k:]) for k in range(1, lags + 1))
+    error = math.sqrt(max(float(e @ e), float(e @ e) + 2 * shared))
+    return min(total, -2 * float(norm.logsf(total / max(error, 1e-300))))

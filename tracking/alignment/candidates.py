@@ -222,10 +222,12 @@ def start_of(candidate: Candidate, layout: Layout, motion: RigidMotion, right: b
         1.0,
         1.0,
         1.0,
+        0.0,
         np.inf,
         0.0,
         empty,
         empty,
+        np.zeros(0),
     )
 
 

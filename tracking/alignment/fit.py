@@ -16,6 +16,7 @@ from scipy.spatial.transform import Rotation
 from wingfit.records.array_types import Array, Mask
 from wingfit.records.blas_threads import one_blas_thread
 from wingfit.tracking.alignment.pose_error import Frames, PoseError
+from wingfit.tracking.alignment.shake import jitter_costs, jitter_precision, shake_of
 from wingfit.tracking.alignment.wing_model import BENDING, STATES, SWEEPING, TWISTING, Strip, positions
 
 # Prior standard deviations of the states, rad: none for the flap angle; bending, twist and sweep are hardly restricted.
@@ -48,6 +49,7 @@ _FRAME = 7  # small rotation about y and z, a shift, and the line: rotation abou
 _STEPS = 40
 _STATE_STEPS = 10
 _SETTLED = 3e-5  # change of the pose in radians and in spans at which the iteration ends
+_SETTLED_SCATTER = 0.02  # change of the scatter, of itself
 _FIRST_SCATTER = 5e-3
 _LEAST_REST, _MOST_REST = 2e-4, 1e-2  # standard deviation of described rest positions, spans
 _CAUCHY = 3.0
@@ -70,10 +72,13 @@ class Fit:
         noise: standard deviation of one coordinate of one sample, model errors included, m.
         scatter: standard deviation of the described rest positions, m.
         memory: number of consecutive samples that count as one, because noise and model errors are correlated in time.
+        shake: standard deviation of each coordinate of the part of the jitter that all tracks share anew in each frame,
+            as of cameras that shake, m.
         cost: minus twice the log-likelihood (up to a constant of the tracks), with robust weights.
         flap_error: standard error of the mean flap angle, rad.
         covariance: [7 + 3 M, 7 + 3 M] of the rotation about y and z (rad), the shift, line and rest positions (m).
         residuals: [T, M, 3] measured minus modelled position in wing axes, m; NaN where not seen.
+        jitter_costs: [T] minus twice the log-likelihood of each frame's jitter.
     """
 
     turn: Array
@@ -86,10 +91,12 @@ class Fit:
     noise: float
     scatter: float
     memory: float
+    shake: float
     cost: float
     flap_error: float
     covariance: Array
     residuals: Array
+    jitter_costs: Array
 
     @property
     def right(self) -> bool:
@@ -108,8 +115,8 @@ def fit(strip: Strip, described: Array, tracks: Array, frames: Frames, start: Fi
     ``described`` are hinge coordinates; the tracks are in the order of the markers. ``start`` is where to begin.
     """
     seen: Mask = np.asarray(np.isfinite(tracks).all(axis=-1))
-    steady = frames.shaking.precision(start.turn, start.hinge)
-    problem = _Problem(strip, described, tracks, seen, frames.mean, frames.slow, steady)
+    pose = frames.shaking.covariance(start.turn, start.hinge)
+    problem = _Problem(strip, described, tracks, seen, frames.mean, frames.slow, pose)
     if len(start.drift) != frames.slow.shape[1]:
         start = replace(start, drift=np.zeros((frames.slow.shape[1], _JITTER)))
     here = replace(start, residuals=problem.residuals(start), scatter=_FIRST_SCATTER * strip.span)
@@ -123,12 +130,15 @@ def fit(strip: Strip, described: Array, tracks: Array, frames: Frames, start: Fi
                 break
             damping *= 10
         turned, shifted = np.abs(there.turn - here.turn).max(), np.abs(there.hinge - here.hinge).max()
-        damping = max(damping / 10, 1e-9)
+        damping, before = max(damping / 10, 1e-9), here.scatter
         here = problem.scaled(replace(there, covariance=covariance, flap_error=flap_error))
-        if max(float(turned), float(shifted) / strip.span) < _SETTLED:
+        settled = abs(here.scatter - before) < _SETTLED_SCATTER * before
+        if settled and max(float(turned), float(shifted) / strip.span) < _SETTLED:
             break
-    covariance, flap_error = _Step(problem, here).errors()
-    return replace(here, covariance=covariance, flap_error=flap_error)
+    step = _Step(problem, here)
+    covariance, flap_error = step.errors()
+    costs = jitter_costs(here.jitter, problem.jitter_precision(here), step.A, here.memory)
+    return replace(here, covariance=covariance, flap_error=flap_error, jitter_costs=costs)
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,7 +151,7 @@ class _Problem:
     seen: Mask
     mean: Array
     slow: Array
-    steady: Array
+    pose: Array
 
     @property
     def drift_precision(self) -> Array:
@@ -149,6 +159,10 @@ class _Problem:
         shift = _SLOW_SHIFT * self.strip.span
         one = np.array([_SLOW_TURN, _SLOW_TURN, shift, shift, shift]) ** -2.0
         return np.tile(one, (self.slow.shape[1], 1))
+
+    def jitter_precision(self, at: Fit) -> Array:
+        """Of the jitter [5, 5] of each frame."""
+        return jitter_precision(self.pose, at.shake, at.memory)
 
     def residuals(self, at: Fit) -> Array:
         model = positions(self.strip, at.rest, at.states, at.line)[0]
@@ -163,28 +177,31 @@ class _Problem:
         means = self.mean @ at.states[:, _ELASTIC]
         means = means @ _MEAN_PRECISION @ means
         line = (((at.line - self.strip.line) / (_LINE_PRIOR * self.strip.chord)) ** 2).sum()
-        jitter = np.einsum("ta,ab,tb->", at.jitter, self.steady, at.jitter)
+        jitter = np.einsum("ta,ab,tb->", at.jitter, self.jitter_precision(at), at.jitter)
         drift = (at.drift**2 * self.drift_precision).sum()
         return replace(at, cost=float(data / at.memory + moves + states + jitter + means + line + drift))
 
     def scaled(self, at: Fit) -> Fit:
-        """Return ``at`` with new estimates of noise, its memory and scatter, and its cost under these."""
+        """Return ``at`` with new estimates of noise, its memory, shake and scatter, and its cost under these."""
         squares = (at.residuals[self.seen] ** 2).sum(axis=-1)
         # The median of |r|^2 of three normal coordinates is 2.366 times their variance.
         noise = max(float(np.sqrt(np.median(squares) / 2.366)), _LEAST_NOISE * self.strip.span)
-        at = replace(at, noise=noise, memory=_memory(at.residuals, noise))
+        memory = _memory(at.residuals, noise)
+        shake = shake_of(at.residuals, self.seen, at.rest[:, 0], at.jitter, self.pose, noise, memory)
+        at = replace(at, noise=noise, memory=memory, shake=shake)
         moves = ((at.rest - self.described) ** 2).ravel()
         scatter = at.scatter
-        if at.covariance.size:  # expectation maximisation
-            scatter = float(np.sqrt(np.mean(moves + np.diag(at.covariance)[_FRAME:])))
+        if at.covariance.size:  # MacKay (1992): squares over the number of coordinates that the tracks determine
+            known = len(moves) - np.diag(at.covariance)[_FRAME:].sum() / scatter**2
+            scatter = float(np.sqrt(moves.sum() / max(known, 1.0)))
         scatter = min(max(scatter, _LEAST_REST * self.strip.span), _MOST_REST * self.strip.span)
         return self.weighed(replace(at, scatter=scatter))
 
 
-def _local_prior(memory: float, steady: Array) -> Array:
-    """Precision [_LOCAL, _LOCAL] of the states and the jitter of a frame; ``steady`` [5, 5]: that of the jitter."""
+def _local_prior(memory: float, jitter: Array) -> Array:
+    """Precision [_LOCAL, _LOCAL] of the states and the jitter of a frame; ``jitter`` [5, 5]: that of the jitter."""
     found = np.diag(np.concatenate([_STATE_PRIOR**-2.0 / memory, np.zeros(_JITTER)]))
-    found[STATES:, STATES:] = steady
+    found[STATES:, STATES:] = jitter
     return found
 
 
@@ -231,7 +248,7 @@ class _Step:
         by_frame = np.concatenate([by_pose(q), by_line], axis=-1)
         by_state = np.concatenate([by_state, by_frame[..., :_JITTER]], axis=-1)
         J, free = weight[..., None, None] * by_state, _FRAME + 3 * M
-        prior = _local_prior(at.memory, problem.steady)
+        prior = _local_prior(at.memory, problem.jitter_precision(at))
         seen_only, pull = np.einsum("tmia,tmib->tab", J, by_state), np.einsum("tmia,tmi->ta", J, r)
         self.A, self.a = seen_only + prior, pull - np.hstack([at.states, at.jitter]) @ prior
         slow, drifts = problem.slow, slice(free + _MEANS, free + _MEANS + at.drift.size)
@@ -312,7 +329,8 @@ def states_of(
     drift = slow @ at.drift
     local = np.zeros((len(tracks), _LOCAL))
     local[:, 0] = flap
-    prior = _local_prior(at.memory, shaking.precision(at.turn, at.hinge))
+    pose = shaking.covariance(at.turn, at.hinge)
+    prior = _local_prior(at.memory, jitter_precision(pose, at.shake, at.memory))
     seen: Mask = np.asarray(np.isfinite(tracks).all(axis=-1))
     measured = at.coordinates(np.nan_to_num(tracks))
     for _ in range(_STATE_STEPS):

@@ -27,8 +27,8 @@ class PoseError:
     middle: Array
     memory: float = 1.0
 
-    def precision(self, turn: Array, hinge: Array) -> Array:
-        """Return the inverse covariance [5, 5] of rotations about y and z of the wing (rad) and shifts of its hinge, m.
+    def covariance(self, turn: Array, hinge: Array) -> Array:
+        """Return the covariance [5, 5] of rotations about y and z of the wing (rad) and shifts of its hinge, m.
 
         ``turn`` [3, 3]: to the wing's axes; ``hinge`` [3]: its position, m. A rotation about x is a flap angle.
         """
@@ -40,7 +40,7 @@ class PoseError:
         errors = np.zeros((6, 6))
         errors[:3, :3], errors[3:, 3:] = self.rotation, self.position**2 * np.eye(3)
         covariance = to_pose @ errors @ to_pose.T + _STEADY**2 * np.eye(5)
-        return np.asarray(np.linalg.inv(covariance) / self.memory)
+        return np.asarray(self.memory * covariance)
 
 
 STEADY = PoseError(np.zeros((3, 3)), 0.0, np.zeros(3))

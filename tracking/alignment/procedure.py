@@ -20,6 +20,7 @@ from wingfit.tracking.alignment.report import Frame, aligned
 from wingfit.tracking.alignment.request import LEAST_TRACKS, Known, Tracks, checked
 from wingfit.tracking.alignment.result import AlignedTracks, DroppedTrack
 from wingfit.tracking.alignment.rigid_motion import RigidMotion
+from wingfit.tracking.alignment.shake import body_part
 from wingfit.tracking.alignment.wing_model import Strip, positions, strip_of
 
 _CHUNK = 2000
@@ -89,13 +90,13 @@ def _arranged(
         )
         raise fail(tracks.file, None, f"{message} one at a time, and after a fit fewer than {LEAST_MARKERS}; {remedy}")
     best, evidence = _best(every, described, named, tracks, wing)
-    _check_stated(best, excluded, described, wing, known)
+    _check_stated(best, excluded, described, known)
     return best, evidence if known.side is None and up is None else None
 
 
-def _check_stated(best: Arrangement, excluded: list[Arrangement], described: Array, wing: Wing, known: Known) -> None:
+def _check_stated(best: Arrangement, excluded: list[Arrangement], described: Array, known: Known) -> None:
     """Raise DatasetError if what the user said about the side contradicts the tracks."""
-    costs = {id(one): cost for cost, one in ranked([best, *excluded], described, wing.span)}
+    costs = {id(one): cost for cost, one in ranked([best, *excluded], described)}
     worse = max((costs[id(best)] - costs[id(one)] for one in excluded), default=0.0)
     if worse > DISTINCT:
         stated, value = ("--side", known.side) if known.side else ("--up", known.up)
@@ -119,7 +120,7 @@ def _best(
     every: list[Arrangement], described: Array, named: Index, tracks: Tracks, wing: Wing
 ) -> tuple[Arrangement, float]:
     """Return the best arrangement, and the evidence for its side; DatasetError if another one is nearly as good."""
-    order = ranked(every, described, wing.span)
+    order = ranked(every, described)
     agreeing = [pair for pair in order if _agrees(pair[1], named)]
     if agreeing and agreeing[0][0] < DISTINCT and (named >= 0).sum() >= 3:
         order = [(cost - agreeing[0][0], one) for cost, one in agreeing]  # names decide between what fits equally
@@ -217,11 +218,14 @@ def _finished(
 def _steadied(mine: Array, strip: Strip, final: Fit, found: Prepared) -> Array:
     """Return positions [T, M, 3] of the markers, m, without what remains of the body's motion."""
     flap = found.flap_angles(final.states[:, 0])
+    pose = found.shaking.covariance(final.turn, final.hinge)
     result = mine.copy()
     for start in range(0, len(mine), _CHUNK):
         part = slice(start, start + _CHUNK)
         states, moved = states_of(strip, mine[part], final, found.shaking, found.slow[part], flap[part])
         model = positions(strip, final.rest, states, final.line)[0]
+        drift = found.slow[part] @ final.drift
+        moved = drift + body_part(moved - drift, pose, final.shake, final.memory)
         result[part] -= shaken(model, moved) @ final.turn
     return result
 

@@ -64,7 +64,7 @@ class AlignedTracks:
         flap_amplitude, mean_flap: half the range of the flap angle, and its mean over the beat, rad.
         noise: standard deviation of a coordinate of a sample against the modelled motion, m.
         rest_scatter: standard deviation of the described rest positions, m.
-        side_evidence: twice the difference of log-likelihoods for this side; None if the side was given.
+        side_evidence: twice the ln of the odds for this side; None if the side was given.
         results: of each marker.
         rest_covariance: [3 N, 3 N] of the rest positions, m^2, in the order of ``markers``, x, y, z each.
         exchanges: parts of tracks that belong to other markers than their tracks.

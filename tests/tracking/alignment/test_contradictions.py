@@ -131,10 +131,10 @@ def test_errors_of_a_pose_turn_about_the_markers() -> None:
     shift = np.cross(turns, hinge - middle) + 1e-2 * rng.normal(size=turns.shape)
     axial = np.linalg.det(turn) * turns @ turn.T
     samples = np.concatenate([axial[:, 1:], shift @ turn.T], axis=1)
-    covariance = np.linalg.inv(error.precision(turn, hinge))
+    covariance = error.covariance(turn, hinge)
     scale = np.sqrt(np.diag(covariance))
     assert np.abs(np.cov(samples.T) - covariance).max() < 0.02 * (scale[:, None] * scale).max()
-    assert np.allclose(PoseError(spread, 1e-2, middle, 4.0).precision(turn, hinge), error.precision(turn, hinge) / 4)
+    assert np.allclose(PoseError(spread, 1e-2, middle, 4.0).covariance(turn, hinge), 4 * covariance)
 
 
 def test_progress_is_shown_of_long_work_only(
