@@ -31,6 +31,9 @@ from wingfit.diagnosis.policy import POLICY, Policy
 from wingfit.diagnosis.verdict.noise_doubt import noise_may_hide, sure_error
 from wingfit.records.array_types import Array, Float
 
+MANY = 3
+"""So many effects together imitate almost any law: they are no more probable than one law outside the library."""
+
 
 @dataclass(frozen=True)
 class HypothesisWeights:
@@ -86,6 +89,7 @@ def weigh(
             data, tau + policy.unknown_residual**2 * excess, genes + policy.unknown_genes, effects, suspects
         )
         weight = _with_unknown_rest(hypotheses, weight, with_unknown - imitates)
+        unknown = max(unknown, weight[effects >= MANY].max(initial=-np.inf))
     top = max(weight.max(), unknown)
     weight, other = np.exp(weight - top), np.exp(unknown - top)
     total = weight.sum() + other
