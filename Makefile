@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 RUNS := $(VENV)/runs
 INSTALLED := $(VENV)/installed
 
-.PHONY: demo proof test test-service test-pages test-programs test-docs test-rest check check-wheel serve format lock install pin-image check-image clean
+.PHONY: demo proof test test-service test-pages test-programs test-rest check check-wheel serve format lock install pin-image check-image clean
 
 demo: $(RUNS)  ## start the service, calibrate the example campaign, print what came out
 	@$(BIN)/python -m examples.demo
@@ -17,10 +17,10 @@ proof: $(RUNS)  ## play three stories on concealed data, each ending with a repo
 serve: $(RUNS)  ## start the service and stay
 	@$(BIN)/wingfit serve
 
-test: $(INSTALLED)  ## every check and every test, all at a time: programs, servers and browsers wait more than they compute
-	@$(MAKE) --no-print-directory -k -j6 test-docs test-rest test-programs test-pages test-service check
+test: $(INSTALLED)  ## every check and every test, four at a time: programs, servers and browsers wait more than they compute
+	@$(MAKE) --no-print-directory -k -j4 test-service test-rest test-programs test-pages check
 
-# Taken out of the parts that they belong to, so that all take about as long.
+# Taken out of two of the four parts, so that all take about as long.
 BESIDE := tests/service/jobs tests/service/pages tests/contract
 test-service:
 	$(BIN)/python -m pytest tests/service $(BESIDE:%=--ignore %)
@@ -29,15 +29,12 @@ test-pages:
 	$(BIN)/python -m pytest $(BESIDE)
 
 # They start programs, and wait for them.
-PROGRAMS := tests/benchmarks tests/workers
+PROGRAMS := tests/docs tests/benchmarks tests/workers
 test-programs:
 	$(BIN)/python -m pytest $(PROGRAMS)
 
-test-docs:
-	$(BIN)/python -m pytest tests/docs
-
 test-rest:
-	$(BIN)/python -m pytest --ignore tests/service --ignore tests/contract --ignore tests/docs $(PROGRAMS:%=--ignore %)
+	$(BIN)/python -m pytest --ignore tests/service --ignore tests/contract $(PROGRAMS:%=--ignore %)
 
 check: $(INSTALLED) check-image  ## every check, no test
 	$(BIN)/ruff check .
