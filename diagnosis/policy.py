@@ -59,7 +59,7 @@ class Policy:
         2.0, "effective samples, relative", "how steeply a hypothesis that leaves more becomes improbable"
     )
     single: float = _threshold(
-        0.9,
+        0.885,
         "probability",
         "share of all effects from which one hypothesis is named: above that of two that fit alike, and of which one "
         "has a gene more (0.88), so that the cost of a gene alone never decides",
