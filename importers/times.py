@@ -137,7 +137,7 @@ def _from_rate(raw: Raw, rate: Statement | None, given: Given, file: str, faults
         missing = int(raw.frames[-1]) - start + 1 - len(raw.frames)
         if missing:
             between = f"{counted(missing, 'frame')} between the first and the last"
-            remarks.append(f"the file lacks {between}, which the times count")
+            remarks.append(f"{between} are not in the file; the times count them")
     return Timing(numbers / hertz, statements, remarks)
 
 

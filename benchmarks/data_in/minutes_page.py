@@ -94,8 +94,8 @@ def _answer(walk: Walk, source: Source) -> None:
     """Answer the questions of the form until the tracks are shown; first the axes, if the file shows a wing."""
     known = {"unit": source.unit, "time_unit": source.time_unit, "rows": source.also, "repeated": "gaps"}
     walk.until(f"{SHOWN} || {QUESTIONS}.length > 0")
-    while asked := walk.page.evaluate(QUESTIONS):
-        for option in asked:
+    while unanswered := walk.page.evaluate(QUESTIONS):
+        for option in unanswered:
             place = f"#import-asked [name={option}]"
             if walk.page.get_attribute(place, "type") == "checkbox":
                 walk.click(place)

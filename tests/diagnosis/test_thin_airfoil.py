@@ -1,4 +1,4 @@
-"""Flat plates that flap in a stream, by Theodorsen and Garrick in closed form: what a quasi-steady model lacks."""
+"""Flat plates that flap in a stream, by Theodorsen and Garrick in closed form: what quasi-steady models leave out."""
 
 from __future__ import annotations
 
