@@ -1,0 +1,1 @@
+"""Renders videos of a wing with markers; the truth is kept beside them."""
