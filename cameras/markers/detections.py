@@ -1,0 +1,38 @@
+"""What is detected in one image: places of markers in pixels, with covariances."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from wingfit.records.array_types import Array, Float, Index, Mask
+
+
+@dataclass(frozen=True, eq=False)
+class Detections:
+    """Markers seen in one image.
+
+    Attributes:
+        pixels: [N, 2], x and y of the centres.
+        covariance: [N, 2, 2] (pixels squared), of the noise of the image and of what the pattern does not follow.
+        size_px: [N], smallest distance from the centre to the edge of the marker.
+        contrast: [N], brightness of the marker above that of its surroundings.
+    """
+
+    pixels: Float[Array, "N 2"]
+    covariance: Float[Array, "N 2 2"]
+    size_px: Float[Array, " N"]
+    contrast: Float[Array, " N"]
+
+    def __len__(self) -> int:
+        return len(self.pixels)
+
+    def only(self, keep: Mask | Index) -> Detections:
+        """Return the detections in ``keep`` [N], a mask or indices."""
+        return Detections(self.pixels[keep], self.covariance[keep], self.size_px[keep], self.contrast[keep])
+
+
+def no_detections() -> Detections:
+    """Return an image in which nothing is detected."""
+    return Detections(np.empty((0, 2)), np.empty((0, 2, 2)), np.empty(0), np.empty(0))

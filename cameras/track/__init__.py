@@ -1,0 +1,1 @@
+"""From detections in the images of several cameras to tracks in space."""

@@ -1,0 +1,180 @@
+"""Detects the markers in all frames of a film, one frame in memory at a time, and stores them so that it can go on."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from wingfit.cameras.markers.chequer import detect_chequers
+from wingfit.cameras.markers.detections import Detections
+from wingfit.cameras.markers.dot import detect_dots
+from wingfit.cameras.video.source import Film, Frames
+from wingfit.cameras.video.strobe import Background, FlashMark, background, flashes
+from wingfit.records.array_types import Array
+from wingfit.records.errors import fail
+
+MarkerKind = Literal["chequer", "dot"]
+Light = Literal["strobe", "continuous"]
+Progress = Callable[[int, int], object]
+_CHUNK = 50  # instants
+_VERSION = 1
+_LEAST_NOISE = 1.0  # grey levels: quantisation, and compression that removes noise
+
+
+@dataclass(frozen=True, eq=False)
+class FilmDetections:
+    """Detections of one camera.
+
+    Attributes:
+        seen: of each instant: of each flash with a strobe, else of each frame.
+        marks: where the flashes are; without strobe ``frame`` is the number of the frame, and the rest has no meaning.
+        bad_frames: numbers of frames that could not be decoded, or whose size differs.
+    """
+
+    seen: list[Detections]
+    marks: list[FlashMark]
+    bad_frames: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class FilmTask:
+    """What is detected in one film: frames ``first`` to ``last`` (excluded), into ``store`` if given."""
+
+    film: Film
+    kind: MarkerKind
+    light: Light
+    first: int = 0
+    last: int | None = None
+    store: Path | None = None
+
+    @property
+    def key(self) -> str:
+        """Return a text that differs for another film, and for another way to detect."""
+        path = self.film.path
+        of = path.stat()
+        stated = [_VERSION, str(path.resolve()), of.st_size, of.st_mtime_ns, self.film.rate_hz, self.kind, self.light]
+        return hashlib.sha256(json.dumps([*stated, self.first, self.last]).encode()).hexdigest()[:16]
+
+
+def detect_film(task: FilmTask, progress: Progress = lambda done, of: None) -> FilmDetections:
+    """Return the detections of a film; those that an earlier run stored are read.
+
+    Raises:
+        DatasetError: the film cannot be read, or a strobe's flashes cannot be told apart.
+    """
+    frames = task.film.opened()
+    folder = task.store / task.key if task.store else None
+    chunks = _stored(folder)
+    seen = [one for chunk in chunks for one in chunk.seen]
+    marks = [one for chunk in chunks for one in chunk.marks]
+    bad = [one for chunk in chunks for one in chunk.bad_frames]
+    first = task.first
+    if marks:
+        first = marks[-1].frame + (2 if task.light == "strobe" else 1)
+    fresh = FilmDetections([], [], ())
+    of = min(frames.count or 10**9, task.last or 10**9) - task.first
+    for mark, found, missing in _instants(task, frames, first):
+        fresh.seen.append(found)
+        fresh.marks.append(mark)
+        fresh = FilmDetections(fresh.seen, fresh.marks, (*fresh.bad_frames, *missing))
+        if len(fresh.seen) == _CHUNK and folder:
+            _store(folder, len(chunks), fresh)
+            chunks.append(fresh)
+            seen, marks, bad = seen + fresh.seen, marks + fresh.marks, [*bad, *fresh.bad_frames]
+            fresh = FilmDetections([], [], ())
+        progress(mark.frame + 1 - task.first, of)
+    return FilmDetections(seen + fresh.seen, marks + fresh.marks, (*bad, *fresh.bad_frames))
+
+
+def _instants(task: FilmTask, frames: Frames, first: int) -> Iterator[tuple[FlashMark, Detections, tuple[int, ...]]]:
+    """Return instants with their detections, and the numbers of the bad frames before them."""
+    detect = detect_chequers if task.kind == "chequer" else detect_dots
+    limited = _Limited(frames, task.last)
+    if task.light == "strobe":
+        dark = background(frames)
+        for flash in flashes(limited, dark, first):
+            yield flash.mark, detect(flash.image, 0.0, max(flash.noise, _LEAST_NOISE)), limited.bad()
+        return
+    still: Background | None = None
+    for number, frame in limited.read(first):
+        if frame is None:
+            continue
+        if still is None:
+            still = _steady(frame)
+        found = detect(frame, float(np.median(frame)), still.noise)
+        yield FlashMark(number, 0.0, (0.0, 0.0)), found, limited.bad()
+
+
+class _Limited(Frames):
+    """Frames up to a last one; the numbers of bad ones are collected."""
+
+    def __init__(self, frames: Frames, last: int | None) -> None:
+        self.path, self.size_px = frames.path, frames.size_px
+        self.rate_hz, self.count = frames.rate_hz, frames.count
+        self._frames, self._last, self._bad = frames, last, list[int]()
+
+    def read(self, first: int = 0) -> Iterator[tuple[int, Array | None]]:
+        for number, frame in self._frames.read(first):
+            if self._last is not None and number >= self._last:
+                return
+            if frame is None:
+                self._bad.append(number)
+            yield number, frame
+
+    def bad(self) -> tuple[int, ...]:
+        """Return the numbers of the bad frames since the last call."""
+        bad, self._bad = tuple(self._bad), []
+        return bad
+
+
+def _steady(frame: Array) -> Background:
+    """Return the noise of a frame from differences of neighbouring pixels, most of which show no edge."""
+    change = np.diff(frame.astype(np.float32), axis=1)
+    noise = float(np.median(np.abs(change)) / 0.6745 / np.sqrt(2))
+    return Background(frame.astype(np.float32), max(noise, _LEAST_NOISE))
+
+
+def _store(folder: Path, number: int, chunk: FilmDetections) -> None:
+    """Write one chunk; a run that is interrupted leaves whole chunks only."""
+    folder.mkdir(parents=True, exist_ok=True)
+    part = folder / f"{number:06d}.part"
+    with part.open("wb") as file:
+        np.savez_compressed(
+            file,
+            counts=[len(one) for one in chunk.seen],
+            pixels=np.concatenate([one.pixels for one in chunk.seen]),
+            covariance=np.concatenate([one.covariance for one in chunk.seen]),
+            size_px=np.concatenate([one.size_px for one in chunk.seen]),
+            contrast=np.concatenate([one.contrast for one in chunk.seen]),
+            marks=np.array([(one.frame, one.split, *one.between) for one in chunk.marks]),
+            bad=np.array(chunk.bad_frames, dtype=int),
+        )
+    part.replace(folder / f"{number:06d}.npz")
+
+
+def _stored(folder: Path | None) -> list[FilmDetections]:
+    """Return the chunks of an earlier run."""
+    chunks: list[FilmDetections] = []
+    while folder is not None and (file := folder / f"{len(chunks):06d}.npz").exists():
+        try:
+            with np.load(file) as of:
+                chunks.append(_chunk({name: of[name] for name in of.files}))
+        except (OSError, ValueError, KeyError) as error:
+            raise fail(str(file), None, f"cannot be read ({error}); remove the folder, it is made anew") from None
+    return chunks
+
+
+def _chunk(of: dict[str, Array]) -> FilmDetections:
+    ends = np.cumsum(of["counts"])
+    seen = [
+        Detections(*(of[name][start:end] for name in ("pixels", "covariance", "size_px", "contrast")))
+        for start, end in zip(ends - of["counts"], ends, strict=True)
+    ]
+    marks = [FlashMark(int(row[0]), float(row[1]), (float(row[2]), float(row[3]))) for row in of["marks"]]
+    return FilmDetections(seen, marks, tuple(int(number) for number in of["bad"]))

@@ -1,0 +1,188 @@
+"""Follows the markers from one instant to the next, in space.
+
+Each marker is predicted from its last three places. What is found nearest to the predictions gives the smooth motion of
+the wing since then, and this predicts the markers again, also those that were not seen for some time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from wingfit.cameras.track.cloud import Cloud
+from wingfit.cameras.track.registration import Deformed, Surface, assign, deformed, register
+from wingfit.records.array_types import Array, Float, Index
+
+Progress = Callable[[int, int], object]
+_STARTS = 12  # instants at which a start is tried
+_LEAST_SHARE = 0.5  # of the markers, without which the wing is sought anew
+_LEAST_MARKERS = 6
+_NARROWEST = 0.04  # of the distance between neighbouring markers, as a standard deviation
+
+
+@dataclass(frozen=True, eq=False)
+class Followed:
+    """Which point of the cloud of each instant is which marker.
+
+    Attributes:
+        chosen: [T, K], index of a point of the cloud, -1 where a marker was not found.
+        predicted: [T, K, 3] (m), where the smooth motion of the wing places the markers; NaN at instants that are lost.
+        start: the instant at which the markers were identified first.
+    """
+
+    chosen: Index
+    predicted: Float[Array, "T K 3"]
+    start: int
+
+
+def follow(
+    clouds: Sequence[Cloud],
+    reference: Float[Array, "K 3"],
+    surface: Surface,
+    progress: Progress = lambda done, of: None,
+) -> Followed | None:
+    """Identify the markers in the ``clouds`` of all instants; None if the wing is seen in none of those tried.
+
+    ``reference`` are the markers in any axes, for example at rest.
+    """
+    start, found = _start(clouds, reference)
+    if found is None:
+        return None
+    state = _State(clouds, surface, reference)
+    state.put(start, *found)
+    done = 1
+    for direction in (1, -1):
+        state.restart(start)
+        for instant in range(start + direction, len(clouds) if direction > 0 else -1, direction):
+            state.step(instant, direction)
+            done += 1
+            progress(done, len(clouds))
+    return Followed(state.chosen, state.predicted, start)
+
+
+def _start(clouds: Sequence[Cloud], reference: Float[Array, "K 3"]) -> tuple[int, tuple[Index, Array] | None]:
+    """Return the instant at which most markers are identified, of some that are tried, and the identification there."""
+    sizes = [len(cloud) for cloud in clouds]
+    tried = np.unique(np.linspace(0, len(clouds) - 1, min(_STARTS, len(clouds))).astype(int))
+    best, most, found = 0, 0, None
+    for instant in sorted(tried, key=lambda one: -min(sizes[one], len(reference))):
+        cloud = clouds[instant]
+        chosen, predicted = register(reference, cloud.positions, cloud.points.covariance)
+        count = int((chosen >= 0).sum())
+        if count > most:
+            best, most, found = int(instant), count, (chosen, predicted)
+        if count >= 0.95 * len(reference):
+            break
+    return best, found
+
+
+def _spacing(positions: Float[Array, "K 3"]) -> float:
+    """Return the median distance (m) of a marker to its nearest neighbour."""
+    apart = np.linalg.norm(positions[:, None] - positions[None], axis=2) + np.diag(np.full(len(positions), np.inf))
+    return float(np.median(apart.min(1)))
+
+
+class _State:
+    """The markers at the instants so far, and how well they were predicted."""
+
+    def __init__(self, clouds: Sequence[Cloud], surface: Surface, reference: Float[Array, "K 3"]) -> None:
+        self.clouds, self.surface, self.reference = clouds, surface, reference
+        count = len(reference)
+        # Errors of predictions are not all alike; a search that is narrower than this loses markers, and gains nothing.
+        self.least = _NARROWEST * _spacing(reference)
+        self.chosen = np.full((len(clouds), count), -1)
+        self.predicted = np.full((len(clouds), count, 3), np.nan)
+        self.places = np.full((len(clouds), count, 3), np.nan)
+        self.known: list[int] = []
+        self.error = np.inf
+
+    def restart(self, instant: int) -> None:
+        """Go on from ``instant`` alone."""
+        self.known, self.error = [instant], np.inf
+
+    def put(self, instant: int, chosen: Index, smooth: Float[Array, "K 3"]) -> None:
+        """Store the markers of one instant; those not found are where the smooth motion places them."""
+        found = chosen >= 0
+        self.chosen[instant], self.predicted[instant] = chosen, smooth
+        self.places[instant] = np.where(found[:, None], self.clouds[instant].positions[chosen], smooth)
+
+    def step(self, instant: int, direction: int) -> None:
+        """Identify the markers at ``instant`` from those of the instants before it in this ``direction``."""
+        cloud = self.clouds[instant]
+        expected = self._extrapolated(instant) if np.isfinite(self.error) else None
+        found = self._near(expected, cloud) if expected is not None else None
+        if found is None or (found[0] >= 0).mean() < _LEAST_SHARE:
+            again = self._anew(cloud)
+            if found is None or (again is not None and (again[0] >= 0).sum() > (found[0] >= 0).sum()):
+                found = again
+        if found is None or (found[0] >= 0).sum() < _LEAST_MARKERS:
+            return
+        self.put(instant, *found)
+        self._learn(instant, direction)
+
+    def _extrapolated(self, instant: int) -> Float[Array, "K 3"]:
+        """Return the places at ``instant`` of the polynomial through the last one to three instants."""
+        last = self.known[-3:]
+        places = self.places[last]
+        total = np.zeros_like(places[0])
+        for one, at in enumerate(last):
+            weight = 1.0
+            for other in last:
+                if other != at:
+                    weight *= (instant - other) / (at - other)
+            total += weight * places[one]
+        # The place of a marker that was not found is a prediction itself: errors would grow with each extrapolation.
+        return np.where(np.all(self.chosen[last] >= 0, axis=0, keepdims=True).T, total, np.nan)
+
+    def _near(self, expected: Float[Array, "K 3"], cloud: Cloud) -> tuple[Index, Array] | None:
+        """Return the identification near the places that are ``expected``."""
+        covariance = cloud.points.covariance
+        chosen = assign(expected, np.full(len(expected), self.error), cloud.positions, covariance)
+        smooth = expected
+        for _ in range(8):
+            if (chosen >= 0).sum() < _LEAST_MARKERS:
+                return None
+            found = np.where((chosen >= 0)[:, None], cloud.positions[chosen], np.nan)
+            moved = self._moved(found, expected)
+            again = assign(moved.positions, np.maximum(moved.deviation, self.least), cloud.positions, covariance)
+            smooth = moved.positions
+            if (again == chosen).all():
+                break
+            chosen = again
+        return chosen, smooth
+
+    def _moved(self, found: Float[Array, "K 3"], expected: Float[Array, "K 3"]) -> Deformed:
+        """Return the markers after the smooth motion that those ``found`` show.
+
+        Markers found at all of the last instants move from the places ``expected``. One that was missing has no
+        expectation: it moves with the others from its place at the last instant or, if it was missing at all of them
+        and its place may have drifted, from that at rest.
+        """
+        last = self.chosen[self.known[-3:]] >= 0
+        moved = deformed(self.surface, found, expected)
+        for group, shape, of in (
+            (np.asarray(~last.all(0)), self.places[self.known[-1]], last[-1]),
+            (np.asarray(~last.any(0)), self.reference, np.ones(len(found), dtype=bool)),
+        ):
+            if group.any():
+                other = deformed(self.surface, np.where(of[:, None], found, np.nan), shape)
+                moved = Deformed(
+                    np.where(group[:, None], other.positions, moved.positions),
+                    np.where(group, other.deviation, moved.deviation),
+                )
+        return moved
+
+    def _anew(self, cloud: Cloud) -> tuple[Index, Array] | None:
+        """Return the identification by the shape at the last instant, wherever the wing is now."""
+        chosen, smooth = register(self.places[self.known[-1]], cloud.positions, cloud.points.covariance)
+        return (chosen, smooth) if (chosen >= 0).any() else None
+
+    def _learn(self, instant: int, direction: int) -> None:
+        """Compare the markers with what was expected, so that the next search is as wide as it must be."""
+        if len(self.known) >= 3 or (len(self.known) == 2 and not np.isfinite(self.error)):
+            apart = np.linalg.norm(self._extrapolated(instant) - self.places[instant], axis=1)
+            now = float(np.nanpercentile(apart[self.chosen[instant] >= 0], 90))
+            self.error = max(now, 0.7 * self.error if np.isfinite(self.error) else 0.0, 1e-4)
+        self.known.append(instant)

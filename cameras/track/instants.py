@@ -1,0 +1,172 @@
+"""The detections of all cameras at common instants: flashes of a strobe, or times between frames."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from wingfit.cameras.camera import Camera
+from wingfit.cameras.markers.detections import Detections
+from wingfit.cameras.track.cloud import possible_points
+from wingfit.cameras.track.film_detections import FilmDetections
+from wingfit.cameras.track.synchronise import Offset, common_times, offset_between
+from wingfit.cameras.track.tracklets import at_time, join
+from wingfit.cameras.video.source import Frames
+from wingfit.cameras.video.strobe import FlashTimes, flash_times
+from wingfit.records.array_types import Array, Float
+from wingfit.records.errors import fail
+
+_SHIFTS = 3  # flashes by which the films of two cameras may begin apart
+_COMPARED = 25  # instants
+_APART = 1.5  # frames between samples of a marker, at most
+
+
+@dataclass(frozen=True, eq=False)
+class Instants:
+    """Detections of all cameras at the same instants.
+
+    Attributes:
+        times: [T] (s), on the clock of the first camera.
+        seen: of each instant, of each camera.
+        frames: [T, C], number of the first frame of each camera that shows the instant; -1 if there is none.
+        offsets: of the clocks of cameras without strobe.
+        flashes: of the first camera, with a strobe.
+        row_s: time from row to row of each camera (s), as stated or as the flashes show it.
+        remarks: what was estimated or is doubtful.
+    """
+
+    times: Float[Array, " T"]
+    seen: list[tuple[Detections, ...]]
+    frames: Array
+    offsets: tuple[Offset, ...]
+    flashes: FlashTimes | None
+    row_s: tuple[float, ...]
+    remarks: tuple[str, ...]
+
+
+def flash_instants(
+    cameras: Sequence[Camera], films: Sequence[Frames], found: Sequence[FilmDetections], tolerance_px: float
+) -> Instants:
+    """Return the flashes that all cameras saw, matched by where their rays meet best."""
+    timed = [
+        flash_times(one.marks, frames, camera.row_s or None)
+        for camera, frames, one in zip(cameras, films, found, strict=True)
+    ]
+    remarks = _clock_remarks(cameras, timed)
+    shifts = [0]
+    for other in range(1, len(cameras)):
+        shifts.append(_best_shift(cameras, found, timed, other, tolerance_px))
+        if shifts[-1]:
+            remarks.append(
+                f"the film of {cameras[other].name} begins {-shifts[-1]} flashes before that of {cameras[0].name}"
+            )
+    index = [
+        {int(number) + shift: k for k, number in enumerate(one.numbers)}
+        for one, shift in zip(timed, shifts, strict=True)
+    ]
+    common = sorted(set(index[0]).intersection(*index[1:]))
+    if len(common) < 3:
+        raise fail("films", len(common), f"{len(common)} flashes are seen by all cameras; at least 3 are needed")
+    lost = len(index[0]) - len(common)
+    if lost:
+        remarks.append(f"{lost} of {len(index[0])} flashes were not seen by all cameras, and are left out")
+    rows = [[one[number] for one in index] for number in common]
+    return Instants(
+        times=np.array([timed[0].times[row[0]] for row in rows]),
+        seen=[tuple(one.seen[k] for one, k in zip(found, row, strict=True)) for row in rows],
+        frames=np.array([[one.marks[k].frame for one, k in zip(found, row, strict=True)] for row in rows]),
+        offsets=(),
+        flashes=timed[0],
+        row_s=tuple(one.row_s for one in timed),
+        remarks=tuple(remarks),
+    )
+
+
+def _clock_remarks(cameras: Sequence[Camera], timed: Sequence[FlashTimes]) -> list[str]:
+    remarks = []
+    for camera, one in zip(cameras[1:], timed[1:], strict=True):
+        apart = one.period / timed[0].period - 1
+        if abs(apart) > 1e-3:
+            remarks.append(
+                f"the strobe's period is {apart * 100:+.2f} % longer in the film of {camera.name} than in that of "
+                f"{cameras[0].name}: check rate_hz of both"
+            )
+    return remarks
+
+
+def _best_shift(
+    cameras: Sequence[Camera],
+    found: Sequence[FilmDetections],
+    timed: Sequence[FlashTimes],
+    other: int,
+    tolerance_px: float,
+) -> int:
+    """Return what is added to the numbers of flashes of camera ``other`` to get those of the first."""
+    first = {int(number): k for k, number in enumerate(timed[0].numbers)}
+    second = {int(number): k for k, number in enumerate(timed[other].numbers)}
+    pair = (cameras[0], cameras[other])
+    scores = {}
+    for shift in sorted(range(-_SHIFTS, _SHIFTS + 1), key=abs):
+        both = [number for number in first if number - shift in second]
+        used = [both[k] for k in np.unique(np.linspace(0, len(both) - 1, _COMPARED).astype(int))] if both else []
+        points = 0.0
+        for number in used:
+            seen = (found[0].seen[first[number]], found[other].seen[second[number - shift]])
+            cloud = possible_points(pair, seen, tolerance_px, (0.0, np.inf))
+            points += len(np.unique(cloud.detections[0])) - cloud.points.misfit.sum() / 16
+        scores[shift] = points / max(len(used), 1)
+    return max(scores, key=lambda shift: (scores[shift], -abs(shift)))
+
+
+def frame_instants(
+    cameras: Sequence[Camera],
+    films: Sequence[Frames],
+    found: Sequence[FilmDetections],
+    tolerance_px: float,
+    within_s: float,
+) -> Instants:
+    """Return the detections at the times of the first camera's frames; clocks up to ``within_s`` apart are compared.
+
+    With ``within_s`` zero the cameras are synchronised.
+    """
+    times = [
+        np.array([one.frame for one in of.marks]) / frames.rate_hz for of, frames in zip(found, films, strict=True)
+    ]
+    joined = [join(of.seen, at, camera.row_s) for of, at, camera in zip(found, times, cameras, strict=True)]
+    middle = cameras[0].row_s * cameras[0].size_px[1] / 2
+    frame_s = max(1 / frames.rate_hz for frames in films)
+    offsets = [Offset(0.0, 0.0)]
+    for other in range(1, len(cameras)):
+        if within_s == 0:
+            offsets.append(Offset(0.0, 0.0))
+            continue
+        pair, two = (cameras[0], cameras[other]), (joined[0], joined[other])
+        offsets.append(offset_between(pair, two, times[0] + middle, frame_s, within_s, tolerance_px))
+    seconds = [one.seconds for one in offsets]
+    instants = common_times(joined, seconds, times[0] + middle)
+    if len(instants) < 3:
+        raise fail("films", len(instants), "the films of all cameras have fewer than 3 frames in common")
+    seen = [
+        tuple(at_time(one, time + offset, _APART * frame_s) for one, offset in zip(joined, seconds, strict=True))
+        for time in instants
+    ]
+    frames = np.column_stack(
+        [
+            np.rint((instants + offset - middle) * of.rate_hz).astype(int)
+            for of, offset in zip(films, seconds, strict=True)
+        ]
+    )
+    row_s = tuple(camera.row_s for camera in cameras)
+    return Instants(instants, seen, frames, tuple(offsets), None, row_s, _offset_remarks(cameras, offsets, within_s))
+
+
+def _offset_remarks(cameras: Sequence[Camera], offsets: Sequence[Offset], within_s: float) -> tuple[str, ...]:
+    if within_s == 0:
+        return ()
+    return tuple(
+        f"the clock of {camera.name} is {1e3 * one.seconds:+.3f} ms ({1e3 * one.standard_error:.3f} ms standard error) "
+        f"from that of {cameras[0].name}"
+        for camera, one in zip(cameras[1:], offsets[1:], strict=True)
+    )

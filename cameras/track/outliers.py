@@ -1,0 +1,33 @@
+"""Which places of a marker do not fit to those before and after."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wingfit.records.array_types import Array, Float, Mask
+
+_NEIGHBOURS, _DEGREE = 3, 4  # on each side; of the polynomial through them
+_DEVIATIONS = 6.0
+
+
+def jumps(times: Float[Array, " T"], positions: Float[Array, "T K 3"], covariance: Float[Array, "T K 3 3"]) -> Mask:
+    """Return where [T, K] a marker is far from a polynomial through its places at the nearest instants around it.
+
+    Far is more than six times what the covariances and the scatter about the polynomials explain.
+    """
+    count, markers = positions.shape[:2]
+    apart = np.full((count, markers), np.nan)
+    for marker in range(markers):
+        known = np.flatnonzero(np.isfinite(positions[:, marker]).all(1))
+        for place, instant in enumerate(known):
+            near = np.r_[known[max(place - _NEIGHBOURS, 0) : place], known[place + 1 : place + 1 + _NEIGHBOURS]]
+            if len(near) <= _DEGREE:
+                continue
+            scale = np.abs(times[near] - times[instant]).max()
+            design = ((times[near] - times[instant]) / scale)[:, None] ** np.arange(_DEGREE + 1)
+            weights = np.linalg.pinv(design)[0]
+            residual = positions[instant, marker] - weights @ positions[near, marker]
+            spread = covariance[instant, marker] + np.einsum("n,nij->ij", weights**2, covariance[near, marker])
+            apart[instant, marker] = np.sqrt(residual @ np.linalg.solve(spread, residual))
+    typical = max(float(np.nanmedian(apart)) / 1.538, 1.0) if np.isfinite(apart).any() else 1.0
+    return np.asarray(np.nan_to_num(apart) > _DEVIATIONS * typical)

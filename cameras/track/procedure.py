@@ -1,0 +1,244 @@
+"""From films to tracks: detect, bring to common instants, find which point is which marker, triangulate, reject."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from wingfit.cameras.camera import Camera
+from wingfit.cameras.track.cloud import Cloud, possible_points
+from wingfit.cameras.track.film_detections import FilmDetections, FilmTask, Light, MarkerKind, detect_film
+from wingfit.cameras.track.follow import Followed, follow
+from wingfit.cameras.track.instants import Instants, flash_instants, frame_instants
+from wingfit.cameras.track.outliers import jumps
+from wingfit.cameras.track.registration import surface_of
+from wingfit.cameras.track.result import TrackedFilm
+from wingfit.cameras.triangulation import Points, error_from_cameras, triangulate
+from wingfit.cameras.video.source import Film
+from wingfit.records.array_types import Array, Float, Index
+from wingfit.records.errors import counted, fail
+
+Report = Callable[[str, float], object]
+TOLERANCE_PX = 0.3
+"""Error of the calibration (standard deviation) that the search for meeting rays allows."""
+MOST_PLACES = 20_000_000  # instants times markers
+LEAST_MARKERS = 6
+_UNLIKELY = 15.1  # chi-square with one degree of freedom, 99.99 %
+
+
+@dataclass(frozen=True, eq=False)
+class Request:
+    """What is tracked.
+
+    Attributes:
+        cameras: calibrated.
+        films: of each camera, in the same order.
+        kind: of the markers.
+        light: a strobe in the dark, or light that is always there.
+        names: of the markers; empty if their places on the wing are not known.
+        reference: [K, 3] (m), places of the markers on the wing, in any axes.
+        calibration: covariance of the cameras' parameters, if known.
+        within_s: the clocks of cameras without strobe may be so far apart; zero if they are synchronised.
+        first, last: frames that are used, of each film.
+        store: folder for what is detected, so that an interrupted run can go on.
+    """
+
+    cameras: tuple[Camera, ...]
+    films: tuple[Film, ...]
+    kind: MarkerKind
+    light: Light
+    names: tuple[str, ...] = ()
+    reference: Float[Array, "K 3"] | None = None
+    calibration: Float[Array, "P P"] | None = None
+    within_s: float = 0.0
+    first: int = 0
+    last: int | None = None
+    store: Path | None = None
+
+
+def track(request: Request, report: Report = lambda what, part: None) -> TrackedFilm:
+    """Track the markers of a wing; ``report`` is called with what is being done, and how much of it is done (0 to 1).
+
+    Raises:
+        DatasetError: a film cannot be read, the cameras do not see the wing at the same instants, or the markers are
+            not identified.
+    """
+    found = _detected(request, report)
+    films = [film.opened() for film in request.films]
+    report("instants", 0.0)
+    if request.light == "strobe":
+        instants = flash_instants(request.cameras, films, found, TOLERANCE_PX)
+    else:
+        instants = frame_instants(request.cameras, films, found, TOLERANCE_PX, request.within_s)
+    clouds = []
+    for number, seen in enumerate(instants.seen):
+        clouds.append(possible_points(request.cameras, seen, TOLERANCE_PX, (0.0, np.inf)))
+        report("rays", (number + 1) / len(instants.seen))
+    names, reference = _reference(request, clouds)
+    if len(names) * len(clouds) > MOST_PLACES:
+        raise fail("films", len(clouds), f"{len(clouds)} instants; track fewer with first_frame and last_frame")
+    followed = follow(clouds, reference, surface_of(reference), lambda done, of: report("following", done / of))
+    if followed is None:
+        most = max(len(cloud) for cloud in clouds)
+        raise fail(
+            "markers",
+            most,
+            f"at none of the instants tried do {LEAST_MARKERS} points agree with the described markers, of at most {most} "
+            "that two cameras see: check the calibration, the unit of the markers' places, and that all cameras show the "
+            "same wing",
+        )
+    return _result(request, found, instants, clouds, followed, names)
+
+
+def _detected(request: Request, report: Report) -> list[FilmDetections]:
+    """Detect the markers in all films at once, a thread for each."""
+    parts = [0.0] * len(request.films)
+
+    def one(number: int) -> FilmDetections:
+        task = FilmTask(request.films[number], request.kind, request.light, request.first, request.last, request.store)
+
+        def progress(done: int, of: int) -> None:
+            parts[number] = min(done / max(of, 1), 1.0)
+            report("detecting", sum(parts) / len(parts))
+
+        return detect_film(task, progress)
+
+    with ThreadPoolExecutor(len(request.films)) as pool:
+        found = list(pool.map(one, range(len(request.films))))
+    for camera, of in zip(request.cameras, found, strict=True):
+        most = max((len(seen) for seen in of.seen), default=0)
+        if most < LEAST_MARKERS:
+            raise fail(
+                f"camera {camera.name}",
+                most,
+                f"at most {counted(most, 'marker')} in a frame; at least {LEAST_MARKERS} are needed: check kind and "
+                "light of the project, and that markers are bright and 6 pixels wide or more",
+            )
+    return found
+
+
+def _reference(request: Request, clouds: Sequence[Cloud]) -> tuple[tuple[str, ...], Float[Array, "K 3"]]:
+    """Return names and places of the markers: the described ones, or those of the instant that shows most of them."""
+    if request.reference is not None:
+        return request.names, request.reference
+    best = max(clouds, key=lambda cloud: len(_single(cloud)))
+    places = best.positions[_single(best)]
+    if len(places) < LEAST_MARKERS:
+        raise fail(
+            "markers", len(places), f"at most {len(places)} markers are seen by two cameras; {LEAST_MARKERS} are needed"
+        )
+    return tuple(f"t{number + 1:02d}" for number in range(len(places))), places
+
+
+def _single(cloud: Cloud) -> Index:
+    """Return the points whose detections belong to no other point."""
+    alone = np.ones(len(cloud), dtype=bool)
+    for row in cloud.detections:
+        used, index, counts = np.unique(row, return_inverse=True, return_counts=True)
+        alone &= (counts[index] == 1) | (used[index] < 0)
+    return np.flatnonzero(alone)
+
+
+def _result(
+    request: Request,
+    found: Sequence[FilmDetections],
+    instants: Instants,
+    clouds: Sequence[Cloud],
+    followed: Followed,
+    names: tuple[str, ...],
+) -> TrackedFilm:
+    pixels, covariance = _observed(len(request.cameras), instants, clouds, followed)
+    error = _pixel_error(request.cameras, pixels, covariance)
+    covariance = covariance + error**2 * np.eye(2)
+    points = triangulate(request.cameras, *_flat(pixels, covariance))
+    shape = followed.chosen.shape
+    wrong = points.misfit > _UNLIKELY + 2.5 * (points.freedom - 1)
+    places = np.where(wrong[:, None], np.nan, points.positions).reshape(*shape, 3)
+    spread = points.covariance.reshape(*shape, 3, 3)
+    jumped = jumps(instants.times, places, spread)
+    places[jumped] = np.nan
+    spread[~np.isfinite(places).all(2)] = np.nan
+    projected = np.stack(
+        [camera.project(places.reshape(-1, 3)).reshape(*shape, 2) for camera in request.cameras], axis=1
+    )
+    return TrackedFilm(
+        names=names,
+        times=instants.times,
+        positions=places,
+        covariance=spread,
+        by_calibration=_by_calibration(request, points, pixels, covariance),
+        pixels=pixels,
+        residuals=pixels - projected,
+        cameras=tuple(camera.name for camera in request.cameras),
+        frames=instants.frames,
+        pixel_error=error,
+        rejected=wrong.reshape(shape).sum(0) + jumped.sum(0),
+        bad_frames=tuple(of.bad_frames for of in found),
+        remarks=(*instants.remarks, *_remarks(request, found)),
+    )
+
+
+def _observed(
+    cameras: int, instants: Instants, clouds: Sequence[Cloud], followed: Followed
+) -> tuple[Float[Array, "T C K 2"], Float[Array, "T C K 2 2"]]:
+    """Return the pixels of each marker in each camera, and their covariances."""
+    count, markers = followed.chosen.shape
+    pixels = np.full((count, cameras, markers, 2), np.nan)
+    covariance = np.tile(np.eye(2), (count, cameras, markers, 1, 1))
+    for instant, (cloud, seen) in enumerate(zip(clouds, instants.seen, strict=True)):
+        rows = np.flatnonzero(followed.chosen[instant] >= 0)
+        for camera, one in enumerate(seen):
+            index = cloud.detections[camera, followed.chosen[instant, rows]]
+            have = index >= 0
+            pixels[instant, camera, rows[have]] = one.pixels[index[have]]
+            covariance[instant, camera, rows[have]] = one.covariance[index[have]]
+    return pixels, covariance
+
+
+def _flat(pixels: Array, covariance: Array) -> tuple[Float[Array, "C N 2"], Float[Array, "C N 2 2"]]:
+    cameras = pixels.shape[1]
+    return np.moveaxis(pixels, 1, 0).reshape(cameras, -1, 2), np.moveaxis(covariance, 1, 0).reshape(cameras, -1, 2, 2)
+
+
+def _pixel_error(cameras: Sequence[Camera], pixels: Array, covariance: Array) -> float:
+    """Return the error of each pixel, beside that of its detection, for which half of the misfits are as expected.
+
+    It holds what neighbouring pixels do not show: compression, uneven light, an imperfect calibration.
+    """
+    at, spread = _flat(pixels, covariance)
+    known = np.flatnonzero(np.isfinite(at).all(2).sum(0) >= 2)
+    used = known[np.unique(np.linspace(0, len(known) - 1, 4000).astype(int))]
+    low, high = 0.0, 3.0
+    for _ in range(14):
+        middle = (low + high) / 2
+        points = triangulate(cameras, at[:, used], spread[:, used] + middle**2 * np.eye(2))
+        expected = points.freedom * (1 - 2 / (9 * points.freedom)) ** 3
+        low, high = (middle, high) if np.median(points.misfit / expected) > 1 else (low, middle)
+    return (low + high) / 2
+
+
+def _by_calibration(request: Request, points: Points, pixels: Array, covariance: Array) -> Float[Array, "K 3 3"] | None:
+    if request.calibration is None:
+        return None
+    at, spread = _flat(pixels, covariance)
+    known = np.asarray(np.isfinite(points.positions).all(1))
+    places = Points(
+        points.positions, np.where(known[:, None, None], points.covariance, 0.0), points.misfit, points.freedom
+    )
+    changes = error_from_cameras(request.cameras, places, at, spread, request.calibration)
+    each = np.einsum("nip,pq,njq->nij", changes, request.calibration, changes, optimize=True)
+    each[~known] = np.nan
+    return np.asarray(np.nanmean(each.reshape(pixels.shape[0], -1, 3, 3), axis=0))
+
+
+def _remarks(request: Request, found: Sequence[FilmDetections]) -> list[str]:
+    return [
+        f"{counted(len(of.bad_frames), 'frame')} of camera {camera.name} could not be decoded: "
+        f"{', '.join(map(str, of.bad_frames[:5]))}{', ...' if len(of.bad_frames) > 5 else ''}"
+        for camera, of in zip(request.cameras, found, strict=True)
+        if of.bad_frames
+    ]

@@ -1,0 +1,122 @@
+"""Points in space from their pixels in several cameras, with covariances (Hartley and Zisserman 2004, chapter 12)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from wingfit.cameras.camera import Camera
+from wingfit.records.array_types import Array, Float, Index, Mask
+
+_STEPS = 10
+_SMALL_STEP_M = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Points:
+    """Triangulated points.
+
+    Attributes:
+        positions: [N, 3] (m); NaN where fewer than two cameras see the point.
+        covariance: [N, 3, 3] (m^2), of the pixels' covariances.
+        misfit: [N], sum over cameras of squared residuals over the pixels' covariances; chi-square with
+            ``2 * cameras - 3`` degrees of freedom.
+        freedom: [N], these degrees of freedom.
+    """
+
+    positions: Float[Array, "N 3"]
+    covariance: Float[Array, "N 3 3"]
+    misfit: Float[Array, " N"]
+    freedom: Index
+
+
+def triangulate(
+    cameras: Sequence[Camera], pixels: Float[Array, "C N 2"], covariance: Float[Array, "C N 2 2"]
+) -> Points:
+    """Return the points in space whose pixels in ``cameras`` are given; NaN where a camera does not see one.
+
+    Linear start from the rays, then Gauss-Newton on the pixels, weighted by the inverse of their ``covariance``.
+    """
+    seen = np.asarray(np.isfinite(pixels).all(2))
+    enough = seen.sum(0) >= 2
+    count = pixels.shape[1]
+    positions = np.full((count, 3), np.nan)
+    spread = np.full((count, 3, 3), np.nan)
+    misfit = np.full(count, np.nan)
+    at = np.flatnonzero(enough)
+    if len(at):
+        found = _linear(cameras, pixels[:, at], seen[:, at])
+        weights = _weights(covariance[:, at], seen[:, at])
+        found, matrix, cost = _refined(cameras, pixels[:, at], seen[:, at], weights, found)
+        positions[at], misfit[at] = found, cost
+        spread[at] = np.linalg.inv(matrix)
+    return Points(positions, spread, misfit, 2 * seen.sum(0) - 3)
+
+
+def _linear(cameras: Sequence[Camera], pixels: Array, seen: Mask) -> Float[Array, "N 3"]:
+    """Return the points nearest to their rays: least squares of the distances."""
+    matrix, right = np.zeros((pixels.shape[1], 3, 3)), np.zeros((pixels.shape[1], 3))
+    for camera, at, mask in zip(cameras, pixels, seen, strict=True):
+        slopes = camera.rays(at[mask])
+        ray = np.column_stack([slopes, np.ones(len(slopes))]) @ camera.rotation
+        ray /= np.linalg.norm(ray, axis=1, keepdims=True)
+        across = np.eye(3) - ray[:, :, None] * ray[:, None, :]
+        matrix[mask] += across
+        right[mask] += across @ camera.centre
+    matrix += 1e-12 * np.eye(3)
+    return np.asarray(np.linalg.solve(matrix, right[:, :, None])[:, :, 0])
+
+
+def _weights(covariance: Float[Array, "C N 2 2"], seen: Mask) -> Float[Array, "C N 2 2"]:
+    weights = np.zeros_like(covariance)
+    weights[seen] = np.linalg.inv(covariance[seen])
+    return weights
+
+
+def _refined(
+    cameras: Sequence[Camera], pixels: Array, seen: Mask, weights: Array, start: Float[Array, "N 3"]
+) -> tuple[Float[Array, "N 3"], Float[Array, "N 3 3"], Float[Array, " N"]]:
+    """Return points, their matrices of information and the sums of weighted squares."""
+    points = start.copy()
+    for _ in range(_STEPS):
+        matrix, right, cost = np.zeros((len(points), 3, 3)), np.zeros((len(points), 3)), np.zeros(len(points))
+        for camera, at, mask, weight in zip(cameras, pixels, seen, weights, strict=True):
+            where, by_point, _ = camera.project_with_changes(points[mask])
+            residual = at[mask] - where
+            weighted = np.einsum("nij,nik->njk", weight[mask], by_point)
+            matrix[mask] += np.einsum("nij,nik->njk", by_point, weighted)
+            right[mask] += np.einsum("nij,ni->nj", weighted, residual)
+            cost[mask] += np.einsum("ni,nij,nj->n", residual, weight[mask], residual)
+        step = np.linalg.solve(matrix, right[:, :, None])[:, :, 0]
+        # The information and the cost are those of the points before a step too small to change them.
+        if np.abs(step).max() < _SMALL_STEP_M:
+            break
+        points = points + step
+    return points, matrix, cost
+
+
+def error_from_cameras(
+    cameras: Sequence[Camera],
+    points: Points,
+    pixels: Float[Array, "C N 2"],
+    covariance: Float[Array, "C N 2 2"],
+    calibration: Float[Array, "P P"],
+) -> Float[Array, "N 3 P"]:
+    """Return the derivatives of the ``points`` by all parameters of the cameras, in the order of ``calibration``.
+
+    A wrong calibration moves all points together: their covariance from it is ``J calibration J^T`` between any two.
+    """
+    seen = np.asarray(np.isfinite(pixels).all(2))
+    weights = _weights(covariance, seen)
+    total = len(calibration)
+    right = np.zeros((pixels.shape[1], 3, total))
+    first = 0
+    for camera, mask, weight in zip(cameras, seen, weights, strict=True):
+        size = len(camera.parameter_names)
+        good = mask & np.isfinite(points.positions).all(1)
+        _, by_point, by_camera = camera.project_with_changes(points.positions[good])
+        right[good, :, first : first + size] -= np.einsum("nij,nik,nkp->njp", by_point, weight[good], by_camera)
+        first += size
+    return np.asarray(np.einsum("nij,njp->nip", points.covariance, right))

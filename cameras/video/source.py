@@ -1,0 +1,147 @@
+"""The frames of one camera, from a video file or a folder of images, one at a time."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from wingfit.cameras.opencv import opencv
+from wingfit.records.array_types import Array
+from wingfit.records.errors import fail
+
+IMAGES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".pgm")
+VIDEOS = (".mp4", ".m4v", ".mov", ".avi", ".mkv", ".webm", ".mts", ".wmv")
+MOST_PIXELS = 64_000_000
+_FASTEST_HZ = 1_000_000.0
+
+
+@dataclass(frozen=True)
+class Film:
+    """Frames of one camera.
+
+    Attributes:
+        path: of a video file, or of a folder with one image per frame, in the order of the numbers in their names.
+        rate_hz: frames per second; that of the file if None. Images have none, and videos of a high-speed camera state
+            that of playback.
+    """
+
+    path: Path
+    rate_hz: float | None = None
+
+    def opened(self) -> Frames:
+        """Return the frames; DatasetError if the path holds none or the rate is unknown."""
+        if self.rate_hz is not None and not 0 < self.rate_hz < _FASTEST_HZ:
+            raise fail(
+                str(self.path), self.rate_hz, f"rate_hz is {self.rate_hz}; it must be above 0, in frames per second"
+            )
+        if self.path.is_dir():
+            return _ImageFrames(self.path, self.rate_hz)
+        if not self.path.exists():
+            raise fail(
+                str(self.path), None, "is no file or folder; state the path of a video, or of a folder of images"
+            )
+        return _VideoFrames(self.path, self.rate_hz)
+
+
+class Frames:
+    """Grey frames [H, W] of a film: ``size_px`` is width and height, ``count`` may be off by a few for a video."""
+
+    path: Path
+    size_px: tuple[int, int]
+    rate_hz: float
+    count: int
+
+    def read(self, first: int = 0) -> Iterator[tuple[int, Array | None]]:
+        """Return frames with their numbers, from number ``first``; None is a frame that cannot be decoded."""
+        raise NotImplementedError
+
+    def _check(self) -> None:
+        width, height = self.size_px
+        if width * height > MOST_PIXELS:
+            raise fail(
+                str(self.path), width * height, f"frames have {width} x {height} pixels; at most {MOST_PIXELS} are read"
+            )
+
+
+class _ImageFrames(Frames):
+    def __init__(self, folder: Path, rate_hz: float | None) -> None:
+        self.path = folder
+        self.files = sorted((one for one in folder.iterdir() if one.suffix.lower() in IMAGES), key=_by_number)
+        if not self.files:
+            raise fail(str(folder), None, f"holds no images; a frame is a file ending in {', '.join(IMAGES)}")
+        if rate_hz is None:
+            raise fail(str(folder), None, "images have no frame rate; state rate_hz, in frames per second")
+        first = _grey(opencv().imread(str(self.files[0]), opencv().IMREAD_UNCHANGED))
+        if first is None:
+            raise fail(str(self.files[0]), None, "cannot be read as an image; save it as PNG")
+        self.size_px = (first.shape[1], first.shape[0])
+        self.rate_hz, self.count = rate_hz, len(self.files)
+        self._check()
+
+    def read(self, first: int = 0) -> Iterator[tuple[int, Array | None]]:
+        cv2 = opencv()
+        for number, file in enumerate(self.files[first:], first):
+            image = _grey(cv2.imread(str(file), cv2.IMREAD_UNCHANGED))
+            fits = image is not None and image.shape == self.size_px[::-1]
+            yield number, image if fits else None
+
+
+class _VideoFrames(Frames):
+    def __init__(self, file: Path, rate_hz: float | None) -> None:
+        self.path = file
+        cv2 = opencv()
+        video = self._open()
+        self.size_px = (int(video.get(cv2.CAP_PROP_FRAME_WIDTH)), int(video.get(cv2.CAP_PROP_FRAME_HEIGHT)))
+        stated = float(video.get(cv2.CAP_PROP_FPS))
+        self.count = max(int(video.get(cv2.CAP_PROP_FRAME_COUNT)), 0)
+        readable, _ = video.read()
+        video.release()
+        if not readable:
+            raise fail(str(file), None, "holds no frame that can be decoded; convert it, for example to MP4 with H.264")
+        self.rate_hz = rate_hz if rate_hz is not None else stated
+        if not 0 < self.rate_hz < _FASTEST_HZ:
+            raise fail(str(file), stated, "states no frame rate; state rate_hz, in frames per second")
+        self._check()
+
+    def _open(self) -> Any:
+        video = opencv().VideoCapture(str(self.path))
+        if not video.isOpened():
+            endings = ", ".join(VIDEOS)
+            raise fail(
+                str(self.path), None, f"cannot be read as a video; use a common container ({endings}), or images"
+            )
+        return video
+
+    def read(self, first: int = 0) -> Iterator[tuple[int, Array | None]]:
+        video, number = self._open(), 0
+        try:
+            # Containers seek to key frames only, so earlier frames are decoded and skipped.
+            while video.grab():
+                if number >= first:
+                    readable, image = video.retrieve()
+                    yield number, _grey(image) if readable else None
+                number += 1
+        finally:
+            video.release()
+
+
+def _grey(image: Array | None) -> Array | None:
+    """Return an image without colour."""
+    if image is None:
+        return None
+    if image.ndim == 3:
+        cv2 = opencv()
+        code = cv2.COLOR_BGRA2GRAY if image.shape[2] == 4 else cv2.COLOR_BGR2GRAY
+        return np.asarray(cv2.cvtColor(image, code))
+    return image
+
+
+def _by_number(file: Path) -> tuple[list[tuple[int, str]], str]:
+    """Return a key by which frame9 is before frame10."""
+    parts = re.findall(r"\d+|\D+", file.stem)
+    return [(int(part), "") if part.isdigit() else (-1, part) for part in parts], file.name
