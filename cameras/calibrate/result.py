@@ -179,8 +179,10 @@ def _inverse(information: Array, free: Free, names: Sequence[str], remedy: str) 
     values, vectors = np.linalg.eigh(matrix * np.outer(scale, scale))
     if len(values) and values[0] < LEAST_EIGENVALUE:
         name = names[rows[int(np.argmax(np.abs(vectors[:, 0])))]]
+        camera, _, parameter = name.rpartition(".")
+        what = f"the focal length of camera {camera}" if parameter in FOCAL_AND_CENTRE[:2] else name
         why = f"smallest eigenvalue of the scaled normal matrix {values[0]:.1g}, at least {LEAST_EIGENVALUE:g}"
-        raise _not_determined(name, f"{name} with others ({why})", remedy)
+        raise _not_determined(name, f"{what} ({why})", remedy)
     inverse = np.zeros_like(information)
     inverse[np.ix_(rows, rows)] = (vectors / values) @ vectors.T * np.outer(scale, scale)
     return inverse

@@ -257,7 +257,7 @@ def _pruner(seen: Observations, scene: Scene) -> Pruned:
     def prune(used: Mask) -> Mask:
         counts = np.bincount(place[used], minlength=len(scene.rotations) * markers)
         enough = counts.reshape(-1, markers).min(axis=1) >= LEAST_CAMERAS
-        return used & enough[seen.body]
+        return np.asarray(used & enough[seen.body])
 
     return prune
 

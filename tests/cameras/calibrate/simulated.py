@@ -93,6 +93,6 @@ def wand_tracks(
     for camera in cameras:
         pixels = camera.project(points.reshape(-1, 3)).reshape(frames, -1, 2)
         pixels += noise * rng.standard_normal(pixels.shape)
-        outside = ((pixels < 0) | (pixels > np.array(camera.size_px) - 1)).any(axis=2)
+        outside = np.asarray(((pixels < 0) | (pixels > np.array(camera.size_px) - 1)).any(axis=2))
         tracks[camera.name] = np.where(outside[:, :, None], np.nan, pixels)
     return tracks
