@@ -12,6 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy.sparse
 from scipy.spatial.transform import Rotation
 
 from wingfit.cameras.camera import Camera, Lens
@@ -85,10 +86,13 @@ def projection_errors(scene: Scene, seen: Observations) -> Float[Array, "N 2"]:
     return errors
 
 
-def adjust(scene: Scene, seen: Observations, free: Free, huber_px: float | None = None) -> Adjusted:
+def adjust(
+    scene: Scene, seen: Observations, free: Free, huber_px: float | None = None, tolerance: float = CONVERGED
+) -> Adjusted:
     """Minimise the squared errors of ``seen`` over what is ``free``, from the start ``scene``.
 
-    With ``huber_px``, an error beyond it counts linearly (Huber 1964). Every body with free motions must be seen.
+    With ``huber_px``, an error beyond it counts linearly (Huber 1964). Every body with free motions must be seen. The
+    last step decreases the sum by less than ``tolerance`` times its value.
     """
     system = _linearise(scene, seen, free, huber_px)
     damping, steps = FIRST_DAMPING, 0
@@ -102,7 +106,7 @@ def adjust(scene: Scene, seen: Observations, free: Free, huber_px: float | None 
         decrease = system.cost - cost
         scene, damping = trial, max(damping / 10, LEAST_DAMPING)
         system = _linearise(scene, seen, free, huber_px)
-        if decrease <= CONVERGED * cost:
+        if decrease <= tolerance * cost:
             break
     return Adjusted(scene, system.errors, system.information(), steps)
 
@@ -152,17 +156,25 @@ def _linearise(scene: Scene, seen: Observations, free: Free, huber_px: float | N
         pixels, by_camera, by_body = _derivatives(camera, scene, body, seen.point[rows])
         errors[rows] = pixels - seen.pixels[rows]
         by_camera, by_body = by_camera * free.parameters[columns], by_body * free.motions[body][:, None, :]
-        weights = _weights(errors[rows], huber_px)[:, None, None]
-        one = errors[rows][:, :, None]
-        a[columns, columns] = np.einsum("nci,ncj->ij", weights * by_camera, by_camera)
-        gradient_a[columns] = np.einsum("nci,ncj->i", weights * by_camera, one)
-        np.add.at(b, body, np.einsum("nci,ncj->nij", weights * by_body, by_body))
-        np.add.at(gradient_b, body, np.einsum("nci,ncj->ni", weights * by_body, one))
-        np.add.at(ab[:, columns], body, np.einsum("nci,ncj->nij", weights * by_camera, by_body))
+        weighted = _weights(errors[rows], huber_px)[:, None, None] * by_camera
+        flat = by_camera.reshape(-1, by_camera.shape[2])
+        a[columns, columns] = weighted.reshape(flat.shape).T @ flat
+        gradient_a[columns] = weighted.reshape(flat.shape).T @ errors[rows].ravel()
+        ab[:, columns] = _summed(np.einsum("nci,ncj->nij", weighted, by_body), body, bodies)
+        weighted = _weights(errors[rows], huber_px)[:, None, None] * by_body
+        b += _summed(np.einsum("nci,ncj->nij", weighted, by_body), body, bodies)
+        gradient_b += _summed(np.einsum("nci,nc->ni", weighted, errors[rows]), body, bodies)
     a[~free.parameters, ~free.parameters] = 1.0
     held, axis = np.nonzero(~free.motions)
     b[held, axis, axis] = 1.0
     return _System(a, b, ab, gradient_a, gradient_b, free, errors, _cost(errors, huber_px))
+
+
+def _summed(values: Array, body: Index, bodies: int) -> Array:
+    """Return the sums of ``values`` [N, ...] over the observations of each body."""
+    count = len(values)
+    chosen = scipy.sparse.csr_array((np.ones(count), (body, np.arange(count))), shape=(bodies, count))
+    return np.asarray(chosen @ values.reshape(count, -1)).reshape(bodies, *values.shape[1:])
 
 
 def _derivatives(camera: Camera, scene: Scene, body: Index, point: Index) -> tuple[Array, Array, Array]:

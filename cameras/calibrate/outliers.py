@@ -7,14 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wingfit.cameras.calibrate.bundle import Adjusted, Free, Observations, Scene, adjust, projection_errors
+from wingfit.cameras.calibrate.bundle import CONVERGED, Adjusted, Free, Observations, Scene, adjust, projection_errors
 from wingfit.records.array_types import Array, Bool, Index, Int, Mask
 
 POINT_LIMIT = 5.0  # standard deviations: Gaussian errors in two directions exceed it once in 270,000 points
-IMAGE_LIMIT = 3.0  # RMS error of an image over the median of its camera
+IMAGE_LIMIT = 3.0  # median distance of the points of an image over the median of those of its camera
 HUBER_LIMIT = 1.5  # standard deviations of one coordinate
 LEAST_PX = 1e-3  # errors below it are of no concern, and zero in noise-free tests
 ROUNDS = 20
+ROUGHLY_CONVERGED = 1e-4  # of robust fits, after which outliers are rejected
 # The median absolute value of a Gaussian variable is 0.6745 of its standard deviation.
 MEDIAN_TO_DEVIATION = 1 / 0.6745
 
@@ -69,7 +70,8 @@ def _fit(scene: Scene, seen: Observations, free: Free, used: Mask, huber: float 
     """Fit to those ``used``; bodies without observations stay where they are."""
     present = np.bincount(seen.body[used], minlength=len(scene.rotations)) > 0
     seen_only = Free(free.parameters, free.motions & present[:, None])
-    return adjust(scene, seen.only(used), seen_only, huber), seen_only
+    tolerance = CONVERGED if huber is None else ROUGHLY_CONVERGED
+    return adjust(scene, seen.only(used), seen_only, huber, tolerance), seen_only
 
 
 def _huber(scene: Scene, seen: Observations, used: Mask) -> float:
@@ -90,12 +92,12 @@ def _far_points(errors: Array, seen: Observations, used: Mask) -> Mask:
 
 
 def _far_images(errors: Array, seen: Observations, used: Mask) -> Mask:
+    """Return the points of images of which the median distance is large: single bad points do not make it so."""
     far = np.zeros(len(errors), bool)
-    bodies = int(seen.body.max()) + 1
-    image, squares = image_numbers(seen, bodies), np.sum(errors**2, axis=1)
+    image, distances = image_numbers(seen, int(seen.body.max()) + 1), np.linalg.norm(errors, axis=1)
     for camera in np.unique(seen.camera[used]):
         mine = used & (seen.camera == camera)
         numbers, place = np.unique(image[mine], return_inverse=True)
-        rms = np.sqrt(np.bincount(place, squares[mine]) / np.bincount(place, minlength=len(numbers)))
-        far[mine] = (rms > max(IMAGE_LIMIT * float(np.median(rms)), LEAST_PX))[place]
+        medians = np.array([np.median(distances[mine][place == i]) for i in range(len(numbers))])
+        far[mine] = (medians > max(IMAGE_LIMIT * float(np.median(medians)), LEAST_PX))[place]
     return far

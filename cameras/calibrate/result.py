@@ -231,7 +231,7 @@ def _rejections(
     found: Screened, seen: Observations, cameras: Sequence[Camera], images: Sequence[str]
 ) -> list[Rejection]:
     reasons = (
-        (found.far_images, True, "its RMS error is more than 3 times the median of the camera"),
+        (found.far_images, True, "its median error is more than 3 times that of the other images"),
         (found.far_points, False, "errors of more than 5 standard deviations"),
         (~(found.used | found.far_images | found.far_points), False, "too few points are seen with those rejected"),
     )
