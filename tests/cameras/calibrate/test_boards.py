@@ -89,7 +89,7 @@ def test_cameras_that_never_see_the_board_together_are_joined_by_others() -> Non
     true = ring((0.0, 40.0, 80.0, 120.0))
     rng = np.random.default_rng(3)
     poses = board_poses(rng, 24, BOARD)
-    pairs = {view: ((0, 1), (1, 2), (2, 3))[view % 3] for view in range(24)}
+    pairs: dict[int, tuple[int, ...]] = {view: ((0, 1), (1, 2), (2, 3))[view % 3] for view in range(24)}
     result = calibrate_boards(sightings(true, BOARD, poses, rng, NOISE, pairs))
     assert np.abs(normalised(result, true)[0]).max() < 4
 
@@ -97,7 +97,7 @@ def test_cameras_that_never_see_the_board_together_are_joined_by_others() -> Non
 def test_groups_of_cameras_without_a_shared_view_are_named() -> None:
     rng = np.random.default_rng(3)
     poses = board_poses(rng, 24, BOARD)
-    pairs = {view: ((0, 1), (2, 3))[view % 2] for view in range(24)}
+    pairs: dict[int, tuple[int, ...]] = {view: ((0, 1), (2, 3))[view % 2] for view in range(24)}
     apart = sightings(ring((0.0, 40.0, 80.0, 120.0)), BOARD, poses, rng, NOISE, pairs)
     with pytest.raises(DatasetError, match="cameras c, d and the cameras a, b"):
         calibrate_boards(apart)
