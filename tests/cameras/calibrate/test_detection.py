@@ -64,7 +64,7 @@ def test_corners_are_detected_and_unseen_boards_are_listed(
     assert found.of_camera(0) == [0, 1]
     assert [(one.camera, one.image) for one in found.unseen] == [("a", "3.png")]
     for view, true in enumerate(truth):
-        assert np.abs(found.corners[0, view] - true).max() < 0.15
+        assert np.abs(found.corners[0, view] - true).max() < 0.1
 
 
 def test_a_camera_upside_down_numbers_the_corners_alike(
@@ -76,7 +76,7 @@ def test_a_camera_upside_down_numbers_the_corners_alike(
     for view, true in enumerate(truth):
         height, width = images[view].shape
         turned = np.array([width - 1, height - 1]) - found.corners[0, view]
-        assert np.abs(turned - true).max() < 0.15
+        assert np.abs(turned - true).max() < 0.1
 
 
 def test_the_order_of_the_detector_does_not_matter(shots: tuple[list[np.ndarray], list[np.ndarray]]) -> None:
