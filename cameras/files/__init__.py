@@ -1,0 +1,1 @@
+"""Files of calibrated cameras: that of wingfit, and those of DLTdv, easyWand, OpenCV and Anipose."""
