@@ -25,6 +25,8 @@ from wingfit.cli import (
 )
 from wingfit.cli.aligning import command as aligning
 from wingfit.cli.base.output import note
+from wingfit.cli.cameras import calibrate as cameras
+from wingfit.cli.cameras import track as films
 from wingfit.cli.forces import free_flight, kinematics
 from wingfit.cli.forces import runs as force_runs
 from wingfit.cli.importing import command as importing
@@ -49,6 +51,8 @@ app.command("import")(importing.import_)
 app.command("import-forces")(force_files.import_forces)
 app.command("wing-template")(template.wing_template)
 app.command("wing-drawing")(template.wing_drawing)
+app.add_typer(cameras.app, name="cameras")
+app.command()(films.track)
 app.command()(aligning.align)
 app.command()(kinematics.kinematics)
 app.command()(free_flight.forces)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal
 
@@ -23,7 +23,12 @@ NO_BOARD = "no board of {columns} x {rows} inner corners was detected"
 
 
 def find_boards(
-    images: Mapping[str, Sequence[Path]], board: Board, *, match: Match | None = None, finder: Finder = "sector"
+    images: Mapping[str, Sequence[Path]],
+    board: Board,
+    *,
+    match: Match | None = None,
+    finder: Finder = "sector",
+    report: Callable[[float], object] = lambda _: None,
 ) -> Sightings:
     """Detect ``board`` in the images of each camera, and say which images show it at the same time.
 
@@ -33,6 +38,7 @@ def find_boards(
         match: how images of different cameras are matched (see ``views_of_images``).
         finder: ``sector`` is OpenCV's findChessboardCornersSB (Duda and Frese 2018), with ``adaptive`` where it fails;
             ``adaptive`` is findChessboardCorners alone. Both are refined by cornerSubPix.
+        report: called with the part of the images that is done, from 0 to 1.
 
     Raises:
         DatasetError: for images that cannot be read or have different sizes in one camera, for a camera in which no
@@ -46,6 +52,7 @@ def find_boards(
     sizes: dict[int, tuple[int, int]] = {}
     unseen, larger = [], Counter[tuple[int, int]]()
     for number, view in enumerate(views):
+        report(number / len(views))
         for camera, path in views[view].items():
             c = cameras.index(camera)
             grey = read_grey(path)

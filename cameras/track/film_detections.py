@@ -62,8 +62,10 @@ class FilmTask:
         return hashlib.sha256(json.dumps([*stated, self.first, self.last]).encode()).hexdigest()[:16]
 
 
-def detect_film(task: FilmTask, progress: Progress = lambda done, of: None) -> FilmDetections:
+def detect_film(task: FilmTask, progress: Progress) -> FilmDetections:
     """Return the detections of a film; those that an earlier run stored are read.
+
+    ``progress`` is called with the count of frames done, and of all.
 
     Raises:
         DatasetError: the film cannot be read, or a strobe's flashes cannot be told apart.

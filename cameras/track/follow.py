@@ -41,11 +41,12 @@ def follow(
     clouds: Sequence[Cloud],
     reference: Float[Array, "K 3"],
     surface: Surface,
-    progress: Progress = lambda done, of: None,
+    progress: Progress,
 ) -> Followed | None:
     """Identify the markers in the ``clouds`` of all instants; None if the wing is seen in none of those tried.
 
-    ``reference`` are the markers in any axes, for example at rest.
+    ``reference`` are the markers in any axes, for example at rest. ``progress`` is called with the count of instants
+    done, and of all.
     """
     start, found = _start(clouds, reference)
     if found is None:
@@ -56,7 +57,7 @@ def follow(
     for direction in (1, -1):
         state.restart(start)
         for instant in range(start + direction, len(clouds) if direction > 0 else -1, direction):
-            state.step(instant, direction)
+            state.step(instant)
             done += 1
             progress(done, len(clouds))
     return Followed(state.chosen, state.predicted, start)
@@ -108,8 +109,8 @@ class _State:
         self.chosen[instant], self.predicted[instant] = chosen, smooth
         self.places[instant] = np.where(found[:, None], self.clouds[instant].positions[chosen], smooth)
 
-    def step(self, instant: int, direction: int) -> None:
-        """Identify the markers at ``instant`` from those of the instants before it in this ``direction``."""
+    def step(self, instant: int) -> None:
+        """Identify the markers at ``instant`` from those of the instants before."""
         cloud = self.clouds[instant]
         expected = self._extrapolated(instant) if np.isfinite(self.error) else None
         found = self._near(expected, cloud) if expected is not None else None
@@ -120,7 +121,7 @@ class _State:
         if found is None or (found[0] >= 0).sum() < _LEAST_MARKERS:
             return
         self.put(instant, *found)
-        self._learn(instant, direction)
+        self._learn(instant)
 
     def _extrapolated(self, instant: int) -> Float[Array, "K 3"]:
         """Return the places at ``instant`` of the polynomial through the last one to three instants."""
@@ -179,7 +180,7 @@ class _State:
         chosen, smooth = register(self.places[self.known[-1]], cloud.positions, cloud.points.covariance)
         return (chosen, smooth) if (chosen >= 0).any() else None
 
-    def _learn(self, instant: int, direction: int) -> None:
+    def _learn(self, instant: int) -> None:
         """Compare the markers with what was expected, so that the next search is as wide as it must be."""
         if len(self.known) >= 3 or (len(self.known) == 2 and not np.isfinite(self.error)):
             apart = np.linalg.norm(self._extrapolated(instant) - self.places[instant], axis=1)

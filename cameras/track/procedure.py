@@ -23,6 +23,12 @@ from wingfit.records.array_types import Array, Float, Index
 from wingfit.records.errors import counted, fail
 
 Report = Callable[[str, float], object]
+
+
+def _silent(step: str, part: float) -> None:
+    pass
+
+
 TOLERANCE_PX = 0.3
 """Error of the calibration (standard deviation) that the search for meeting rays allows."""
 MOST_PLACES = 20_000_000  # instants times markers
@@ -60,7 +66,7 @@ class Request:
     store: Path | None = None
 
 
-def track(request: Request, report: Report = lambda what, part: None) -> TrackedFilm:
+def track(request: Request, report: Report = _silent) -> TrackedFilm:
     """Track the markers of a wing; ``report`` is called with what is being done, and how much of it is done (0 to 1).
 
     Raises:
@@ -87,9 +93,9 @@ def track(request: Request, report: Report = lambda what, part: None) -> Tracked
         raise fail(
             "markers",
             most,
-            f"at none of the instants tried do {LEAST_MARKERS} points agree with the described markers, of at most {most} "
-            "that two cameras see: check the calibration, the unit of the markers' places, and that all cameras show the "
-            "same wing",
+            f"at none of the instants tried do {LEAST_MARKERS} points agree with the described markers, of at most "
+            f"{most} that two cameras see: check the calibration, the unit of the markers' places, and that all "
+            "cameras show the same wing",
         )
     return _result(request, found, instants, clouds, followed, names)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -55,6 +56,14 @@ class TrackedFilm:
         """Return the tracks as CSV: ``time_s``, and x, y, z of each marker in m."""
         columns = [f"{name}_{axis}_m" for name in self.names for axis in "xyz"]
         return write_table(columns, self.times, self.positions.reshape(len(self.times), -1))
+
+    def write_covariance(self, path: Path) -> None:
+        """Write names, times and covariances (m^2) to ``path``, a NumPy archive."""
+        arrays = {"names": np.array(self.names), "times": self.times, "covariance": self.covariance}
+        if self.by_calibration is not None:
+            arrays["by_calibration"] = self.by_calibration
+        with path.open("wb") as file:
+            np.savez_compressed(file, allow_pickle=False, **arrays)
 
     def as_json(self) -> dict[str, Any]:
         """Return the summary of the tracks as JSON."""

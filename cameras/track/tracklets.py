@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -69,7 +70,7 @@ def _calmest(frames: Sequence[Detections]) -> int:
     """Return the frame from which the detections move least to the next, among those that see most of them."""
     many = np.percentile([len(frame) for frame in frames], 70)
     best, least = 0, np.inf
-    for number, (one, two) in enumerate(zip(frames, frames[1:], strict=False)):
+    for number, (one, two) in enumerate(pairwise(frames)):
         if len(one) < max(many, 2) or len(two) < 2:
             continue
         moved = float(np.median(cKDTree(two.pixels).query(one.pixels)[0]))

@@ -14,11 +14,11 @@ from wingfit.cli.base.output import note, number, say, table
 from wingfit.records import LowPass, Recording
 from wingfit.records.description.convert import describe_recording
 from wingfit.records.description.yaml_text import write_yaml
+from wingfit.records.files.number_table import Table, header_of, read_table, require
 from wingfit.records.files.table import write_table
 from wingfit.report.charts import Chart, Curve, chart_page
 from wingfit.service.units import PASCAL_PER_MBAR, ZERO_CELSIUS
 from wingfit.tracking.free_flight import Body, FreeFlight, free_flight, recording
-from wingfit.tracking.tables import Table, header_of, read_table, require
 
 __all__ = ["CUTOFF_PER_BEAT", "PASCAL_PER_MBAR", "ZERO_CELSIUS", "LowPass", "recording"]
 

@@ -13,9 +13,9 @@ from wingfit.cli.base.output import note, number, say, table
 from wingfit.records.description.convert import to_data
 from wingfit.records.description.vehicle_file import MotionFile
 from wingfit.records.description.yaml_text import write_yaml
+from wingfit.records.files.number_table import Table, header_of, read_table, require
 from wingfit.report.charts import Chart, Curve, chart_page
 from wingfit.tracking.smoothing import PeriodicFit
-from wingfit.tracking.tables import Table, header_of, read_table, require
 from wingfit.tracking.wing_kinematics import Angles, WingKinematics, WingPlace, beats_of, from_markers, wing_motion
 
 SMALLEST_RANGE_DEG = 2.0  # of a plausible flap angle in degrees: a range below is probably in radians

@@ -14,8 +14,8 @@ from tests.command_line import Wingfit, in_process
 from tests.importers.start.test_start import wing_table
 from tests.oracles.track_files import flapping, text_writers
 from wingfit.cli.importing.command import import_
+from wingfit.records.files.number_table import read_table
 from wingfit.records.files.tracks import read_tracks
-from wingfit.tracking.tables import read_table
 
 
 @pytest.fixture

@@ -1,0 +1,181 @@
+"""The description of what is filmed: ``film.yaml``, with cameras, films, markers and light."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, get_args
+
+import numpy as np
+
+from wingfit.cameras.files.read import read_cameras
+from wingfit.cameras.track.film_detections import Light, MarkerKind
+from wingfit.cameras.track.procedure import LEAST_MARKERS, Request
+from wingfit.cameras.video.source import Film
+from wingfit.records.array_types import Array
+from wingfit.records.description.wing_description import read_wing
+from wingfit.records.description.yaml_text import Document, read_yaml
+from wingfit.records.errors import check_most, fail, nearest, shown
+from wingfit.records.files.number_table import read_table
+from wingfit.records.limits import MAX_DESCRIPTION_BYTES, MIB
+
+FORMAT, VERSION = "wingfit film", 1
+MOST_CAMERAS = 8
+MOST_WITHIN_MS = 1000.0
+_KEYS = ("format", "version", "cameras", "films", "markers", "light")
+_OPTIONAL = ("clocks_within_ms", "first_frame", "last_frame")
+
+
+def read_film(path: Path, store: Path | None = None) -> Request:
+    """Return what ``film.yaml`` at ``path`` describes; paths in it count from its folder.
+
+    ``store`` is the folder for what is detected. DatasetError names line, value and remedy.
+    """
+    document = _document(path)
+    data = _mapping(document, (), _KEYS, _OPTIONAL)
+    if data["format"] != FORMAT or data["version"] != VERSION:
+        value = f"{data['format']} {data['version']}"
+        raise fail(document.where(("format",)), value, f"{value!r} is not {FORMAT!r} version {VERSION}")
+    return _Reader(document, data, path.parent).request(store)
+
+
+@dataclass(frozen=True)
+class _Reader:
+    document: Document
+    data: Mapping[str, Any]
+    folder: Path
+
+    def request(self, store: Path | None) -> Request:
+        described = read_cameras(self._file(("cameras",)))
+        films = self._films([camera.name for camera in described.cameras])
+        cameras = tuple(camera for camera in described.cameras if camera.name in films)
+        covariance = described.covariance
+        if covariance is not None:
+            sizes = [len(camera.parameter_names) for camera in described.cameras]
+            used = np.repeat([camera.name in films for camera in described.cameras], sizes)
+            covariance = covariance[np.ix_(used, used)]
+        markers = _mapping(self.document, ("markers",), ("kind",), ("wing", "places"))
+        names, places = self._places(markers)
+        light: Light = self._choice(("light",), get_args(Light))
+        within = self._number(("clocks_within_ms",), 0.0, MOST_WITHIN_MS, 0.0)
+        if within and light == "strobe":
+            where = self.document.where(("clocks_within_ms",))
+            raise fail(where, within, "with a strobe, its flashes show the clocks; leave the key out")
+        first = int(self._number(("first_frame",), 0, 10**9, 0))
+        last = int(self._number(("last_frame",), first + 1, 10**9, 0)) or None
+        return Request(
+            cameras=cameras,
+            films=tuple(films[camera.name] for camera in cameras),
+            kind=self._choice(("markers", "kind"), get_args(MarkerKind)),
+            light=light,
+            names=names,
+            reference=places,
+            calibration=covariance,
+            within_s=within / 1000,
+            first=first,
+            last=last,
+            store=store,
+        )
+
+    def _films(self, cameras: list[str]) -> dict[str, Film]:
+        films = _mapping(self.document, ("films",), (), tuple(cameras))
+        if not 2 <= len(films) <= MOST_CAMERAS:
+            where = self.document.where(("films",))
+            raise fail(where, len(films), f"{len(films)} films; tracks in space take 2 to {MOST_CAMERAS} cameras")
+        found = {}
+        for name in films:
+            _mapping(self.document, ("films", name), ("path",), ("rate_hz",))
+            rate = self._number(("films", name, "rate_hz"), 1e-3, 1e6, 0.0)
+            found[name] = Film(self._file(("films", name, "path")), rate or None)
+        return found
+
+    def _places(self, markers: Mapping[str, Any]) -> tuple[tuple[str, ...], Array | None]:
+        """Return names and places [K, 3] of the markers, from a wing or a table; none if neither is given."""
+        if "wing" in markers and "places" in markers:
+            raise fail(self.document.where(("markers",)), None, "has both 'wing' and 'places'; keep one")
+        if "wing" in markers:
+            wing = read_wing(self._file(("markers", "wing")))
+            names, places = tuple(one.name for one in wing.markers), np.array([one.position for one in wing.markers])
+        elif "places" in markers:
+            path = self._file(("markers", "places"))
+            table = read_table(path.read_bytes(), path.name, "marker")
+            names, places = table.labels, np.stack([table.column(f"{axis}_m") for axis in "xyz"], axis=1)
+        else:
+            return (), None
+        where = self.document.where(("markers",))
+        if len(names) < LEAST_MARKERS:
+            raise fail(where, len(names), f"{len(names)} markers; at least {LEAST_MARKERS} are needed")
+        if not np.isfinite(places).all() or len(set(names)) < len(names):
+            raise fail(where, None, "a marker has no place, or two have the same name; give each a name and a place")
+        size = float(np.linalg.norm(np.ptp(places, axis=0)))
+        if not 1e-3 < size < 20:
+            raise fail(where, f"{size:g}", f"the markers extend over {size:g} m; give their places in metres")
+        return names, places
+
+    def _file(self, path: tuple[str, ...]) -> Path:
+        value = self._value(path)
+        if not isinstance(value, str) or not value:
+            raise fail(self.document.where(path), value, f"{shown(value)} is no path; state that of a file or folder")
+        found = self.folder / value
+        if not found.exists():
+            raise fail(
+                self.document.where(path), value, f"there is no {found}; paths count from the folder of film.yaml"
+            )
+        return found
+
+    def _choice(self, path: tuple[str, ...], of: tuple[Any, ...]) -> Any:
+        value = self._value(path)
+        if value not in of:
+            raise fail(self.document.where(path), value, f"{shown(value)!r}; {nearest(str(value), of)}")
+        return value
+
+    def _number(self, path: tuple[str, ...], low: float, high: float, default: float) -> float:
+        value = self._value(path)
+        if value is None:
+            return default
+        try:
+            number = float(value)
+        except (TypeError, ValueError):
+            number = float("nan")
+        if not low <= number <= high:
+            raise fail(
+                self.document.where(path), value, f"{shown(value)}; it must be a number from {low:g} to {high:g}"
+            )
+        return number
+
+    def _value(self, path: tuple[str, ...]) -> Any:
+        value: Any = self.data
+        for key in path:
+            value = value.get(key) if isinstance(value, dict) else None
+        return value
+
+
+def _document(path: Path) -> Document:
+    try:
+        raw = path.read_bytes()
+    except OSError as error:
+        raise fail(str(path), None, f"cannot be read: {error.strerror or error}; check the path") from None
+    limit = MAX_DESCRIPTION_BYTES / MIB
+    check_most(path.name, "has", len(raw) / MIB, limit, "MiB", "a description of films is short; check the path")
+    return read_yaml(raw, path.name)
+
+
+def _mapping(
+    document: Document, path: tuple[str, ...], keys: tuple[str, ...], optional: tuple[str, ...] = ()
+) -> Mapping[str, Any]:
+    """Return the mapping at ``path``, which must have exactly ``keys``, and may have ``optional`` ones."""
+    data: Any = document.data
+    for key in path:
+        data = data.get(key) if isinstance(data, dict) else None
+    if not isinstance(data, dict):
+        raise fail(
+            document.where(path), data, f"{shown(data)} is no mapping with the keys {', '.join((*keys, *optional))}"
+        )
+    for key in keys:
+        if key not in data:
+            raise fail(document.where((*path, key)), None, f"the key {key!r} is missing; add it")
+    for key in data:
+        if key not in (*keys, *optional):
+            raise fail(document.where((*path, key)), key, f"unknown key {key!r}; {nearest(key, (*keys, *optional))}")
+    return data

@@ -1,0 +1,1 @@
+"""``wingfit track`` and ``wingfit cameras``."""
