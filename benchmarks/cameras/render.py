@@ -2,8 +2,9 @@
 
 The folder then holds, for each camera CAM (``left``, ``right``, ...):
 
-- ``wing-CAM.avi``: the film of the wing. Frame f is frame f of the truth. ``--suffix .mp4`` writes MPEG-4 instead, and
-  ``--suffix .png`` a folder ``wing-CAM`` of images.
+- ``wing-CAM.avi``: the film of the wing; its frames are counted from 0, as in the truth. ``--suffix`` selects .avi
+  (MJPG) or .mp4 (MPEG-4), which lose most of the noise in the dark, .mkv (FFV1) without loss, or .png: a folder
+  ``wing-CAM`` of images.
 - ``wand-CAM.avi``: a wand with two balls, waved, in continuous light.
 - ``boards-CAM/00.png``, ...: the chessboard at rest. Images of the same number show the same pose.
 - ``cameras.json``: a list of the true cameras: size, matrix, distortion (k1, k2, p1, p2, k3), rotation and translation
@@ -28,13 +29,18 @@ import numpy as np
 from benchmarks.cameras.renderer.boards import board_image
 from benchmarks.cameras.renderer.film import Film
 from benchmarks.cameras.renderer.film_camera import FilmCamera
-from benchmarks.cameras.renderer.presets import PRESETS, Experiment
+from benchmarks.cameras.renderer.presets import BEAT, PRESETS, Experiment, with_rod
+from benchmarks.cameras.renderer.scene import Scene
 from benchmarks.cameras.renderer.sensor import Image
+from benchmarks.cameras.renderer.simulated import simulated_scene
 from benchmarks.cameras.renderer.truth import truth_of
-from benchmarks.cameras.write import write_image, write_video
+from benchmarks.cameras.renderer.wings import Flapping, analytic_scene
+from benchmarks.cameras.write import CODECS, write_image, write_video
 from benchmarks.common.progress import show_count
+from wingfit.records import Condition
 
-SUFFIXES = (".avi", ".mp4", ".png")
+SUFFIXES = (*CODECS, ".png")
+PRESSURE, LAG = 1e4, 0.05  # Pa and rad, of the simulated wing
 
 
 def main(words: list[str] | None = None) -> None:
@@ -45,6 +51,16 @@ def main(words: list[str] | None = None) -> None:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--flashes", type=int, help="number of flashes of the strobe")
     parser.add_argument("--beats", type=float, help="number of beats filmed in continuous light")
+    parser.add_argument("--wing", choices=("analytic", "simulated"), default="analytic", help="which wing is filmed")
+    parser.add_argument(
+        "--gene",
+        action="append",
+        type=_gene,
+        default=[],
+        metavar="NAME=VALUE",
+        help="of the simulated wing: hinge_offset.y=0.02",
+    )
+    parser.add_argument("--rod", action="store_true", help="a rod hides some of the markers")
     parser.add_argument("--scale", type=float, default=1.0, help="width of the images relative to the cameras' own")
     parser.add_argument("--suffix", choices=SUFFIXES, default=".avi", help="kind of video")
     parser.add_argument("--seed", type=int, default=1, help="the same seed gives the same films")
@@ -54,8 +70,28 @@ def main(words: list[str] | None = None) -> None:
         parser.error(f"--flashes is for thesis_strobe; {chosen.preset} has no strobe, use --beats")
     if chosen.beats is not None and chosen.preset == "thesis_strobe":
         parser.error("--beats is for continuous light; thesis_strobe needs --flashes")
+    if chosen.gene and chosen.wing != "simulated":
+        parser.error("--gene is for --wing simulated")
     options = {name: value for name, value in given.items() if value is not None}
-    write(PRESETS[chosen.preset](scale=chosen.scale, seed=chosen.seed, **options), chosen.folder, chosen.suffix)
+    scene = _scene(chosen.wing, dict(chosen.gene))
+    made = PRESETS[chosen.preset](
+        scale=chosen.scale, seed=chosen.seed, scene=with_rod(scene) if chosen.rod else scene, **options
+    )
+    write(made, chosen.folder, chosen.suffix)
+
+
+def _gene(text: str) -> tuple[str, float]:
+    """Name and value of a gene; argparse reports a ValueError."""
+    name, _, value = text.partition("=")
+    return name, float(value)
+
+
+def _scene(wing: str, genes: dict[str, float]) -> Scene:
+    """The scene of the analytic or the simulated wing; both flap as often as the presets assume."""
+    if wing == "analytic":
+        return analytic_scene(Flapping(BEAT))
+    air = Condition(BEAT, LAG, PRESSURE, 293.15)
+    return simulated_scene(air, genes)
 
 
 def write(made: Experiment, folder: Path, suffix: str = ".avi") -> None:
@@ -78,7 +114,7 @@ def _described(made: Experiment) -> dict[str, object]:
         "markers": list(film.scene.names),
         "kind": film.scene.kind,
         "sizes": film.scene.sizes.tolist(),
-        "beat_hz": made.frequency,
+        "beat_hz": BEAT,
         "strobe_hz": strobe.frequency if strobe else None,
         "flash_s": strobe.duration if strobe else None,
         "wand_m": float(np.linalg.norm(ends[1] - ends[0])),

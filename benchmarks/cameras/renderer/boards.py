@@ -107,10 +107,12 @@ def board_light(camera: FilmCamera, board: Board, pose: BoardPose, over: int = 4
     if (high <= low).any():
         return light
     columns, rows = (high - low + 1).tolist()
+    axes = pose.axes @ camera.rotation.T
+    slope = camera.slopes(camera.local(pose.centre), axes) / over
     samples = np.empty((rows * over, columns * over))
     sample_board(
         camera.rays, int(low[0]) + PAD, int(low[1]) + PAD, over, camera.local(pose.centre),
-        pose.axes @ camera.rotation.T, np.array(board.inner, float) + 1, board.side, board.side,
+        axes, slope, np.array(board.inner, float) + 1, board.side, board.side,
         np.array(board.shades), samples,
     )  # fmt: skip
     samples = gaussian_filter(samples, camera.sensor.blur * over, mode="nearest")

@@ -102,10 +102,12 @@ def add_markers(image: Array, scene: Scene, camera: FilmCamera, frame: int, lit:
         if not _touched(centres, axes, scene, k, margin, triangles, rods).any():
             triangles, rods = triangles[:, :0], rods[:, :0]
         x0, y0, x1, y1 = box
+        facing = np.broadcast_to(np.eye(3), axes.shape) if scene.kind == "ball" else axes
+        slopes = camera.slopes(centres, facing) / over
         samples = np.empty((len(middle), (y1 - y0 + 1) * over, (x1 - x0 + 1) * over))
         sample_marker(
             camera.rays, float(x0 + PAD), float(y0 + PAD), over, KINDS[scene.kind], float(scene.sizes[k]) / 2,
-            centres, axes, light, margin, triangles, rods, scene.radii, samples,
+            centres, axes, slopes, light, margin, triangles, rods, scene.radii, samples,
         )  # fmt: skip
         _deposit(image, camera, samples, box, over, shone(starts, ends, edges[:-1], edges[1:]) * lit[2])
 
@@ -132,7 +134,7 @@ def strength(scene: Scene, centres: Array, axes: Array) -> Array:
     if KINDS[scene.kind] == BALL:
         return near
     facing = -np.einsum("...i,...i->...", axes[..., 2, :], centres) / distance
-    return np.asarray(near * np.maximum(facing, 0.0) ** scene.retro)
+    return np.asarray(near * (facing > 0) * np.maximum(facing, 0.0) ** scene.retro)
 
 
 def corners(centres: Array, axes: Array, size: float, ball: bool, grid: Array) -> Array:

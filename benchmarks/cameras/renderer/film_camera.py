@@ -116,6 +116,19 @@ class FilmCamera:
         k = self.matrix
         return np.stack([k[0, 0] * u + k[0, 1] * v + k[0, 2], k[1, 1] * v + k[1, 2]], axis=-1)
 
+    def slopes(self, centres: Array, axes: Array) -> Array:
+        """Change [..., 2, 2] of the two coordinates of a plane when the pixel moves along x and y, at a point of it.
+
+        ``centres`` [..., 3] and ``axes`` [..., 3, 3] are in camera coordinates, m; the plane has the first two axes.
+        """
+        step = 1e-5 * centres[..., 2, None]
+        u = (self.image(centres + step * axes[..., 0, :]) - self.image(centres - step * axes[..., 0, :])) / (2 * step)
+        v = (self.image(centres + step * axes[..., 1, :]) - self.image(centres - step * axes[..., 1, :])) / (2 * step)
+        det = u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
+        det = np.where(np.abs(det) < 1e-3, 1e-3, det)  # seen edge-on
+        inverse = np.stack([v[..., 1], -v[..., 0], -u[..., 1], u[..., 0]], axis=-1) / det[..., None]
+        return np.asarray(inverse.reshape(*det.shape, 2, 2))
+
     def project(self, points: ArrayLike) -> Array:
         """Pixels [..., 2] of world points [..., 3]."""
         return self.image(self.local(points))

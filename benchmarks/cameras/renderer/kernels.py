@@ -159,17 +159,45 @@ def hidden(points: Array, margin: float, triangles: Array, rods: Array, radii: A
 
 
 @compiled
-def _white(kind: int, u: float, v: float, half: float) -> bool:
-    """Whether the point (u, v) of a marker's plane is reflecting."""
+def _ramp(x: float) -> float:
+    return x * x if x > 0.0 else 0.0
+
+
+@compiled
+def _right(t: float, a: float, b: float) -> float:
+    """Part of a sample that lies right of an edge which is ``t`` to its left.
+
+    The sample is a square, whose sides change t by ``a`` and ``b``; all are lengths in the plane of the pattern.
+    """
+    wide, narrow = max(abs(a), abs(b)), min(abs(a), abs(b))
+    narrow = max(narrow, 1e-4 * wide)
+    out, flat = 0.5 * (wide + narrow), 0.5 * (wide - narrow)
+    if t >= out:
+        return 1.0
+    if t <= -out:
+        return 0.0
+    return (_ramp(t + out) - _ramp(t + flat) - _ramp(t - flat)) / (2.0 * wide * narrow)
+
+
+@compiled
+def _white(kind: int, u: float, v: float, half: float, slope: Array) -> float:
+    """Part of the sample at the point (u, v) of a marker's plane that reflects; ``slope`` [2, 2]: its sides there."""
     if kind == CHEQUER:
-        return abs(u) <= half and abs(v) <= half and u * v > 0.0
-    return u * u + v * v <= half * half
+        a, b, c, d = slope[0, 0], slope[0, 1], slope[1, 0], slope[1, 1]
+        left, right = _right(u + half, a, b), _right(u - half, a, b)
+        if left == right:
+            return 0.0
+        below, above = _right(v + half, c, d), _right(v - half, c, d)
+        u0, v0 = _right(u, a, b), _right(v, c, d)
+        return (u0 - right) * (v0 - above) + (left - u0) * (below - v0)
+    wide = math.sqrt(abs(slope[0, 0] * slope[1, 1] - slope[0, 1] * slope[1, 0]))
+    return min(max((half - math.sqrt(u * u + v * v)) / wide + 0.5, 0.0), 1.0)
 
 
 @compiled
 def sample_marker(
     table: Array, left: float, top: float, over: int, kind: int, half: float, centres: Array, axes: Array,
-    light: Array, margin: float, triangles: Array, rods: Array, radii: Array, out: Array,
+    slopes: Array, light: Array, margin: float, triangles: Array, rods: Array, radii: Array, out: Array,
 ) -> None:  # fmt: skip
     """Sample a marker's brightness on a grid of ``over`` by ``over`` points in each pixel, at S instants.
 
@@ -182,6 +210,7 @@ def sample_marker(
         half: half the marker's width, or its radius, m.
         centres: [S, 3] of the marker.
         axes: [S, 3, 3]; rows are two tangents and the normal.
+        slopes: [S, 2, 2] change of both coordinates in the marker's plane from a sample to the next, along x and y, m.
         light: [S] brightness of a reflecting point.
         margin: distance behind a triangle from which a point is hidden, m.
         triangles: [S, M, 3, 3] that may hide the marker.
@@ -206,11 +235,12 @@ def sample_marker(
                     depth = (c[0] * a[2, 0] + c[1] * a[2, 1] + c[2] * a[2, 2]) / down
                     r0, r1, r2 = depth * x - c[0], depth * y - c[1], depth - c[2]
                     u, v = r0 * a[0, 0] + r1 * a[0, 1] + r2 * a[0, 2], r0 * a[1, 0] + r1 * a[1, 1] + r2 * a[1, 2]
-                if not _white(kind, u, v, half) or depth <= 0.0:
+                white = _white(kind, u, v, half, slopes[s])
+                if white <= 0.0 or depth <= 0.0:
                     continue
                 if hides_triangle(x, y, depth - margin, triangles[s]) or hides_rod(x, y, depth, rods[s], radii):
                     continue
-                out[s, i, j] = light[s]
+                out[s, i, j] = light[s] * white
 
 
 @compiled
@@ -254,8 +284,8 @@ def fill_rods(image: Array, table: Array, pad: int, rods: Array, radii: Array, v
 
 @compiled
 def sample_board(
-    table: Array, left: int, top: int, over: int, centre: Array, axes: Array, squares: Array, side: float,
-    border: float, shades: Array, out: Array,
+    table: Array, left: int, top: int, over: int, centre: Array, axes: Array, slope: Array, squares: Array,
+    side: float, border: float, shades: Array, out: Array,
 ) -> None:  # fmt: skip
     """Sample a chessboard on a grid of ``over`` by ``over`` points in each pixel, into ``out`` [rows, columns].
 
@@ -263,6 +293,7 @@ def sample_board(
     white and the surroundings; the other arguments are those of :func:`sample_marker`.
     """
     wide, high = squares[0] * side / 2.0, squares[1] * side / 2.0
+    a, b, c, d = slope[0, 0], slope[0, 1], slope[1, 0], slope[1, 1]
     for i in range(out.shape[0]):
         for j in range(out.shape[1]):
             x, y = _ray(table, left - 0.5 + (j + 0.5) / over, top - 0.5 + (i + 0.5) / over)
@@ -271,10 +302,15 @@ def sample_board(
             r0, r1, r2 = depth * x - centre[0], depth * y - centre[1], depth - centre[2]
             u = r0 * axes[0, 0] + r1 * axes[0, 1] + r2 * axes[0, 2]
             v = r0 * axes[1, 0] + r1 * axes[1, 1] + r2 * axes[1, 2]
-            if not (depth > 0.0 and abs(u) <= wide + border and abs(v) <= high + border):
+            if not (depth > 0.0 and abs(u) < wide + 2 * border and abs(v) < high + 2 * border):
                 out[i, j] = shades[2]
-            elif abs(u) >= wide or abs(v) >= high:
-                out[i, j] = shades[1]
-            else:
-                column, row = math.floor((u + wide) / side), math.floor((v + high) / side)
-                out[i, j] = shades[(column + row) % 2]
+                continue
+            p, q = round((u + wide) / side), round((v + high) / side)  # the nearest lines between squares
+            signed = (2.0 * _right(u + wide - p * side, a, b) - 1.0) * (2.0 * _right(v + high - q * side, c, d) - 1.0)
+            if (p + q) % 2 == 1:
+                signed = -signed
+            pattern = 0.5 * (shades[0] + shades[1]) + 0.5 * (shades[0] - shades[1]) * signed
+            inner = _right(wide - abs(u), a, b) * _right(high - abs(v), c, d)
+            whole = _right(wide + border - abs(u), a, b) * _right(high + border - abs(v), c, d)
+            sheet = inner * pattern + (1.0 - inner) * shades[1]
+            out[i, j] = whole * sheet + (1.0 - whole) * shades[2]

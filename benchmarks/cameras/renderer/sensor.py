@@ -44,10 +44,6 @@ class Readout:
         cut = self._pool[i : i + h, j : j + w]
         return np.ascontiguousarray(cut[:: rng.choice([-1, 1]), :: rng.choice([-1, 1])])
 
-    def expected(self, light: Array) -> Array:
-        """Expected grey levels above black of a frame that receives ``light`` [height, width]."""
-        return np.asarray(light * self._shading * self.camera.sensor.gain)
-
     def read(self, frame: int, light: Array) -> Image:
         """Grey levels of a frame that receives ``light`` [height, width], with noise."""
         sensor, rng = self.camera.sensor, np.random.default_rng([*self.seed, 1, frame])
