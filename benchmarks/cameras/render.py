@@ -22,6 +22,7 @@ import argparse
 import json
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -61,6 +62,7 @@ def main(words: list[str] | None = None) -> None:
         help="of the simulated wing: hinge_offset.y=0.02",
     )
     parser.add_argument("--rod", action="store_true", help="a rod hides some of the markers")
+    parser.add_argument("--wand", type=float, default=6.0, help="duration of the film of the wand, s")
     parser.add_argument("--scale", type=float, default=1.0, help="width of the images relative to the cameras' own")
     parser.add_argument("--suffix", choices=SUFFIXES, default=".avi", help="kind of video")
     parser.add_argument("--seed", type=int, default=1, help="the same seed gives the same films")
@@ -77,6 +79,7 @@ def main(words: list[str] | None = None) -> None:
     made = PRESETS[chosen.preset](
         scale=chosen.scale, seed=chosen.seed, scene=with_rod(scene) if chosen.rod else scene, **options
     )
+    made = replace(made, wand=replace(made.wand, until=chosen.wand))
     write(made, chosen.folder, chosen.suffix)
 
 
@@ -100,7 +103,13 @@ def write(made: Experiment, folder: Path, suffix: str = ".avi") -> None:
     _write_text(folder / "scene.json", _described(made))
     for film, cameras, truth in ((made.film, "cameras", "truth"), (made.wand, "wand", "wand")):
         _write_text(folder / f"{cameras}.json", [camera.as_json() for camera in film.cameras])
-        truth_of(film).save(folder / f"{truth}.npz")
+        began = time.monotonic()
+
+        def tell(done: int, total: int, name: str = f"truth of {film.name}", began: float = began) -> None:
+            if done % 20 == 0 or done == total:
+                show_count(name, done, total, began)
+
+        truth_of(film, tell).save(folder / f"{truth}.npz")
     _write_boards(made, folder)
     for film in (made.wand, made.film):
         for camera in film.cameras:

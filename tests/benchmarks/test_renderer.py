@@ -12,7 +12,7 @@ from benchmarks.cameras.renderer.boards import Board, BoardPose, Wand, board_lig
 from benchmarks.cameras.renderer.film import Film
 from benchmarks.cameras.renderer.film_camera import PAD, FilmCamera, Sensor, aimed
 from benchmarks.cameras.renderer.light import Light, Strobe
-from benchmarks.cameras.renderer.scene import Kind, Poses, Rod, Scene, Surface
+from benchmarks.cameras.renderer.scene import Glare, Kind, Poses, Rod, Scene, Surface
 from benchmarks.cameras.renderer.sensor import Readout
 from benchmarks.cameras.renderer.truth import truth_of
 from wingfit.records.array_types import Array
@@ -84,6 +84,32 @@ def test_the_distortion_is_that_of_brown() -> None:
         camera = replace(CAMERA, distortion=0.01 * np.eye(5)[k])
         moved = camera.image(np.array([x, y, 1.0])) - CAMERA.image(np.array([x, y, 1.0]))
         assert moved == pytest.approx(FOCAL * 0.01 * np.array([u, v]), abs=1e-9)
+
+
+def test_the_projection_is_that_of_opencv() -> None:
+    cv2 = pytest.importorskip("cv2")
+    rotation, translation = aimed([0.1, 0.2, 1.0], [0.3, 0.1, 0.0], [0, 1, 0.2])
+    camera = replace(DISTORTED, rotation=rotation, translation=translation)
+    points = np.random.default_rng(1).uniform(-0.3, 0.3, (50, 3))
+    turn, _ = cv2.Rodrigues(rotation)
+    expected, _ = cv2.projectPoints(points, turn, translation, camera.matrix, camera.distortion)
+    assert camera.project(points) == pytest.approx(expected[:, 0], abs=1e-9)
+
+
+def test_a_smaller_image_shows_the_same() -> None:
+    small = DISTORTED.scaled(0.25)
+    assert small.size == (80, 60)
+    point = np.array([0.1, -0.05, 0.7])
+    assert small.project(point) + 0.5 == pytest.approx(0.25 * (DISTORTED.project(point) + 0.5))
+    assert small.row_time * small.size[1] == DISTORTED.row_time * DISTORTED.size[1]
+
+
+def test_a_clock_that_runs_fast_takes_frames_too_early() -> None:
+    camera = replace(CAMERA, start=0.5, clock_error=1e-3, row_time=1e-5)
+    starts, ends = camera.rows(1001)
+    assert starts[7] == pytest.approx(0.5 + 1001 / 100.1 + 7e-5, abs=1e-12)
+    assert ends[7] - starts[7] == pytest.approx(1e-3)
+    assert list(camera.frames(float(starts[7]), float(ends[7]))) == [1001]
 
 
 def test_a_camera_looks_at_its_target() -> None:
@@ -232,6 +258,22 @@ def test_a_marker_beyond_the_edge_is_cut() -> None:
     assert light is not None
     assert light.sum() == pytest.approx(lit(one(np.array([0.1, 0.0, 1.0]), size=0.02)).sum() / 2, rel=0.03)
     assert 0.3 < truth_of(film).visible[0, 0, 0] < 0.7
+
+
+def test_glare_is_bright_where_it_is() -> None:
+    inside = Glare(0.5, 3.0, pixel=(200.0, 50.0))
+    wanders = Glare(2.0, 4.0, path=lambda times: np.stack([0.05 + times, 0 * times, 1 + 0 * times], axis=1))
+    light = lit(replace(one(np.array([0.0, 0.0, 1.0]), size=1e-6), glares=(inside, wanders)))
+    assert light[50, 200] == pytest.approx(0.5 * LEVEL)
+    assert light[50, 203] == pytest.approx(0.5 * LEVEL * np.exp(-0.5))
+    y, x = np.unravel_index(light.argmax(), light.shape)
+    assert (x, y) == tuple(np.rint(CAMERA.project([0.05 + CAMERA.exposure / 2, 0, 1])))
+
+
+def test_the_corners_are_darker() -> None:
+    shading = replace(CAMERA, sensor=Sensor(vignetting=0.2)).shading()
+    assert shading[119:121, 159:161] == pytest.approx(np.ones((2, 2)), abs=1e-4)
+    assert shading[0, 0] == pytest.approx(0.8, abs=3e-3)
 
 
 def test_the_noise_has_its_variance() -> None:

@@ -110,7 +110,7 @@ class FilmCamera:
             x, y = np.where(p[..., 2] > 0, p[..., 0] / p[..., 2], np.nan), p[..., 1] / p[..., 2]
         k1, k2, p1, p2, k3 = self.distortion
         rr = x * x + y * y
-        radial = 1 + k1 * rr + k2 * rr**2 + k3 * rr**3
+        radial = 1 + rr * (k1 + rr * (k2 + rr * k3))
         u = x * radial + 2 * p1 * x * y + p2 * (rr + 2 * x * x)
         v = y * radial + p1 * (rr + 2 * y * y) + 2 * p2 * x * y
         k = self.matrix

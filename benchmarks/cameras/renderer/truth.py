@@ -19,6 +19,7 @@ from wingfit.records.array_types import Array, Index
 
 _GRID = np.array([-0.8, -0.4, 0.0, 0.4, 0.8])  # of points of a marker, in units of half its width
 _STEPS = 40  # of the search for the instant at which a marker's own row is exposed
+_SAME = 1e-10  # s: less than a millionth of a pixel
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,8 +113,8 @@ def _frame(scene: Scene, camera: FilmCamera, frame: int) -> View:
     count = len(scene.names)
     rows, instants = np.full(count, camera.size[1] / 2), np.zeros(count)
     for _ in range(_STEPS):
-        instants = starts[0] + camera.row_time * rows + camera.exposure / 2
-        if camera.row_time == 0:
+        before, instants = instants, starts[0] + camera.row_time * rows + camera.exposure / 2
+        if camera.row_time == 0 or np.abs(instants - before).max() < _SAME:
             break
         local = np.stack([found.at(instants[k : k + 1], k)[0][0] for k in range(count)])
         rows = np.clip(np.nan_to_num(camera.image(local)[:, 1]), 0, camera.size[1] - 1)
