@@ -166,10 +166,13 @@ def _window(
             return None
         low, high = np.floor(pixels.min(axis=(0, 1)) + 0.5) - 1, np.ceil(pixels.max(axis=(0, 1)) - 0.5) + 1
         reach = np.ceil(5 * camera.sensor.blur)
+        before = first, last
         first = max(first, begin + camera.row_time * max(0.0, low[1] - reach))
         last = min(last, begin + camera.row_time * min(camera.size[1] - 1.0, high[1] + reach) + camera.exposure)
         if last <= first:
             return None
+        if (first, last) == before:
+            break
     x0, y0 = np.maximum(low, 1 - PAD)
     x1, y1 = np.minimum(high, np.array(camera.size) + PAD - 2)
     return (first, last, (int(x0), int(y0), int(x1), int(y1))) if x1 >= x0 and y1 >= y0 else None

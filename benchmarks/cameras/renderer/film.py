@@ -34,7 +34,7 @@ class Film:
     cameras: tuple[FilmCamera, ...]
     until: float
     seed: int = 1
-    over: int = 4
+    over: int = 3
 
     def frames(self, camera: FilmCamera) -> int:
         """Number of frames of ``camera`` that start before the end of the film."""

@@ -122,8 +122,9 @@ class FilmCamera:
         ``centres`` [..., 3] and ``axes`` [..., 3, 3] are in camera coordinates, m; the plane has the first two axes.
         """
         step = 1e-5 * centres[..., 2, None]
-        u = (self.image(centres + step * axes[..., 0, :]) - self.image(centres - step * axes[..., 0, :])) / (2 * step)
-        v = (self.image(centres + step * axes[..., 1, :]) - self.image(centres - step * axes[..., 1, :])) / (2 * step)
+        u, v = step * axes[..., 0, :], step * axes[..., 1, :]
+        right, left, low, high = self.image(centres + np.stack([u, -u, v, -v]))
+        u, v = (right - left) / (2 * step), (low - high) / (2 * step)
         det = u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
         det = np.where(np.abs(det) < 1e-3, 1e-3, det)  # seen edge-on
         inverse = np.stack([v[..., 1], -v[..., 0], -u[..., 1], u[..., 0]], axis=-1) / det[..., None]

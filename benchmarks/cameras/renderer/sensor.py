@@ -11,6 +11,7 @@ from benchmarks.cameras.renderer.film_camera import FilmCamera
 from wingfit.records.array_types import Array
 
 Image = npt.NDArray[np.uint8]
+_DARK = 1e-3  # grey levels of light below which a pixel counts as dark
 _MARGIN = 256  # pixels by which the pool of dark pixels is larger than an image, along both sides
 
 
@@ -48,9 +49,9 @@ class Readout:
         """Grey levels of a frame that receives ``light`` [height, width], with noise."""
         sensor, rng = self.camera.sensor, np.random.default_rng([*self.seed, 1, frame])
         image = self._dark(rng)
-        rows, columns = np.nonzero(light > 1e-3)
+        rows, columns = (np.flatnonzero(light.max(axis=axis) > _DARK) for axis in (1, 0))
         if len(rows):
-            part = np.s_[rows.min() : rows.max() + 1, columns.min() : columns.max() + 1]
+            part = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
             level = light[part] * self._shading[part] * sensor.gain
             noise = rng.standard_normal(level.shape, np.float32) * np.sqrt(sensor.variance(level))
             image[part] = quantised(sensor.black + level + noise)
