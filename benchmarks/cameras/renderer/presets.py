@@ -76,7 +76,7 @@ def continuous(scale: float = 1.0, beats: float = 3.0, seed: int = 1, scene: Sce
         _fast(name, AIM + np.array([0.0, side, 1.0]), 0.0, sensor).scaled(scale)
         for name, side in (("left", -0.15), ("right", 0.15))
     )
-    light = Light(continuous=170.0 / cameras[0].exposure)
+    light = Light(continuous=130.0 / cameras[0].exposure)
     scene = scene or analytic_scene(Flapping(BEAT))
     return _experiment("wing", scene, light, cameras, beats / BEAT - 1e-4, seed)
 
@@ -93,7 +93,7 @@ def three_cameras_late(scale: float = 1.0, beats: float = 2.0, seed: int = 1, sc
         replace(_fast(name, AIM + np.array(place), late, sensor), rate=240.0).scaled(scale)
         for name, place, late in places
     )
-    light = Light(continuous=170.0 / cameras[0].exposure)
+    light = Light(continuous=130.0 / cameras[0].exposure)
     scene = scene or analytic_scene(Flapping(BEAT))
     return _experiment("wing", scene, light, cameras, beats / BEAT + 1.9e-3, seed)
 
@@ -113,7 +113,7 @@ def with_rod(scene: Scene) -> Scene:
 
 def _fast(name: str, place: Array, late: float, sensor: Sensor) -> FilmCamera:
     pose = aimed(place, AIM, _RIGHT)
-    lens = _matrix(1250.0, 639.5, 511.5), np.array(_LENS)
+    lens = _matrix(1600.0, 639.5, 511.5), np.array(_LENS)
     return FilmCamera(name, (1280, 1024), *lens, *pose, rate=500.0, start=late, exposure=4e-4, sensor=sensor)
 
 
