@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 
 from wingfit.cameras.markers.chequer import detect_chequers
-from wingfit.cameras.markers.detections import Detections
+from wingfit.cameras.markers.detections import Detections, no_detections
 from wingfit.cameras.markers.dot import detect_dots
 from wingfit.cameras.video.source import Film, Frames
 from wingfit.cameras.video.strobe import Background, FlashMark, background, flashes
@@ -24,6 +24,7 @@ Light = Literal["strobe", "continuous"]
 Progress = Callable[[int, int], object]
 _CHUNK = 50  # instants
 _VERSION = 1
+_COMPLETE = "complete"
 _LEAST_NOISE = 1.0  # grey levels: quantisation, and compression that removes noise
 
 
@@ -76,6 +77,8 @@ def detect_film(task: FilmTask, progress: Progress) -> FilmDetections:
     seen = [one for chunk in chunks for one in chunk.seen]
     marks = [one for chunk in chunks for one in chunk.marks]
     bad = [one for chunk in chunks for one in chunk.bad_frames]
+    if folder and (folder / _COMPLETE).exists():
+        return FilmDetections(seen, marks, tuple(bad))
     first = task.first
     if marks:
         first = marks[-1].frame + (2 if task.light == "strobe" else 1)
@@ -91,6 +94,9 @@ def detect_film(task: FilmTask, progress: Progress) -> FilmDetections:
             seen, marks, bad = seen + fresh.seen, marks + fresh.marks, [*bad, *fresh.bad_frames]
             fresh = FilmDetections([], [], ())
         progress(mark.frame + 1 - task.first, of)
+    if folder:
+        _store(folder, len(chunks), fresh)
+        (folder / _COMPLETE).touch()
     return FilmDetections(seen + fresh.seen, marks + fresh.marks, (*bad, *fresh.bad_frames))
 
 
@@ -145,16 +151,16 @@ def _steady(frame: Array) -> Background:
 def _store(folder: Path, number: int, chunk: FilmDetections) -> None:
     """Write one chunk; a run that is interrupted leaves whole chunks only."""
     folder.mkdir(parents=True, exist_ok=True)
-    part = folder / f"{number:06d}.part"
+    part, none = folder / f"{number:06d}.part", no_detections()
     with part.open("wb") as file:
         np.savez_compressed(
             file,
-            counts=[len(one) for one in chunk.seen],
-            pixels=np.concatenate([one.pixels for one in chunk.seen]),
-            covariance=np.concatenate([one.covariance for one in chunk.seen]),
-            size_px=np.concatenate([one.size_px for one in chunk.seen]),
-            contrast=np.concatenate([one.contrast for one in chunk.seen]),
-            marks=np.array([(one.frame, one.split, *one.between) for one in chunk.marks]),
+            counts=np.array([len(one) for one in chunk.seen], dtype=int),
+            pixels=np.concatenate([none.pixels, *(one.pixels for one in chunk.seen)]),
+            covariance=np.concatenate([none.covariance, *(one.covariance for one in chunk.seen)]),
+            size_px=np.concatenate([none.size_px, *(one.size_px for one in chunk.seen)]),
+            contrast=np.concatenate([none.contrast, *(one.contrast for one in chunk.seen)]),
+            marks=np.array([(one.frame, one.split, *one.between) for one in chunk.marks]).reshape(-1, 4),
             bad=np.array(chunk.bad_frames, dtype=int),
         )
     part.replace(folder / f"{number:06d}.npz")

@@ -132,7 +132,7 @@ def _reference(request: Request, clouds: Sequence[Cloud]) -> tuple[tuple[str, ..
     if request.reference is not None:
         return request.names, request.reference
     best = max(clouds, key=lambda cloud: len(_single(cloud)))
-    places = best.positions[_single(best)]
+    places = best.positions[_on_surface(best, _single(best))]
     if len(places) < LEAST_MARKERS:
         raise fail(
             "markers", len(places), f"at most {len(places)} markers are seen by two cameras; {LEAST_MARKERS} are needed"
@@ -147,6 +147,30 @@ def _single(cloud: Cloud) -> Index:
         used, index, counts = np.unique(row, return_inverse=True, return_counts=True)
         alone &= (counts[index] == 1) | (used[index] < 0)
     return np.flatnonzero(alone)
+
+
+def _on_surface(cloud: Cloud, single: Index) -> Index:
+    """Return the points ``single``, and of the ambiguous ones those near the smooth surface through these.
+
+    Each detection is used once, first by the points whose rays meet best.
+    """
+    if len(single) < 2 * LEAST_MARKERS:
+        return single
+    surface = surface_of(cloud.positions[single])
+    design, height = surface.quadratic(cloud.positions)
+    fitted, *_ = np.linalg.lstsq(design[single], height[single], rcond=None)
+    apart = np.abs(height - design @ fitted)
+    near = max(4 * float(np.sqrt(np.mean(apart[single] ** 2))), 0.01 * surface.size)
+    used = [set(row[single]) for row in cloud.detections]
+    chosen = list(single)
+    for point in np.argsort(cloud.points.misfit, kind="stable"):
+        row = cloud.detections[:, point]
+        free = all(index < 0 or index not in taken for index, taken in zip(row, used, strict=True))
+        if free and apart[point] < near and np.abs(design[point, 1:3]).max() < 3:
+            chosen.append(int(point))
+            for index, taken in zip(row, used, strict=True):
+                taken.add(int(index))
+    return np.array(sorted(chosen))
 
 
 def _result(

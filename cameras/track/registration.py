@@ -24,9 +24,25 @@ _LEAST_DEVIATION_M = 5e-5
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """Places of the markers on the wing: ``plane`` [K, 2], coordinates on it, in units of its size; NaN if unknown."""
+    """A plane through the wing.
+
+    Attributes:
+        plane: [K, 2], coordinates of the markers on it, in units of ``size``.
+        centre: [3] (m), its middle.
+        axes: [3, 3], two directions on it and its normal.
+        size: of the wing (m), the largest root of the mean square from the middle.
+    """
 
     plane: Float[Array, "K 2"]
+    centre: Array
+    axes: Array
+    size: float
+
+    def quadratic(self, points: Float[Array, "N 3"]) -> tuple[Float[Array, "N 6"], Float[Array, " N"]]:
+        """Return the products of up to two coordinates on the plane, and the height (m) above it, of ``points``."""
+        u, v, height = ((points - self.centre) @ self.axes.T).T
+        one, two = u / self.size, v / self.size
+        return np.column_stack([np.ones(len(points)), one, two, one**2, one * two, two**2]), height
 
 
 def surface_of(positions: Float[Array, "K 3"]) -> Surface:
@@ -34,8 +50,8 @@ def surface_of(positions: Float[Array, "K 3"]) -> Surface:
     known = np.isfinite(positions).all(1)
     centre = positions[known].mean(0)
     _, spread, axes = np.linalg.svd(positions[known] - centre, full_matrices=False)
-    scale = max(float(spread[0]) / np.sqrt(known.sum()), 1e-9)
-    return Surface((positions - centre) @ axes[:2].T / scale)
+    size = max(float(spread[0]) / np.sqrt(known.sum()), 1e-9)
+    return Surface((positions - centre) @ axes[:2].T / size, centre, axes, size)
 
 
 @dataclass(frozen=True, eq=False)
