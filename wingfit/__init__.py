@@ -27,6 +27,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from wingfit._align import align_tracks
     from wingfit._drive import drive
+    from wingfit._film import track_film
     from wingfit._local import calibrate, diagnose
     from wingfit.calibration.forces.result import ForceResult
     from wingfit.calibration.result import GeneResult, RecordingResult, Result
@@ -37,6 +38,7 @@ if TYPE_CHECKING:
     from wingfit.client.transport import ServerAwayError, WingfitError
     from wingfit.diagnosis.finding import Finding
     from wingfit.diagnosis.spec import DiagnosisSpec
+    from wingfit.cameras.track.result import TrackedFilm
     from wingfit.importers import ImportedTracks, import_tracks
     from wingfit.importers.forces import ImportedForces, import_forces
     from wingfit.importers.planform import WingTemplate, wing_template
@@ -93,6 +95,7 @@ __all__ = [
     "ServerAwayError",
     "SimulationError",
     "Suspect",
+    "TrackedFilm",
     "WingTemplate",
     "WingfitError",
     "align_tracks",
@@ -108,6 +111,7 @@ __all__ = [
     "import_tracks",
     "load_dataset",
     "save_dataset",
+    "track_film",
     "wing_drawing",
     "wing_template",
 ]
@@ -115,11 +119,13 @@ __all__ = [
 _MODULES = {
     "wingfit._align": ("align_tracks",),
     "wingfit._drive": ("drive",),
+    "wingfit._film": ("track_film",),
     "wingfit._local": ("calibrate", "diagnose"),
     "wingfit.calibration.forces.result": ("ForceResult",),
     "wingfit.calibration.result": ("GeneResult", "RecordingResult", "Result"),
     "wingfit.calibration.series.result": ("SeriesResult",),
     "wingfit.calibration.spec": ("CalibrationSpec",),
+    "wingfit.cameras.track.result": ("TrackedFilm",),
     "wingfit.checks": ("DatasetWarning", "Mistake", "check_dataset", "examine", "load_dataset"),
     "wingfit.client.client": ("Client",),
     "wingfit.client.transport": ("ServerAwayError", "WingfitError"),

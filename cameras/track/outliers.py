@@ -8,12 +8,14 @@ from wingfit.records.array_types import Array, Float, Mask
 
 _NEIGHBOURS, _DEGREE = 3, 4  # on each side; of the polynomial through them
 _DEVIATIONS = 6.0
+_MEDIAN = 1.538  # of the length of three standard normal numbers
 
 
 def jumps(times: Float[Array, " T"], positions: Float[Array, "T K 3"], covariance: Float[Array, "T K 3 3"]) -> Mask:
     """Return where [T, K] a marker is far from a polynomial through its places at the nearest instants around it.
 
-    Far is more than six times what the covariances and the scatter about the polynomials explain.
+    Far is more than six times what the covariances explain, or than the marker is in the median: a polynomial cannot
+    follow fast flexing.
     """
     count, markers = positions.shape[:2]
     apart = np.full((count, markers), np.nan)
@@ -29,5 +31,8 @@ def jumps(times: Float[Array, " T"], positions: Float[Array, "T K 3"], covarianc
             residual = positions[instant, marker] - weights @ positions[near, marker]
             spread = covariance[instant, marker] + np.einsum("n,nij->ij", weights**2, covariance[near, marker])
             apart[instant, marker] = np.sqrt(residual @ np.linalg.solve(spread, residual))
-    typical = max(float(np.nanmedian(apart)) / 1.538, 1.0) if np.isfinite(apart).any() else 1.0
+    compared = np.isfinite(apart)
+    typical = np.ones(markers)
+    for marker in np.flatnonzero(compared.any(0)):
+        typical[marker] = max(float(np.median(apart[compared[:, marker], marker])) / _MEDIAN, 1.0)
     return np.asarray(np.nan_to_num(apart) > _DEVIATIONS * typical)
