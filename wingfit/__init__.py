@@ -33,12 +33,12 @@ if TYPE_CHECKING:
     from wingfit.calibration.result import GeneResult, RecordingResult, Result
     from wingfit.calibration.series.result import SeriesResult
     from wingfit.calibration.spec import CalibrationSpec
+    from wingfit.cameras.track.result import TrackedFilm
     from wingfit.checks import DatasetWarning, Mistake, check_dataset, examine, load_dataset
     from wingfit.client.client import Client
     from wingfit.client.transport import ServerAwayError, WingfitError
     from wingfit.diagnosis.finding import Finding
     from wingfit.diagnosis.spec import DiagnosisSpec
-    from wingfit.cameras.track.result import TrackedFilm
     from wingfit.importers import ImportedTracks, import_tracks
     from wingfit.importers.forces import ImportedForces, import_forces
     from wingfit.importers.planform import WingTemplate, wing_template

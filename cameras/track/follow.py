@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wingfit.cameras.track.cloud import Cloud
-from wingfit.cameras.track.registration import Deformed, Surface, assign, deformed, register
+from wingfit.cameras.track.registration import Deformed, Surface, assign, deformed, register, spacing
 from wingfit.records.array_types import Array, Float, Index
 
 Progress = Callable[[int, int], object]
@@ -79,12 +79,6 @@ def _start(clouds: Sequence[Cloud], reference: Float[Array, "K 3"]) -> tuple[int
     return best, found
 
 
-def _spacing(positions: Float[Array, "K 3"]) -> float:
-    """Return the median distance (m) of a marker to its nearest neighbour."""
-    apart = np.linalg.norm(positions[:, None] - positions[None], axis=2) + np.diag(np.full(len(positions), np.inf))
-    return float(np.median(apart.min(1)))
-
-
 class _State:
     """The markers at the instants so far, and how well they were predicted."""
 
@@ -92,7 +86,7 @@ class _State:
         self.clouds, self.surface, self.reference = clouds, surface, reference
         count = len(reference)
         # Errors of predictions are not all alike; a search that is narrower than this loses markers, and gains nothing.
-        self.least = _NARROWEST * _spacing(reference)
+        self.least = _NARROWEST * spacing(reference)
         self.chosen = np.full((len(clouds), count), -1)
         self.predicted = np.full((len(clouds), count, 3), np.nan)
         self.places = np.full((len(clouds), count, 3), np.nan)

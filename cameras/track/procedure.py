@@ -15,7 +15,7 @@ from wingfit.cameras.track.film_detections import FilmDetections, FilmTask, Ligh
 from wingfit.cameras.track.follow import Followed, follow
 from wingfit.cameras.track.instants import Instants, flash_instants, frame_instants
 from wingfit.cameras.track.outliers import jumps
-from wingfit.cameras.track.registration import surface_of
+from wingfit.cameras.track.registration import spacing, surface_of
 from wingfit.cameras.track.result import TrackedFilm
 from wingfit.cameras.triangulation import Points, error_from_cameras, triangulate
 from wingfit.cameras.video.source import Film
@@ -33,6 +33,7 @@ TOLERANCE_PX = 0.3
 """Error of the calibration (standard deviation) that the search for meeting rays allows."""
 MOST_PLACES = 20_000_000  # instants times markers
 LEAST_MARKERS = 6
+_JUMP = 0.05  # of the distance between neighbouring markers
 _UNLIKELY = 15.1  # chi-square with one degree of freedom, 99.99 %
 
 
@@ -97,7 +98,7 @@ def track(request: Request, report: Report = _silent) -> TrackedFilm:
             f"{most} that two cameras see: check the calibration, the unit of the markers' places, and that all "
             "cameras show the same wing",
         )
-    return _result(request, found, instants, clouds, followed, names)
+    return _result(request, found, instants, clouds, followed, (names, reference))
 
 
 def _detected(request: Request, report: Report) -> list[FilmDetections]:
@@ -179,7 +180,7 @@ def _result(
     instants: Instants,
     clouds: Sequence[Cloud],
     followed: Followed,
-    names: tuple[str, ...],
+    markers: tuple[tuple[str, ...], Float[Array, "K 3"]],
 ) -> TrackedFilm:
     pixels, covariance = _observed(len(request.cameras), instants, clouds, followed)
     error = _pixel_error(request.cameras, pixels, covariance)
@@ -188,15 +189,15 @@ def _result(
     shape = followed.chosen.shape
     wrong = points.misfit > _UNLIKELY + 2.5 * (points.freedom - 1)
     places = np.where(wrong[:, None], np.nan, points.positions).reshape(*shape, 3)
-    spread = points.covariance.reshape(*shape, 3, 3)
-    jumped = jumps(instants.times, places, spread)
+    spread = points.covariance.reshape(*shape, 3, 3).copy()
+    jumped = jumps(instants.times, places, spread, _JUMP * spacing(markers[1]))
     places[jumped] = np.nan
     spread[~np.isfinite(places).all(2)] = np.nan
     projected = np.stack(
         [camera.project(places.reshape(-1, 3)).reshape(*shape, 2) for camera in request.cameras], axis=1
     )
     return TrackedFilm(
-        names=names,
+        names=markers[0],
         times=instants.times,
         positions=places,
         covariance=spread,

@@ -54,6 +54,12 @@ def surface_of(positions: Float[Array, "K 3"]) -> Surface:
     return Surface((positions - centre) @ axes[:2].T / size, centre, axes, size)
 
 
+def spacing(positions: Float[Array, "K 3"]) -> float:
+    """Return the median distance (m) of a marker to its nearest neighbour."""
+    apart = np.linalg.norm(positions[:, None] - positions[None], axis=2) + np.diag(np.full(len(positions), np.inf))
+    return float(np.median(apart.min(1)))
+
+
 @dataclass(frozen=True, eq=False)
 class Deformed:
     """Markers predicted from those found: ``positions`` [K, 3] and ``deviation`` [K] (m), which grows beyond them."""
