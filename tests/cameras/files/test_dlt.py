@@ -10,7 +10,7 @@ import pytest
 
 from tests.cameras.files.samples import POINTS, assert_same, pinholes
 from wingfit.cameras.camera import Camera
-from wingfit.cameras.files.dlt import DltOrigin
+from wingfit.cameras.files.dlt import DltOrigin, camera_of_matrix, without_skew
 from wingfit.cameras.files.read import read_cameras
 from wingfit.records.errors import DatasetError
 
@@ -64,6 +64,43 @@ def test_the_other_origin_is_noticed(tmp_path: Path) -> None:
     path = saved(tmp_path / "dltCoefs.csv", in_front(pinholes()), "lower-left")
     with pytest.raises(DatasetError, match="lies behind all cameras if pixels are counted from upper-left"):
         read_cameras(path, length_unit="m", sizes_px=SIZES, dlt_origin="upper-left")
+
+
+def test_one_camera_may_look_away_from_the_origin(tmp_path: Path) -> None:
+    """The scale of the coefficients, that of the depth of the origin, is then negative."""
+    first, second, _ = in_front(pinholes())
+    away = np.diag([1.0, -1.0, -1.0])
+    second = replace(second, rotation=away @ second.rotation, translation=away @ second.translation)
+    table = np.column_stack([coefficients(first, "opencv", 1.0), exact(second)])
+    np.savetxt(tmp_path / "dltCoefs.csv", table, delimiter=",", fmt="%.15g")
+    found = read_cameras(tmp_path / "dltCoefs.csv", length_unit="m", sizes_px=SIZES, dlt_origin="opencv")
+    np.testing.assert_allclose(found.cameras[1].rotation, second.rotation, atol=1e-7)
+    np.testing.assert_allclose(found.cameras[1].translation, second.translation, atol=1e-7)
+
+
+def exact(camera: Camera) -> np.ndarray:
+    """The coefficients that the matrices of a camera give."""
+    matrix = camera.matrix @ np.column_stack([camera.rotation, camera.translation])
+    return np.asarray(matrix.ravel()[:11] / matrix[2, 3])
+
+
+def test_the_camera_without_skew_is_the_nearest() -> None:
+    """Dropping the skew alone differs more from the coefficients than the camera that is fitted to them."""
+    camera = in_front(pinholes())[1]
+    skewed = exact(camera)
+    skewed[:4] += 0.02 * skewed[4:8]
+    matrix = np.append(skewed, 1.0).reshape(3, 4)
+    dropped = camera_of_matrix("table", "b", matrix, SIZES[0])
+    fitted, rms = without_skew(dropped, matrix)
+    # A turn by half the skew s makes errors s y in x into s y / 2 in x and s x / 2 in y, smaller in RMS for this image
+    # by 0.5 (1 + (1024 / 800)^2)^0.5 = 0.81; the other parameters take a little more.
+    points = 4 * (POINTS - np.array([0, 0, 0.6]))
+    ends = np.column_stack([points, np.ones(len(points))]) @ matrix.T
+    off = [np.linalg.norm(one.project(points) - ends[:, :2] / ends[:, 2:], axis=1).mean() for one in (dropped, fitted)]
+    assert off[1] < 0.82 * off[0]
+    assert 0 < rms < 5
+    with pytest.raises(DatasetError, match="singular"):
+        camera_of_matrix("table", "b", np.ones((3, 4)), SIZES[0])
 
 
 def test_skew_is_reported_and_limited(tmp_path: Path) -> None:
