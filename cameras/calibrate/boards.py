@@ -66,7 +66,7 @@ def find_boards(
             if sum(larger.values()) < LARGER_CHECKED:
                 larger[_larger(grey, board)] += 1
     _check_counts(board, larger)
-    _check_seen(cameras, corners, board, views)
+    _check_seen(cameras, corners, board)
     return Sightings(board, cameras, tuple(sizes[c] for c in range(len(cameras))), tuple(views), corners, tuple(unseen))
 
 
@@ -166,9 +166,9 @@ def _check_size(camera: str, path: Path, grey: Array, size: tuple[int, int]) -> 
         raise fail(str(path), f"{width} x {height}", f"{message}; give images of one size, neither cropped nor turned")
 
 
-def _check_seen(cameras: Sequence[str], corners: Mapping[tuple[int, int], Array], board: Board, views: object) -> None:
+def _check_seen(cameras: Sequence[str], corners: Mapping[tuple[int, int], Array], board: Board) -> None:
     missing = [name for c, name in enumerate(cameras) if not any(one == c for one, _ in corners)]
-    if missing and views:
+    if missing:
         text = NO_BOARD.format(columns=board.columns, rows=board.rows)
         message = (
             f"{text} in any image; count inner corners (a board of 10 x 7 squares has 9 x 6), and show all of them"

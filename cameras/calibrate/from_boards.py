@@ -58,6 +58,9 @@ def calibrate_boards(
     observed = _observations(seen, start, views)
     found = fit_screened(scene, observed, free, _pruner(observed, len(views)), images=True, reject=reject)
     _check_views(seen, observed, found.used)
+    if world is not None and not (found.used & (observed.body == views.index(seen.views.index(world)))).any():
+        message = f"all images of view {world} disagree with the others; choose another view"
+        raise fail("calibration, world", world, message)
     described = f"axes of camera {seen.cameras[0]}" if world is None else f"axes of the board in view {world}"
     return summarise(found, observed, [seen.views[v] for v in views], seen.unseen, described, TILT)
 

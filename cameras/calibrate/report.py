@@ -17,9 +17,13 @@ ARROW_SHARE = (
     0.05  # the root of the mean square of the vectors is drawn as long as this share of the width of the image
 )
 ROUND = (1, 2, 5)
+BINS = 40
 PAGE = """<!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8"><title>Calibration of cameras</title>
-<style>body {{ font-family: sans-serif; margin: 2rem; }} td, th {{ padding: 0.2rem 0.8rem; text-align: left; }}</style>
+<style>
+body {{ font-family: sans-serif; margin: 2rem; }}
+td, th {{ padding: 0.2rem 0.8rem; text-align: left; white-space: nowrap; }}
+</style>
 </head><body><h1>Calibration of cameras</h1>
 {body}
 </body></html>
@@ -56,10 +60,14 @@ def _figure(camera: Camera, errors: PixelErrors, images: Sequence[str]) -> Any:
     x, y = (np.column_stack([errors.pixels[:, i], ends[:, i], gap]).ravel() for i in (0, 1))
     figure.add_trace(go.Scatter(x=x, y=y, mode="lines", name="predicted less observed", hoverinfo="skip"), 1, 1)
     points = errors.pixels.T
-    shown = {"mode": "markers", "marker": {"size": 3}, "text": list(images), "name": "observed"}
-    figure.add_trace(go.Scatter(x=points[0], y=points[1], **shown), 1, 1)
+    dots = {"mode": "markers", "marker": {"size": 3}, "text": list(images), "name": "observed"}
+    figure.add_trace(go.Scatter(x=points[0], y=points[1], **dots), 1, 1)
+    # The same bins for both coordinates, so that their heights can be compared.
+    end = float(np.abs(errors.errors).max(initial=0.0)) or 1.0
+    bins = {"start": -end, "end": end, "size": 2 * end / BINS}
     for axis, name in enumerate("xy"):
-        figure.add_trace(go.Histogram(x=errors.errors[:, axis], name=f"error in {name}", opacity=0.6), 1, 2)
+        shown = {"xbins": bins, "autobinx": False, "opacity": 0.6, "name": f"error in {name}"}
+        figure.add_trace(go.Histogram(x=errors.errors[:, axis], **shown), 1, 2)
     width, height = camera.size_px
     figure.update_xaxes(title_text="x (px)", range=[-0.5, width - 0.5], constrain="domain", row=1, col=1)
     figure.update_yaxes(title_text="y (px)", range=[height - 0.5, -0.5], scaleanchor="x", row=1, col=1)

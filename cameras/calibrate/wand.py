@@ -196,7 +196,7 @@ def _placed(cameras: Sequence[Camera], pixels: Array, wand: Wand) -> list[Camera
     links: dict[tuple[int, int], Link] = {}
     for i in range(len(cameras)):
         for j in range(i + 1, len(cameras)):
-            link = _relative((cameras[i], cameras[j]), pixels[[i, j]], wand)
+            link = relative_pose((cameras[i], cameras[j]), pixels[[i, j]], wand)
             if link is not None:
                 links[i, j] = link
     poses = camera_poses([camera.name for camera in cameras], links, SEPARATE)
@@ -207,7 +207,7 @@ def _at(camera: Camera, pose: Pose) -> Camera:
     return replace(camera, rotation=pose.rotation, translation=pose.translation)
 
 
-def _relative(cameras: tuple[Camera, Camera], pixels: Array, wand: Wand) -> Link | None:
+def relative_pose(cameras: tuple[Camera, Camera], pixels: Array, wand: Wand) -> Link | None:
     """Return the pose from the first camera to the second by the essential matrix, with the length of the wand."""
     cv2 = opencv()
     shared = np.asarray(np.isfinite(pixels).all(axis=(0, 2, 3)))

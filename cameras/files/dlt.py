@@ -29,6 +29,7 @@ DltOrigin = Literal["lower-left", "upper-left", "opencv"]
 COEFFICIENT_COUNT = 11
 MOST_SKEW = 0.05  # of the focal length
 MOST_ASPECT = 1.1  # of the two focal lengths
+LEAST_RANK = 1e-9  # of singular values, over the largest coefficient
 SAMPLES = 7  # along each side of the image, and in depth
 DEPTHS = (0.8, 1.2)  # of the samples, over the distance of the origin
 
@@ -95,10 +96,9 @@ def camera_of_matrix(where: str, name: str, matrix: Float[Array, "3 4"], size: t
     DatasetError if the skew or the ratio of focal lengths is not that of a camera.
     """
     left = matrix[:, :3]
-    if not np.isfinite(matrix).all() or abs(np.linalg.det(left / np.linalg.norm(left))) < 1e-12:
-        raise fail(
-            where, None, "the coefficients are not those of a camera (their matrix is singular); calibrate again"
-        )
+    if not np.isfinite(matrix).all() or np.linalg.matrix_rank(left, tol=LEAST_RANK * np.abs(left).max()) < 3:
+        message = "the coefficients are not those of a camera (their matrix is singular); calibrate again"
+        raise fail(where, None, message)
     inner, rotation = scipy.linalg.rq(left)
     signs = np.diag(np.sign(np.diag(inner)))
     inner, rotation = inner @ signs, signs @ rotation

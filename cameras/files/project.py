@@ -54,6 +54,7 @@ def read_project(raw: bytes, file: str) -> CameraSet:
         raise fail(document.where(("version",)), value, message)
     entries = _list(document, ("cameras",), None)
     cameras = tuple(_camera(document, ("cameras", i)) for i in range(len(entries)))
+    check_cameras(file, CameraSet(cameras))
     covariance = _covariance(document, cameras) if "covariance" in data else None
     return check_cameras(file, CameraSet(cameras, covariance))
 

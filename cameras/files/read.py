@@ -19,10 +19,10 @@ CameraFormat = Literal["wingfit", "opencv", "anipose", "dlt"]
 LengthUnit = Literal["m", "cm", "mm"]
 METRES: dict[LengthUnit, float] = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 HEAD = 4096  # bytes that show the format
-_OPENCV = re.compile(rb"\s*(?:%YAML[ :]1\.0|(?:<\?xml[^>]*>\s*)?<opencv_storage>)")
+_OPENCV = re.compile(rb"\s*(?:%YAML[ :]1\.|(?:<\?xml[^>]*>\s*)?<opencv_storage>)")
 _PROJECT = re.compile(rb"^format:\s*['\"]?" + FORMAT.encode(), re.MULTILINE)
 _TOML_TABLE = re.compile(rb"^\s*\[[^\[\],]+\]\s*(?:#.*)?$", re.MULTILINE)
-_NUMBER_ROW = re.compile(rb"^[\s,0-9eE.+\-naNA]+$")
+_NUMBER_ROW = re.compile(rb"\s*[-+.0-9][-+.,0-9eE \t]*\r?(?:\n|$)")
 
 
 def read_cameras(
@@ -74,7 +74,7 @@ def recognise(raw: bytes, file: str) -> CameraFormat:
         return "wingfit"
     if _TOML_TABLE.search(head):
         return "anipose"
-    if head.strip() and _NUMBER_ROW.match(head):
+    if _NUMBER_ROW.match(head):
         return "dlt"
     message = (
         f"this is none of the known files of cameras: {FORMAT} (cameras.yaml), OpenCV (.yml, .xml), Anipose "

@@ -6,12 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
 from tests.cameras.calibrate.simulated import parameter_errors, ring, wand_tracks
 from wingfit.cameras.calibrate.result import Calibration
 from wingfit.cameras.calibrate.triangulation import nearest_points, triangulate
-from wingfit.cameras.calibrate.wand import Wand, calibrate_wand
+from wingfit.cameras.calibrate.wand import Wand, calibrate_wand, relative_pose, wand_poses
 from wingfit.cameras.camera import Camera
 from wingfit.records.errors import DatasetError
 
@@ -35,8 +36,8 @@ def ratios(result: Calibration, true: tuple[Camera, ...]) -> tuple[np.ndarray, f
 @pytest.mark.parametrize("free", [(), FOCAL], ids=["known lenses", "rough focal lengths"])
 def test_cameras_are_recovered(wand: Wand, free: tuple[str, ...]) -> None:
     true, total, count = ring((0.0, 40.0, 80.0)), 0.0, 0
-    for seed in range(3):
-        tracks = wand_tracks(true, wand.shape, 100, np.random.default_rng(seed))
+    for seed in range(2):
+        tracks = wand_tracks(true, wand.shape, 75, np.random.default_rng(seed))
         result = calibrate_wand(tracks, roughly(true, 1.03 if free else 1.0), wand, free=free)
         parts, squares = ratios(result, true)
         assert np.abs(parts).max() < 4
@@ -92,6 +93,38 @@ def test_points_are_triangulated_where_two_cameras_see_them() -> None:
     for found in (nearest_points(true, pixels), triangulate(true, pixels)):
         np.testing.assert_allclose(found[:2], points[:2], atol=1e-9)
         assert np.isnan(found[2]).all()
+
+
+def test_points_behind_a_camera_are_none() -> None:
+    """Rays that part meet behind the cameras."""
+    true = ring((0.0, 40.0))
+    pixels = np.stack([camera.project(np.array([[0.0, 0.0, 0.6]])) for camera in true])
+    pixels[0, 0, 0] -= 450
+    pixels[1, 0, 0] += 450
+    assert np.isnan(nearest_points(true, pixels)).all()
+    assert np.isnan(triangulate(true, pixels)).all()
+
+
+@pytest.mark.parametrize("wand", WANDS, ids=["two markers", "three in line", "triangle"])
+def test_the_length_of_the_wand_gives_the_scale_of_a_pair(wand: Wand) -> None:
+    true = ring((0.0, 40.0))
+    tracks = wand_tracks(true, wand.shape, 40, np.random.default_rng(5), noise=0.0)
+    first, second = roughly(true)
+    link = relative_pose((first, second), np.stack([tracks["a"], tracks["b"]]), wand)
+    assert link is not None
+    np.testing.assert_allclose(link.pose.rotation, true[1].rotation, atol=1e-6)
+    np.testing.assert_allclose(link.pose.translation, true[1].translation, atol=1e-6)
+
+
+@pytest.mark.parametrize("wand", WANDS, ids=["two markers", "three in line", "triangle"])
+def test_poses_bring_the_wand_to_its_markers(wand: Wand) -> None:
+    rng = np.random.default_rng(6)
+    turns, moves = Rotation.random(20, rng=rng).as_matrix(), rng.standard_normal((20, 3))
+    points = np.einsum("fij,mj->fmi", turns, wand.shape) + moves[:, None]
+    found = wand_poses(points, wand)
+    again = np.einsum("fij,mj->fmi", found.rotation, wand.shape) + found.translation[:, None]
+    np.testing.assert_allclose(again, points, atol=1e-12)
+    np.testing.assert_allclose(np.linalg.det(found.rotation), 1.0)
 
 
 def test_refusals() -> None:

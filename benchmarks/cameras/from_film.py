@@ -1,0 +1,66 @@
+"""From films of a wing under several conditions to a dataset: rendered, tracked, and aligned to the described wing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.cameras.render import write
+from benchmarks.cameras.renderer.presets import BEAT, thesis_strobe
+from benchmarks.cameras.renderer.simulated import simulated_scene
+from benchmarks.cameras.tracked import calibrated
+from wingfit.cameras.track.procedure import Request, track
+from wingfit.cameras.track.result import TrackedFilm
+from wingfit.cameras.video.source import Film
+from wingfit.records import Condition, Dataset, Recording, Wing
+from wingfit.sim.virtual_rigs.campaign import robird_wing
+from wingfit.tracking.alignment import Known, Tracks, align
+
+CONDITIONS = ((1e3, 0.0), (1e4, 0.0524), (1e5, 0.0), (1e5, 0.1222), (1e4, 0.1222))
+HELD_OUT = 4
+FLASHES = 62
+KELVIN = 293.15
+Report = Callable[[str], object]
+
+
+def dataset_from_films(folder: Path, genes: Mapping[str, float], report: Report, flashes: int = FLASHES) -> Dataset:
+    """Film a simulated wing with ``genes`` under all conditions, and return what a user would get from the films."""
+    wing = robird_wing()
+    recordings = []
+    for number, (pressure, lag) in enumerate(CONDITIONS):
+        condition = Condition(BEAT, lag, pressure, KELVIN)
+        name = f"film{number}"
+        report(f"{name}: rendering")
+        place = folder / name
+        if not (place / "done").exists():
+            made = thesis_strobe(flashes=flashes, seed=number + 1, scene=simulated_scene(condition, genes))
+            write(replace(made, wand=replace(made.wand, until=0.1)), place)
+            (place / "done").touch()
+        report(f"{name}: tracking")
+        recordings.append(_recording(name, wing, condition, _tracked(place, wing)))
+    held_out = (recordings[HELD_OUT].name,)
+    return Dataset("films of a wing", wing, tuple(recordings), held_out)
+
+
+def _tracked(place: Path, wing: Wing) -> TrackedFilm:
+    calibration = calibrated(place, ["left", "right"])
+    request = Request(
+        cameras=calibration.cameras,
+        films=tuple(Film(place / f"wing-{camera.name}.avi") for camera in calibration.cameras),
+        kind="chequer",
+        light="strobe",
+        names=tuple(marker.name for marker in wing.markers),
+        reference=np.array([marker.position for marker in wing.markers]),
+        calibration=calibration.covariance,
+        store=place / "detected",
+    )
+    return track(request)
+
+
+def _recording(name: str, wing: Wing, condition: Condition, found: TrackedFilm) -> Recording:
+    aligned = align(Tracks(name, found.times, found.names, found.positions), wing, Known(side="right"), lambda _: None)
+    values = aligned.positions.reshape(len(found.times), -1)
+    return Recording(name, wing, condition, aligned.times, aligned.markers, values)
