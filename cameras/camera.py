@@ -36,7 +36,8 @@ class Lens:
 
     def __post_init__(self) -> None:
         if self.model not in get_args(LensModel):
-            raise fail("lens, model", self.model, f"is no model of a lens; {nearest(self.model, COEFFICIENTS)}")
+            hint = nearest(self.model, COEFFICIENTS)
+            raise fail("lens, model", self.model, f"{self.model!r} is no model of a lens; {hint}")
         names, given = COEFFICIENTS[self.model], len(self.coefficients)
         if given != len(names):
             listed = ", ".join(names) or "none"

@@ -82,6 +82,7 @@ def test_the_wheel_holds_one_package() -> None:
     assert links == {
         "inference",
         "calibration",
+        "cameras",
         "checks",
         "cli",
         "client",

@@ -63,4 +63,4 @@ def _tracked(place: Path, wing: Wing) -> TrackedFilm:
 def _recording(name: str, wing: Wing, condition: Condition, found: TrackedFilm) -> Recording:
     aligned = align(Tracks(name, found.times, found.names, found.positions), wing, Known(side="right"), lambda _: None)
     values = aligned.positions.reshape(len(found.times), -1)
-    return Recording(name, wing, condition, aligned.times, aligned.markers, values)
+    return Recording(name, "vacuum_chamber", condition, aligned.times, aligned.markers, values)

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.special import erf
 
 from wingfit.cameras.markers.detections import Detections, no_detections
-from wingfit.cameras.markers.patch_fit import PatchFit, cut_patches, fit_patches, offsets
+from wingfit.cameras.markers.patch_fit import PatchFit, cut_patches, fit_patches, inside, offsets
 from wingfit.cameras.opencv import opencv
 from wingfit.records.array_types import Array, Float, Mask
 
@@ -20,6 +20,7 @@ LARGEST_PX = 60.0
 _LARGEST_RADIUS = 11.0  # of a patch, pixels
 _SCALES = (1.2, 2.4)  # pixels
 _EXPLAINED = 0.75
+_LEAST_SEEN = 0.8  # share of a patch within the image
 _NOISES = 6.0  # contrast above that of noise
 # What the pattern does not follow (uneven light, gamma, compression), as measured on rendered films.
 _FLOOR_PX = 0.01
@@ -38,11 +39,11 @@ def detect_chequers(image: Array, dark: float, noise: float, near: Float[Array, 
     starts, angles, reach = starts[usable], angles[usable], reach[usable]
     if not len(starts):
         return no_detections()
-    fit, places = _fit(image, starts, angles, reach)
+    fit, places, whole = _fit(image, starts, angles, reach)
     found = Detections(places, fit.covariance + _FLOOR_PX**2 * np.eye(2), reach, 2 * np.abs(fit.contrast))
     moved = np.linalg.norm(places - starts, axis=1)
     good = (fit.explained > _EXPLAINED) & (found.contrast > _NOISES * noise) & (moved < 0.6 * reach)
-    good &= np.isfinite(found.covariance).all((1, 2)) & (_variance(found) < 1.0) & _crossing(fit)
+    good &= np.isfinite(found.covariance).all((1, 2)) & (_variance(found) < 1.0) & _crossing(fit) & whole
     return _apart(found.only(good))
 
 
@@ -125,8 +126,8 @@ def _sampled(image: Array, at: Float[Array, "N S 2"]) -> Float[Array, "N S"]:
     return np.asarray(found, dtype=float)
 
 
-def _fit(image: Array, starts: Array, angles: Array, reach: Array) -> tuple[PatchFit, Float[Array, "N 2"]]:
-    """Fit the pattern around ``starts``; returns the fit and the places of the saddles."""
+def _fit(image: Array, starts: Array, angles: Array, reach: Array) -> tuple[PatchFit, Float[Array, "N 2"], Mask]:
+    """Fit the pattern around ``starts``; returns the fit, the places of the saddles, and which the border leaves."""
     # Squares end at the reach along their diagonals; a disc within them is about 0.6 of it.
     radius = np.clip(0.6 * reach, 2.5, _LARGEST_RADIUS)
     half = int(np.ceil(radius.max())) + 1
@@ -134,8 +135,10 @@ def _fit(image: Array, starts: Array, angles: Array, reach: Array) -> tuple[Patc
     at = offsets(half)
     start = np.column_stack([starts - corner, angles, np.zeros((len(starts), 2))])
     weights = np.clip(radius[:, None] + 0.5 - np.linalg.norm(at[None] - start[:, None, :2], axis=2), 0, 1)
-    fit = fit_patches(_shape, start, patches, weights, at)
-    return fit, fit.parameters[:, :2] + corner
+    seen = weights * inside(image, corner, half)
+    fit = fit_patches(_shape, start, patches, seen, at)
+    whole = seen.sum(1) > _LEAST_SEEN * weights.sum(1)
+    return fit, fit.parameters[:, :2] + corner, whole
 
 
 def _shape(parameters: Float[Array, "N 6"], at: Float[Array, "Q 2"]) -> tuple[Array, Array]:

@@ -10,13 +10,14 @@ import numpy as np
 from scipy.special import erf
 
 from wingfit.cameras.markers.detections import Detections, no_detections
-from wingfit.cameras.markers.patch_fit import cut_patches, fit_patches, offsets
+from wingfit.cameras.markers.patch_fit import cut_patches, fit_patches, inside, offsets
 from wingfit.cameras.opencv import opencv
 from wingfit.records.array_types import Array, Float
 
 _NOISES = 6.0  # contrast above that of noise
 _LEAST_PX, _LARGEST_PX = 3, 40.0  # area; radius
 _EXPLAINED = 0.8
+_LEAST_SEEN = 0.7  # share of a patch within the image
 _FLOOR_PX = 0.01  # as for chequers
 _MOST_SLANT = 6.0  # ratio of the axes of an ellipse
 
@@ -51,7 +52,8 @@ def _fitted(image: Array, starts: Array, radii: Array, noise: float) -> Detectio
     start = np.column_stack([first, np.log(np.full(len(starts), 0.8))])
     reach = 1.5 * radii.max(1) + 2.5
     weights = np.clip(reach[:, None] + 0.5 - np.linalg.norm(at[None] - start[:, None, :2], axis=2), 0, 1)
-    fit = fit_patches(_shape, start, patches, weights, at)
+    seen = weights * inside(image, corner, half)
+    fit = fit_patches(_shape, start, patches, seen, at)
     places = fit.parameters[:, :2] + corner
     size = np.exp(np.clip(fit.parameters[:, 2:4], -3, 5)).min(1)
     found = Detections(places, fit.covariance + _FLOOR_PX**2 * np.eye(2), size, fit.contrast)
@@ -59,6 +61,7 @@ def _fitted(image: Array, starts: Array, radii: Array, noise: float) -> Detectio
     good &= (np.linalg.norm(places - starts, axis=1) < radii.max(1)) & (
         np.trace(found.covariance, axis1=1, axis2=2) < 1
     )
+    good &= seen.sum(1) > _LEAST_SEEN * weights.sum(1)
     return found.only(good)
 
 

@@ -47,6 +47,15 @@ def cut_patches(image: Array, centres: Float[Array, "N 2"], half: int) -> tuple[
     return patches.reshape(len(centres), -1), corner
 
 
+def inside(image: Array, corner: Array, half: int) -> Float[Array, "N Q"]:
+    """Return 1 for the pixels of the patches of ``cut_patches`` that lie in the image, 0 for repeats of its border."""
+    height, width = image.shape
+    steps = np.arange(-half, half + 1)
+    rows, columns = corner[:, 1, None] + steps, corner[:, 0, None] + steps
+    good = ((rows >= 0) & (rows < height))[:, :, None] & ((columns >= 0) & (columns < width))[:, None, :]
+    return good.reshape(len(corner), -1).astype(float)
+
+
 def offsets(half: int) -> Float[Array, "Q 2"]:
     """Return x and y of the pixels of a patch from its middle, in the order of ``cut_patches``."""
     steps = np.arange(-half, half + 1, dtype=float)
@@ -151,6 +160,8 @@ def _correlation(residuals: Array, weights: Array, variance: Array, at: Float[Ar
     used = (np.abs(np.fft.rfft2(weights.reshape(-1, side, side), (size, size))) ** 2).sum(0)
     overlap = np.fft.irfft2(used, (size, size))
     by_lag *= overlap[0, 0] / np.maximum(overlap, 1e-3 * overlap[0, 0])
+    # A fit with many parameters for its pixels leaves residuals that alternate, although the errors do not.
+    by_lag = np.maximum(by_lag, 0)
     lag = np.rint(at[:, None] - at[None]).astype(int)
     near = np.clip(1 - np.hypot(lag[..., 0], lag[..., 1]) / (_CORRELATED_PX + 1), 0, 1)
     return np.asarray(by_lag[lag[..., 1], lag[..., 0]] * near)

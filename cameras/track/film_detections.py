@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import hashlib
 import json
+import zlib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
+from zipfile import BadZipFile
 
 import numpy as np
 
@@ -15,7 +17,7 @@ from wingfit.cameras.markers.chequer import detect_chequers
 from wingfit.cameras.markers.detections import Detections, no_detections
 from wingfit.cameras.markers.dot import detect_dots
 from wingfit.cameras.video.source import Film, Frames
-from wingfit.cameras.video.strobe import Background, FlashMark, background, flashes
+from wingfit.cameras.video.strobe import FlashMark, background, flashes
 from wingfit.records.array_types import Array
 from wingfit.records.errors import fail
 
@@ -84,7 +86,8 @@ def detect_film(task: FilmTask, progress: Progress) -> FilmDetections:
         first = marks[-1].frame + (2 if task.light == "strobe" else 1)
     fresh = FilmDetections([], [], ())
     of = min(frames.count or 10**9, task.last or 10**9) - task.first
-    for mark, found, missing in _instants(task, frames, first):
+    limited = _Limited(frames, task.last)
+    for mark, found, missing in _instants(task, limited, first):
         fresh.seen.append(found)
         fresh.marks.append(mark)
         fresh = FilmDetections(fresh.seen, fresh.marks, (*fresh.bad_frames, *missing))
@@ -94,29 +97,27 @@ def detect_film(task: FilmTask, progress: Progress) -> FilmDetections:
             seen, marks, bad = seen + fresh.seen, marks + fresh.marks, [*bad, *fresh.bad_frames]
             fresh = FilmDetections([], [], ())
         progress(mark.frame + 1 - task.first, of)
+    fresh = FilmDetections(fresh.seen, fresh.marks, (*fresh.bad_frames, *limited.bad()))
     if folder:
         _store(folder, len(chunks), fresh)
         (folder / _COMPLETE).touch()
     return FilmDetections(seen + fresh.seen, marks + fresh.marks, (*bad, *fresh.bad_frames))
 
 
-def _instants(task: FilmTask, frames: Frames, first: int) -> Iterator[tuple[FlashMark, Detections, tuple[int, ...]]]:
+def _instants(task: FilmTask, frames: _Limited, first: int) -> Iterator[tuple[FlashMark, Detections, tuple[int, ...]]]:
     """Return instants with their detections, and the numbers of the bad frames before them."""
     detect = detect_chequers if task.kind == "chequer" else detect_dots
-    limited = _Limited(frames, task.last)
     if task.light == "strobe":
-        dark = background(frames)
-        for flash in flashes(limited, dark, first):
-            yield flash.mark, detect(flash.image, 0.0, max(flash.noise, _LEAST_NOISE)), limited.bad()
+        dark = background(frames.all)
+        for flash in flashes(frames, dark, first):
+            yield flash.mark, detect(flash.image, 0.0, max(flash.noise, _LEAST_NOISE)), frames.bad()
         return
-    still: Background | None = None
-    for number, frame in limited.read(first):
-        if frame is None:
-            continue
-        if still is None:
-            still = _steady(frame)
-        found = detect(frame, float(np.median(frame)), still.noise)
-        yield FlashMark(number, 0.0, (0.0, 0.0)), found, limited.bad()
+    # That of the first frame also if an earlier run detected it, so that the detections are the same.
+    noise = next((_noise(frame) for _, frame in frames.all.read(task.first) if frame is not None), _LEAST_NOISE)
+    for number, frame in frames.read(first):
+        if frame is not None:
+            found = detect(frame, float(np.median(frame)), noise)
+            yield FlashMark(number, 0.0, (0.0, 0.0)), found, frames.bad()
 
 
 class _Limited(Frames):
@@ -125,10 +126,10 @@ class _Limited(Frames):
     def __init__(self, frames: Frames, last: int | None) -> None:
         self.path, self.size_px = frames.path, frames.size_px
         self.rate_hz, self.count = frames.rate_hz, frames.count
-        self._frames, self._last, self._bad = frames, last, list[int]()
+        self.all, self._last, self._bad = frames, last, list[int]()
 
     def read(self, first: int = 0) -> Iterator[tuple[int, Array | None]]:
-        for number, frame in self._frames.read(first):
+        for number, frame in self.all.read(first):
             if self._last is not None and number >= self._last:
                 return
             if frame is None:
@@ -141,11 +142,10 @@ class _Limited(Frames):
         return bad
 
 
-def _steady(frame: Array) -> Background:
+def _noise(frame: Array) -> float:
     """Return the noise of a frame from differences of neighbouring pixels, most of which show no edge."""
     change = np.diff(frame.astype(np.float32), axis=1)
-    noise = float(np.median(np.abs(change)) / 0.6745 / np.sqrt(2))
-    return Background(frame.astype(np.float32), max(noise, _LEAST_NOISE))
+    return max(float(np.median(np.abs(change)) / 0.6745 / np.sqrt(2)), _LEAST_NOISE)
 
 
 def _store(folder: Path, number: int, chunk: FilmDetections) -> None:
@@ -173,7 +173,7 @@ def _stored(folder: Path | None) -> list[FilmDetections]:
         try:
             with np.load(file) as of:
                 chunks.append(_chunk({name: of[name] for name in of.files}))
-        except (OSError, ValueError, KeyError) as error:
+        except (OSError, EOFError, ValueError, KeyError, IndexError, BadZipFile, zlib.error) as error:
             raise fail(str(file), None, f"cannot be read ({error}); remove the folder, it is made anew") from None
     return chunks
 

@@ -16,6 +16,7 @@ from wingfit.cameras.markers.detections import Detections, no_detections
 from wingfit.records.array_types import Array, Float
 
 _NEIGHBOURS = 4  # of which the velocity is taken for a detection that has none
+_SAME = 1e-6  # of the longest time between samples
 _GATE = 0.35  # of the distance between neighbouring detections
 
 
@@ -111,8 +112,11 @@ def at_time(tracklets: Tracklets, time: float, longest: float) -> Detections:
     times, owner = tracklets.times, tracklets.owner
     before = np.flatnonzero((times[:-1] <= time) & (times[1:] > time) & (owner[:-1] == owner[1:]))
     before = before[times[before + 1] - times[before] <= longest]
+    # The last sample of a tracklet, and one before a gap, can be read at their own time.
+    exact = np.flatnonzero(np.abs(times - time) < _SAME * longest)
+    alone = tracklets.seen.only(exact[~np.isin(owner[exact], owner[before])])
     if not len(before):
-        return no_detections()
+        return alone
     index = np.clip(before[:, None] + np.arange(-1, 3), 0, len(times) - 1)
     inside = owner[index] == owner[before][:, None]
     gaps = np.abs(times[index] - time) < 3 * longest
@@ -124,7 +128,7 @@ def at_time(tracklets: Tracklets, time: float, longest: float) -> Detections:
     covariance = np.einsum("nk,nkij->nij", weights**2, seen.covariance[index])
     covariance += (0.1 * np.linalg.norm(pixels - straight, axis=1) ** 2)[:, None, None] * 0.1 * np.eye(2)
     nearest = before + (share > 0.5)
-    return Detections(pixels, covariance, seen.size_px[nearest], seen.contrast[nearest])
+    return _joined((Detections(pixels, covariance, seen.size_px[nearest], seen.contrast[nearest]), alone))
 
 
 def _lagrange(times: Float[Array, "N 4"], time: float, use: Array) -> Float[Array, "N 4"]:

@@ -71,7 +71,9 @@ class Frames:
 class _ImageFrames(Frames):
     def __init__(self, folder: Path, rate_hz: float | None) -> None:
         self.path = folder
-        self.files = sorted((one for one in folder.iterdir() if one.suffix.lower() in IMAGES), key=_by_number)
+        # Names that start with a dot are hidden files, which macOS writes beside images on other systems' disks.
+        images = (one for one in folder.iterdir() if one.suffix.lower() in IMAGES and not one.name.startswith("."))
+        self.files = sorted(images, key=_by_number)
         if not self.files:
             raise fail(str(folder), None, f"holds no images; a frame is a file ending in {', '.join(IMAGES)}")
         if rate_hz is None:
@@ -144,4 +146,4 @@ def _grey(image: Array | None) -> Array | None:
 def _by_number(file: Path) -> tuple[list[tuple[int, str]], str]:
     """Return a key by which frame9 is before frame10."""
     parts = re.findall(r"\d+|\D+", file.stem)
-    return [(int(part), "") if part.isdigit() else (-1, part) for part in parts], file.name
+    return [(int(part), "") if part.isdecimal() else (-1, part) for part in parts], file.name

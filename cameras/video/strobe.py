@@ -19,7 +19,8 @@ from wingfit.records.errors import fail
 
 _SAMPLED, _FIRST_FRAMES = 25, 150
 _NOISES, _GREY_LEVELS, _LEAST_PIXELS = 8.0, 6.0, 12
-_MOST_LIT = 0.4  # share of frames
+_MOST_LIT = 0.7  # share of frames
+_GOLDEN = 0.618034
 
 
 @dataclass(frozen=True)
@@ -76,7 +77,8 @@ def background(frames: Frames) -> Background:
     step = max(min(frames.count or _FIRST_FRAMES, _FIRST_FRAMES) // _SAMPLED, 1)
     sampled: list[Array] = []
     for number, frame in frames.read():
-        if number % step == 0 and frame is not None:
+        # One frame of each step, not always the same, lest all show a flash of a strobe in step with them.
+        if number % step == int(number // step * _GOLDEN % 1 * step) and frame is not None:
             sampled.append(frame)
         if len(sampled) == _SAMPLED:
             break
@@ -101,11 +103,12 @@ def flashes(frames: Frames, dark: Background, first: int = 0) -> Iterator[Flash]
         lit_frames += lit
         run = run + 1 if lit else 0
         if run > 2 or (seen > 50 and lit_frames > _MOST_LIT * seen):
+            what = f"frame {number} is the third of three" if run > 2 else f"{lit_frames} of {seen} frames are those"
             raise fail(
                 str(frames.path),
                 number,
-                f"frame {number} is the third of three that are lit; a strobe must leave frames dark between flashes: "
-                "flash at most at a third of the frame rate, or track without strobe",
+                f"{what} that are lit; a strobe must leave frames dark between flashes: flash at most at a third of "
+                "the frame rate, or track with light: continuous",
             )
         if before is not None:
             second = frame if frame is not None else dark.image
@@ -211,5 +214,6 @@ def _numbers(at: Float[Array, " N"], file: str) -> Array:
     intervals = np.diff(at)
     if (intervals <= 0).any():
         raise fail(file, None, "flashes are not in order")
-    period = float(np.median(intervals[intervals < 1.5 * np.percentile(intervals, 20)]))
+    # The mean, for which the rounding to frames cancels; a long gap would be miscounted with the median.
+    period = float(np.mean(intervals[intervals < 1.5 * np.percentile(intervals, 20)]))
     return np.concatenate([[0], np.cumsum(np.maximum(np.rint(intervals / period), 1))]).astype(int)
