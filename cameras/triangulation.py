@@ -10,6 +10,7 @@ import numpy as np
 from wingfit.cameras.camera import Camera
 from wingfit.records.array_types import Array, Float, Index, Mask
 
+LEAST_CAMERAS = 2
 _STEPS = 10
 _SMALL_STEP_M = 1e-9
 
@@ -19,7 +20,7 @@ class Points:
     """Triangulated points.
 
     Attributes:
-        positions: [N, 3] (m); NaN where fewer than two cameras see the point.
+        positions: [N, 3] (m); NaN where fewer than two cameras see the point, or their rays do not meet before them.
         covariance: [N, 3, 3] (m^2), of the pixels' covariances.
         misfit: [N], sum over cameras of squared residuals over the pixels' covariances; chi-square with
             ``2 * cameras - 3`` degrees of freedom.
@@ -37,36 +38,49 @@ def triangulate(
 ) -> Points:
     """Return the points in space whose pixels in ``cameras`` are given; NaN where a camera does not see one.
 
-    Linear start from the rays, then Gauss-Newton on the pixels, weighted by the inverse of their ``covariance``.
+    From the points nearest to the rays, then Gauss-Newton on the pixels, weighted by the inverse of ``covariance``.
     """
     seen = np.asarray(np.isfinite(pixels).all(2))
-    enough = seen.sum(0) >= 2
     count = pixels.shape[1]
+    start = nearest_points(cameras, pixels)
     positions = np.full((count, 3), np.nan)
     spread = np.full((count, 3, 3), np.nan)
     misfit = np.full(count, np.nan)
-    at = np.flatnonzero(enough)
+    at = np.flatnonzero(np.isfinite(start).all(1))
     if len(at):
-        found = _linear(cameras, pixels[:, at], seen[:, at])
         weights = _weights(covariance[:, at], seen[:, at])
-        found, matrix, cost = _refined(cameras, pixels[:, at], seen[:, at], weights, found)
+        found, matrix, cost = _refined(cameras, pixels[:, at], seen[:, at], weights, start[at])
         positions[at], misfit[at] = found, cost
         spread[at] = np.linalg.inv(matrix)
     return Points(positions, spread, misfit, 2 * seen.sum(0) - 3)
 
 
-def _linear(cameras: Sequence[Camera], pixels: Array, seen: Mask) -> Float[Array, "N 3"]:
-    """Return the points nearest to their rays: least squares of the distances."""
-    matrix, right = np.zeros((pixels.shape[1], 3, 3)), np.zeros((pixels.shape[1], 3))
-    for camera, at, mask in zip(cameras, pixels, seen, strict=True):
-        slopes = camera.rays(at[mask])
-        ray = np.column_stack([slopes, np.ones(len(slopes))]) @ camera.rotation
-        ray /= np.linalg.norm(ray, axis=1, keepdims=True)
-        across = np.eye(3) - ray[:, :, None] * ray[:, None, :]
-        matrix[mask] += across
-        right[mask] += across @ camera.centre
-    matrix += 1e-12 * np.eye(3)
-    return np.asarray(np.linalg.solve(matrix, right[:, :, None])[:, :, 0])
+def nearest_points(cameras: Sequence[Camera], pixels: Float[Array, "C N 2"]) -> Float[Array, "N 3"]:
+    """Return the points (m) nearest to the rays of all ``cameras`` at ``pixels``.
+
+    NaN where fewer than two cameras see a point (NaN pixels), where rays are parallel, and where the point is not in
+    front of the cameras.
+    """
+    count = pixels.shape[1]
+    matrix, right = np.zeros((count, 3, 3)), np.zeros((count, 3))
+    seen = np.asarray(np.isfinite(pixels).all(axis=2))
+    for camera, own, mine in zip(cameras, pixels, seen, strict=True):
+        rays = np.concatenate([camera.rays(own[mine]), np.ones((int(mine.sum()), 1))], axis=1)
+        rays = rays @ camera.rotation
+        rays /= np.linalg.norm(rays, axis=1, keepdims=True)
+        # The projection on the plane across the ray measures the distance from it.
+        across = np.eye(3) - rays[:, :, None] * rays[:, None, :]
+        matrix[mine] += across
+        right[mine] += across @ camera.centre
+    points = np.full((count, 3), np.nan)
+    enough = seen.sum(axis=0) >= LEAST_CAMERAS
+    enough[enough] = np.linalg.cond(matrix[enough]) < 1e12
+    points[enough] = np.linalg.solve(matrix[enough], right[enough][:, :, None])[:, :, 0]
+    for camera, mine in zip(cameras, seen, strict=True):
+        behind = mine & enough
+        behind[behind] = camera.depth(points[behind]) <= 0
+        points[behind] = np.nan
+    return points
 
 
 def _weights(covariance: Float[Array, "C N 2 2"], seen: Mask) -> Float[Array, "C N 2 2"]:

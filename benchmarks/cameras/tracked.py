@@ -18,8 +18,10 @@ from wingfit.cameras.calibrate.board import Board
 from wingfit.cameras.calibrate.boards import find_boards
 from wingfit.cameras.calibrate.from_boards import calibrate_boards
 from wingfit.cameras.calibrate.result import Calibration
+from wingfit.cameras.camera import Camera, Lens
 from wingfit.cameras.track.procedure import Report, Request, track
 from wingfit.cameras.track.result import TrackedFilm
+from wingfit.cameras.triangulation import triangulate
 from wingfit.cameras.video.source import Film
 from wingfit.records.array_types import Array
 
@@ -31,11 +33,21 @@ REACH_M = 1.0  # width of what the cameras see at the wing
 
 @dataclass(frozen=True, eq=False)
 class Tracked:
-    """A tracked film: the calibration, the tracks, the true positions in the same axes (m), and CPU seconds."""
+    """A tracked film.
+
+    Attributes:
+        calibration: of the cameras, from rendered chessboards.
+        found: the tracks.
+        truth: [T, K, 3] (m), the true positions in the same axes.
+        noise: [T, K, 3] (m), the error of the same pixels triangulated with the true cameras.
+        field_m: width of what the first camera sees at the wing.
+        frames, seconds: count of frames of all cameras, and the CPU time that tracking took.
+    """
 
     calibration: Calibration
     found: TrackedFilm
     truth: Array
+    noise: Array
     field_m: float
     frames: int
     seconds: float
@@ -49,7 +61,9 @@ class Tracked:
         if self.found.by_calibration is not None:
             variances = variances + np.diagonal(self.found.by_calibration, axis1=1, axis2=2)
         rms = float(np.sqrt(np.mean(distance[seen] ** 2)))
-        inside = np.abs(errors[seen]) < NINETY * np.sqrt(variances[seen])
+        whole = np.abs(errors[seen]) < NINETY * np.sqrt(variances[seen])
+        own = np.diagonal(self.found.covariance, axis1=2, axis2=3)
+        noise = np.abs(self.noise[seen]) < NINETY * np.sqrt(own[seen])
         return {
             "markers": len(self.found.names),
             "tracked_in_95_percent_of_frames": int(np.percentile(seen.sum(1), 5)),
@@ -58,7 +72,8 @@ class Tracked:
             "largest_error_mm": round(1e3 * float(distance[seen].max()), 3),
             "wrong_labels": int((distance[seen] > WRONG_M).sum()),
             "field_over_error": round(self.field_m / rms),
-            "coverage_percent": round(100 * float(inside.mean()), 1),
+            "coverage_percent": round(100 * float(noise.mean()), 1),
+            "coverage_with_calibration_percent": round(100 * float(whole.mean()), 1),
             "frames_per_second": round(self.frames / self.seconds, 2),
             "calibration_px": round(self.calibration.rms_px, 4),
             "remarks": list(self.found.remarks),
@@ -92,9 +107,9 @@ def render_and_track(preset: str, folder: Path, options: dict[str, Any], report:
     found = track(request, report)
     seconds = time.process_time() - began
     frames = sum(film.opened().count for film in request.films)
-    return Tracked(
-        calibration, found, _truth(folder, cameras[0], found, strobe=strobe), _field(cameras[0]), frames, seconds
-    )
+    truth = _truth(folder, cameras[0], found, strobe=strobe)
+    noise = _noise(cameras, found, truth)
+    return Tracked(calibration, found, truth, noise, _field(cameras[0]), frames, seconds)
 
 
 def calibrated(folder: Path, names: list[str]) -> Calibration:
@@ -115,6 +130,22 @@ def _truth(folder: Path, camera: dict[str, Any], found: TrackedFilm, *, strobe: 
     else:
         at = CubicSpline(times, positions)(_clock(camera, found.times) + camera["exposure"] / 2)
     return np.asarray(at @ np.array(camera["rotation"]).T + np.array(camera["translation"]))
+
+
+def _noise(cameras: list[dict[str, Any]], found: TrackedFilm, truth: Array) -> Array:
+    """Return the errors [T, K, 3] of the pixels of ``found``, triangulated with the true cameras."""
+    rotation, move = np.array(cameras[0]["rotation"]), np.array(cameras[0]["translation"])
+    true = [
+        Camera(
+            one["name"], tuple(one["size"]), np.array(one["matrix"]), Lens("brown", tuple(one["distortion"])),
+            np.array(one["rotation"]) @ rotation.T,
+            np.array(one["translation"]) - np.array(one["rotation"]) @ rotation.T @ move,
+        )
+        for one in cameras
+    ]  # fmt: skip
+    pixels = np.moveaxis(found.pixels, 1, 0).reshape(len(true), -1, 2)
+    points = triangulate(true, pixels, np.broadcast_to(np.eye(2), (*pixels.shape, 2)))
+    return np.asarray(points.positions.reshape(truth.shape) - truth)
 
 
 def _clock(camera: dict[str, Any], times: Array) -> Array:

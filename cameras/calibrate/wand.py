@@ -13,9 +13,9 @@ from wingfit.cameras.calibrate.from_boards import MOST_CAMERAS
 from wingfit.cameras.calibrate.graph import UNMOVED, Link, Pose, camera_poses
 from wingfit.cameras.calibrate.outliers import Pruned, Screened, fit_screened
 from wingfit.cameras.calibrate.result import Calibration, WandErrors, summarise
-from wingfit.cameras.calibrate.triangulation import LEAST_CAMERAS, nearest_points, triangulate
 from wingfit.cameras.camera import COEFFICIENTS, FOCAL_AND_CENTRE, POSE, Camera
 from wingfit.cameras.opencv import opencv
+from wingfit.cameras.triangulation import LEAST_CAMERAS, nearest_points, triangulate
 from wingfit.records.array_types import Array, Float, Mask
 from wingfit.records.errors import fail, nearest
 
@@ -272,7 +272,8 @@ def _used_pixels(pixels: Array, seen: Observations, found: Screened) -> Array:
 
 def _length_errors(cameras: Sequence[Camera], pixels: Array, wand: Wand) -> Array:
     """Return the errors (percent) of the distances [F, D] of markers that are triangulated one by one."""
-    points = [triangulate(cameras, pixels[:, :, m]) for m in range(wand.markers)]
+    equal = np.broadcast_to(np.eye(2), (*pixels[:, :, 0].shape, 2))
+    points = [triangulate(cameras, pixels[:, :, m], equal).positions for m in range(wand.markers)]
     lengths = np.stack([np.linalg.norm(points[a] - points[b], axis=1) for a, b in wand.pairs], axis=1)
     errors = 100 * (lengths / np.array(wand.distances_m) - 1)
     return np.asarray(errors[np.isfinite(errors).all(axis=1)])
