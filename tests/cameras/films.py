@@ -16,7 +16,7 @@ from wingfit.records.array_types import Array
 
 SIZE, RATE, FRAMES = (320, 240), 100.0, 25
 NAMES = tuple(f"m{number:02d}" for number in range(12))
-PLACES = np.array([[0.05 * (k % 4) ** 1.1, 0.06 * (k // 4) + 0.01 * (k % 3), 0.0] for k in range(12)])
+PLACES = np.array([[0.05 * (k % 4) ** 1.1, 0.06 * (k // 4) + 0.013 * (k % 4), 0.0] for k in range(12)])
 FILM = """format: wingfit film
 version: 1
 cameras: cameras.yaml
