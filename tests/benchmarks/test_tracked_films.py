@@ -29,7 +29,7 @@ def written(film: RenderedFilm, folder: Path) -> tuple[Film, ...]:
 
 
 def test_the_markers_of_a_wing_under_a_strobe_are_tracked(tmp_path: Path) -> None:
-    film = thesis_strobe(scale=0.4, flashes=6, seed=5).film
+    film = thesis_strobe(scale=0.4, flashes=4, seed=5).film
     truth = truth_of(film)
     rest = film.scene.poses(np.zeros(1)).positions[0]
     films = written(film, tmp_path)

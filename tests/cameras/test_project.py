@@ -17,7 +17,7 @@ from wingfit.records.errors import DatasetError
 
 @pytest.fixture
 def film(tmp_path: Path) -> Path:
-    return write_film(tmp_path, frames=1)
+    return write_film(tmp_path, frames=0)
 
 
 def test_a_description_is_read(film: Path, tmp_path: Path) -> None:

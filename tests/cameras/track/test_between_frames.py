@@ -105,13 +105,13 @@ def film_of(camera: Camera, late: float, rng: np.random.Generator, sigma: float)
 def test_the_offset_of_a_clock_is_found_with_its_error() -> None:
     cameras, true = ring((-20.0, 20.0)), 1.3e-3
     ratios, found = [], []
-    for seed in range(4):
+    for seed in range(3):
         rng = np.random.default_rng(seed)
         films = film_of(cameras[0], 0.0, rng, 0.2), film_of(cameras[1], true, rng, 0.2)
         offset = offset_between((cameras[0], cameras[1]), films, np.arange(30) / RATE, 1 / RATE, 4e-3, 0.05)
         found.append(offset.seconds)
         ratios.append((offset.seconds - true) / offset.standard_error)
-    assert found == pytest.approx([true] * 4, abs=6e-5)
+    assert found == pytest.approx([true] * 3, abs=6e-5)
     assert np.abs(ratios).max() < 4
     assert np.sqrt(np.mean(np.square(ratios))) > 0.2  # the error is not exaggerated
 
