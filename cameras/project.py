@@ -62,8 +62,8 @@ class _Reader:
         if within and light == "strobe":
             where = self.document.where(("clocks_within_ms",))
             raise fail(where, within, "with a strobe, its flashes show the clocks; leave the key out")
-        first = int(self._number(("first_frame",), 0, 10**9, 0))
-        last = int(self._number(("last_frame",), first + 1, 10**9, 0)) or None
+        first = self._frame(("first_frame",), 0) or 0
+        last = self._frame(("last_frame",), first + 1)
         return Request(
             cameras=cameras,
             films=tuple(films[camera.name] for camera in cameras),
@@ -99,15 +99,19 @@ class _Reader:
             names, places = tuple(one.name for one in wing.markers), np.array([one.position for one in wing.markers])
         elif "places" in markers:
             path = self._file(("markers", "places"))
-            table = read_table(path.read_bytes(), path.name, "marker")
+            table = read_table(_bytes(path), path.name, "marker")
             names, places = table.labels, np.stack([table.column(f"{axis}_m") for axis in "xyz"], axis=1)
         else:
             return (), None
         where = self.document.where(("markers",))
         if len(names) < LEAST_MARKERS:
             raise fail(where, len(names), f"{len(names)} markers; at least {LEAST_MARKERS} are needed")
-        if not np.isfinite(places).all() or len(set(names)) < len(names):
-            raise fail(where, None, "a marker has no place, or two have the same name; give each a name and a place")
+        wrong = [name for name, place in zip(names, places, strict=True) if not np.isfinite(place).all()]
+        if wrong:
+            raise fail(where, wrong[0], f"marker {wrong[0]!r} has no place; give its x, y and z in metres")
+        twice = [name for name in names if names.count(name) > 1 or not name]
+        if twice:
+            raise fail(where, twice[0], f"two markers have the name {twice[0]!r}; give each a name of its own")
         size = float(np.linalg.norm(np.ptp(places, axis=0)))
         if not 1e-3 < size < 20:
             raise fail(where, f"{size:g}", f"the markers extend over {size:g} m; give their places in metres")
@@ -134,15 +138,19 @@ class _Reader:
         value = self._value(path)
         if value is None:
             return default
-        try:
-            number = float(value)
-        except (TypeError, ValueError):
-            number = float("nan")
+        # Decimal is what the reader of YAML makes of numbers with a point; true and false are no numbers.
+        number = float("nan") if isinstance(value, (bool, str, list, dict)) else float(value)
         if not low <= number <= high:
             raise fail(
                 self.document.where(path), value, f"{shown(value)}; it must be a number from {low:g} to {high:g}"
             )
         return number
+
+    def _frame(self, path: tuple[str, ...], low: int) -> int | None:
+        number = self._number(path, low, 10**9, -1)
+        if number != int(number):
+            raise fail(self.document.where(path), number, f"{number:g} is no whole number; frames are counted from 0")
+        return int(number) if number >= 0 else None
 
     def _value(self, path: tuple[str, ...]) -> Any:
         value: Any = self.data
@@ -152,13 +160,17 @@ class _Reader:
 
 
 def _document(path: Path) -> Document:
-    try:
-        raw = path.read_bytes()
-    except OSError as error:
-        raise fail(str(path), None, f"cannot be read: {error.strerror or error}; check the path") from None
+    raw = _bytes(path)
     limit = MAX_DESCRIPTION_BYTES / MIB
     check_most(path.name, "has", len(raw) / MIB, limit, "MiB", "a description of films is short; check the path")
     return read_yaml(raw, path.name)
+
+
+def _bytes(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise fail(str(path), None, f"cannot be read: {error.strerror or error}; check the path") from None
 
 
 def _mapping(
@@ -177,5 +189,7 @@ def _mapping(
             raise fail(document.where((*path, key)), None, f"the key {key!r} is missing; add it")
     for key in data:
         if key not in (*keys, *optional):
-            raise fail(document.where((*path, key)), key, f"unknown key {key!r}; {nearest(key, (*keys, *optional))}")
+            raise fail(
+                document.where((*path, key)), key, f"unknown key {key!r}; {nearest(str(key), (*keys, *optional))}"
+            )
     return data

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wingfit.records.array_types import Array, Float, Mask
+from wingfit.records.array_types import Array, Float, Index, Mask
 
 _NEIGHBOURS, _DEGREE = 3, 4  # on each side; of the polynomial through them
 _DEVIATIONS = 6.0
@@ -19,25 +19,57 @@ def jumps(
     Far is more than six times what the covariances explain, or than the marker is in the median: a polynomial cannot
     follow fast flexing. It is more than ``least`` (m), too: less is not the place of another marker.
     """
-    count, markers = positions.shape[:2]
-    apart = np.full((count, markers), np.nan)
-    large = np.zeros((count, markers), dtype=bool)
-    for marker in range(markers):
-        known = np.flatnonzero(np.isfinite(positions[:, marker]).all(1))
-        for place, instant in enumerate(known):
+    far = np.zeros(positions.shape[:2], dtype=bool)
+    for marker in range(positions.shape[1]):
+        far[:, marker] = _Places(times, positions[:, marker], covariance[:, marker], least).far()
+    return far
+
+
+class _Places:
+    """The places of one marker, of which some are left out."""
+
+    def __init__(
+        self, times: Float[Array, " T"], positions: Float[Array, "T 3"], covariance: Array, least: float
+    ) -> None:
+        self.times, self.positions, self.covariance, self.least = times, positions, covariance, least
+        self.known = np.asarray(np.isfinite(positions).all(1))
+
+    def far(self) -> Mask:
+        """Return which places are far: the farthest first, as it also displaces the polynomials of its neighbours."""
+        apart, large = self._distances(np.arange(len(self.times)))
+        compared = np.isfinite(apart)
+        typical = max(float(np.median(apart[compared])) / _MEDIAN, 1.0) if compared.any() else 1.0
+        apart = np.where(large, np.nan_to_num(apart), 0.0)
+        far = np.zeros(len(apart), dtype=bool)
+        while apart.max(initial=0.0) > _DEVIATIONS * typical:
+            worst = int(apart.argmax())
+            far[worst], self.known[worst] = True, False
+            known = np.flatnonzero(self.known)
+            place = int(np.searchsorted(known, worst))
+            again = np.r_[worst, known[max(place - _NEIGHBOURS, 0) : place + _NEIGHBOURS]]
+            now, still = self._distances(again)
+            apart[again] = np.where(still, np.nan_to_num(now), 0.0)
+        return far
+
+    def _distances(self, instants: Index) -> tuple[Float[Array, " N"], Mask]:
+        """Return the distances at ``instants`` from the polynomials, in standard deviations, and which are large.
+
+        NaN where a place is unknown, or has too few neighbours.
+        """
+        apart, large = np.full(len(instants), np.nan), np.zeros(len(instants), dtype=bool)
+        known = np.flatnonzero(self.known)
+        for row, instant in enumerate(instants):
+            place = int(np.searchsorted(known, instant))
             near = np.r_[known[max(place - _NEIGHBOURS, 0) : place], known[place + 1 : place + 1 + _NEIGHBOURS]]
             # Beside a gap the polynomial spans more time than elsewhere, and follows the motion less well.
-            if len(near) <= _DEGREE or np.abs(near - instant).max() > _NEIGHBOURS + 1:
+            alone = len(near) <= _DEGREE or np.abs(near - instant).max() > _NEIGHBOURS + 1
+            if not self.known[instant] or alone:
                 continue
-            scale = np.abs(times[near] - times[instant]).max()
-            design = ((times[near] - times[instant]) / scale)[:, None] ** np.arange(_DEGREE + 1)
+            scale = np.abs(self.times[near] - self.times[instant]).max()
+            design = ((self.times[near] - self.times[instant]) / scale)[:, None] ** np.arange(_DEGREE + 1)
             weights = np.linalg.pinv(design)[0]
-            residual = positions[instant, marker] - weights @ positions[near, marker]
-            spread = covariance[instant, marker] + np.einsum("n,nij->ij", weights**2, covariance[near, marker])
-            apart[instant, marker] = np.sqrt(residual @ np.linalg.solve(spread, residual))
-            large[instant, marker] = np.linalg.norm(residual) > least
-    compared = np.isfinite(apart)
-    typical = np.ones(markers)
-    for one in np.flatnonzero(compared.any(0)):
-        typical[one] = max(float(np.median(apart[compared[:, one], one])) / _MEDIAN, 1.0)
-    return np.asarray(large & (np.nan_to_num(apart) > _DEVIATIONS * typical))
+            residual = self.positions[instant] - weights @ self.positions[near]
+            spread = self.covariance[instant] + np.einsum("n,nij->ij", weights**2, self.covariance[near])
+            apart[row] = np.sqrt(residual @ np.linalg.solve(spread, residual))
+            large[row] = np.linalg.norm(residual) > self.least
+        return apart, large

@@ -117,8 +117,9 @@ def at_time(tracklets: Tracklets, time: float, longest: float) -> Detections:
     alone = tracklets.seen.only(exact[~np.isin(owner[exact], owner[before])])
     if not len(before):
         return alone
-    index = np.clip(before[:, None] + np.arange(-1, 3), 0, len(times) - 1)
-    inside = owner[index] == owner[before][:, None]
+    around = before[:, None] + np.arange(-1, 3)
+    index = np.clip(around, 0, len(times) - 1)
+    inside = (owner[index] == owner[before][:, None]) & (index == around)  # each sample once
     gaps = np.abs(times[index] - time) < 3 * longest
     weights = _lagrange(times[index], time, inside & gaps)
     share = (time - times[before]) / (times[before + 1] - times[before])

@@ -26,7 +26,9 @@ def track(
     ] = None,
     store: Annotated[
         Path | None,
-        typer.Option(help="Folder for what is detected, so that an interrupted run goes on; default: none."),
+        typer.Option(
+            file_okay=False, help="Folder for what is detected, so that an interrupted run goes on; default: none."
+        ),
     ] = None,
     report: Annotated[Path | None, new_file("Write pictures of what was seen: FILE.html.", "--report")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,

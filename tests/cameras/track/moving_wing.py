@@ -20,12 +20,12 @@ def markers(rows: int = 7, columns: int = 7) -> Array:
     return np.column_stack([x, np.tile(y, rows), np.zeros(rows * columns)])
 
 
-def moved(rest: Array, time: float) -> Array:
-    """The markers at ``time`` (s), in axes that are not those at rest."""
+def moved(rest: Array, time: float, bend: float = 1.0) -> Array:
+    """The markers at ``time`` (s), in axes that are not those at rest; ``bend`` scales what is no rigid motion."""
     phase = 2 * np.pi * BEAT * time
     x, y, _ = rest.T
-    angle = 0.5 * np.sin(phase) + 0.25 * (y / 0.55) ** 2 * np.cos(phase - 0.4)
-    twist = 0.5 * (y / 0.55) * np.cos(phase)
+    angle = 0.5 * np.sin(phase) + 0.25 * bend * (y / 0.55) ** 2 * np.cos(phase - 0.4)
+    twist = 0.5 * bend * (y / 0.55) * np.cos(phase)
     places = np.column_stack([x * np.cos(twist), y * np.cos(angle), y * np.sin(angle) - x * np.sin(twist)])
     return np.asarray(places @ np.array([[0, 0, 1.0], [1, 0, 0], [0, 1, 0]]) + [0.1, -0.2, 0.9])
 

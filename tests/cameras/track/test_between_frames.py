@@ -64,7 +64,7 @@ def test_dots_are_read_at_their_own_times() -> None:
     missing = order(seen[20].pixels, track(times[20])[:1])[0]
     seen[20] = seen[20].only(np.arange(12) != missing)
     joined = join(seen, times, 0.0)
-    for number in (0, 10, 18, 19, 21, 22, 59):
+    for number in (0, 1, 10, 18, 19, 21, 22, 59):
         found = at_time(joined, times[number], 1.5 / RATE)
         assert len(found) == 12, number
         assert found.pixels[order(found.pixels, track(times[number]))] == pytest.approx(track(times[number]), abs=1e-6)
@@ -97,7 +97,7 @@ def in_space(time: float) -> Array:
 
 def film_of(camera: Camera, late: float, rng: np.random.Generator, sigma: float) -> Tracklets:
     """Tracklets of a camera whose clock is ``late`` (s) ahead: what it sees at its time t was there at t - late."""
-    times = np.arange(60) / RATE
+    times = np.arange(32) / RATE
     seen = [camera.project(in_space(time - late)) for time in times]
     return join([detections(one + sigma * rng.standard_normal(one.shape), sigma) for one in seen], times, 0.0)
 
@@ -105,13 +105,13 @@ def film_of(camera: Camera, late: float, rng: np.random.Generator, sigma: float)
 def test_the_offset_of_a_clock_is_found_with_its_error() -> None:
     cameras, true = ring((-20.0, 20.0)), 1.3e-3
     ratios, found = [], []
-    for seed in range(4):
+    for seed in range(3):
         rng = np.random.default_rng(seed)
-        films = film_of(cameras[0], 0.0, rng, 0.1), film_of(cameras[1], true, rng, 0.1)
-        offset = offset_between((cameras[0], cameras[1]), films, np.arange(60) / RATE, 1 / RATE, 5e-3, 0.05)
+        films = film_of(cameras[0], 0.0, rng, 0.2), film_of(cameras[1], true, rng, 0.2)
+        offset = offset_between((cameras[0], cameras[1]), films, np.arange(30) / RATE, 1 / RATE, 4e-3, 0.05)
         found.append(offset.seconds)
         ratios.append((offset.seconds - true) / offset.standard_error)
-    assert found == pytest.approx([true] * 4, abs=3e-5)
+    assert found == pytest.approx([true] * 3, abs=6e-5)
     assert np.abs(ratios).max() < 4
     assert np.sqrt(np.mean(np.square(ratios))) > 0.2  # the error is not exaggerated
 

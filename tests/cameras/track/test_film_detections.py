@@ -51,7 +51,7 @@ def flashed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for number in range(48):
         flash, part = divmod(number, 4)
         rows = np.arange(SIZE[1])[:, None]
-        split = 4 * flash + 5
+        split = 3 * flash + 10
         shown = lit * (rows >= split if part == 1 else (rows < split) & (part == 2))
         cv2.imwrite(str(folder / f"{number}.png"), noisy(shown + 10, 1.0, rng))
     return folder
@@ -96,7 +96,7 @@ def test_all_frames_are_detected(steady: Path) -> None:
     assert part.bad_frames == ()
 
 
-@pytest.mark.parametrize("after", [3, 5, 11, 14, 27])
+@pytest.mark.parametrize("after", [3, 14])
 def test_a_run_that_was_interrupted_goes_on(steady: Path, tmp_path: Path, after: int) -> None:
     task = FilmTask(Film(steady, 100.0), "dot", "continuous")
     stored = replace(task, store=tmp_path)

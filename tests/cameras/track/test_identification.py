@@ -19,7 +19,7 @@ ALL = np.ones(len(REST), dtype=bool)
 def test_a_bent_wing_is_registered_among_false_points(time: float) -> None:
     rng = np.random.default_rng(int(1000 * time))
     seen = rng.random(49) > 0.1
-    true = moved(REST, time)
+    true = moved(REST, time, bend=0.4)
     cloud, index = cloud_of(true, seen, rng, false=25)
     chosen, predicted = register(REST, cloud.positions, cloud.points.covariance)
     assert np.mean(chosen[seen] == index[seen]) > 0.95
@@ -38,15 +38,16 @@ def test_points_of_nothing_are_no_wing() -> None:
 
 
 def test_markers_not_found_move_with_the_others() -> None:
-    true, surface = moved(REST, 0.11), surface_of(REST)
+    noise = 10 * DEVIATION * np.random.default_rng(6).standard_normal(REST.shape)
+    true, surface = moved(REST, 0.11) + noise, surface_of(REST)
     hidden = np.zeros(49, dtype=bool)
-    hidden[[10, 24, 25, 40]] = True
+    hidden[[10, 40, 41, 47, 48]] = True  # one in the middle, four at a corner
     found = np.where(hidden[:, None], np.nan, true)
     result = deformed(surface, found, REST)
     errors = np.linalg.norm(result.positions - true, axis=1)
-    assert errors[hidden].max() < 4e-3
+    assert errors[hidden].max() < 0.02
     assert (errors[hidden] < 5 * np.sqrt(3) * result.deviation[hidden]).all()
-    assert (result.deviation[hidden] > result.deviation[~hidden].mean()).all()
+    assert result.deviation[48] > 1.1 * result.deviation[~hidden].mean()
     nothing = deformed(surface, np.where(ALL[:, None], np.nan, true), REST)
     assert np.isnan(nothing.positions).all()
 
@@ -117,5 +118,5 @@ def test_jumps_are_found_and_nothing_else() -> None:
     wrong[[10, 33, 60, 61], [0, 3, 5, 1]] = True
     seen[wrong] = true[wrong] + [0, 4e-3, 0]
     covariance = np.tile(DEVIATION**2 * np.eye(3), (*wrong.shape, 1, 1))
-    assert np.array_equal(jumps(times, seen, covariance), wrong)
-    assert not jumps(times[:4], seen[:4], covariance[:4]).any()  # too few to say
+    assert np.array_equal(jumps(times, seen, covariance, 1e-3), wrong)
+    assert not jumps(times[:4], seen[:4], covariance[:4], 1e-3).any()  # too few to say
