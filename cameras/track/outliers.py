@@ -26,7 +26,7 @@ class _Places:
 
     def __init__(self, times: Float[Array, " T"], positions: Float[Array, "T 3"], covariance: Array) -> None:
         self.times, self.positions, self.covariance = times, positions, covariance
-        self.known = np.isfinite(positions).all(1)
+        self.known: Mask = np.asarray(np.isfinite(positions).all(1))
 
     def distances(self, instants: Index) -> Float[Array, " N"]:
         """Return the distances at ``instants`` from the polynomials, in standard deviations; NaN where unknown."""
