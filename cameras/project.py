@@ -189,7 +189,6 @@ def _mapping(
             raise fail(document.where((*path, key)), None, f"the key {key!r} is missing; add it")
     for key in data:
         if key not in (*keys, *optional):
-            raise fail(
-                document.where((*path, key)), key, f"unknown key {key!r}; {nearest(str(key), (*keys, *optional))}"
-            )
+            hint = nearest(str(key), (*keys, *optional))
+            raise fail(document.where((*path, key)), key, f"unknown key {key!r}; {hint}")
     return data

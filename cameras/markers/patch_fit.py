@@ -53,7 +53,7 @@ def inside(image: Array, corner: Array, half: int) -> Float[Array, "N Q"]:
     steps = np.arange(-half, half + 1)
     rows, columns = corner[:, 1, None] + steps, corner[:, 0, None] + steps
     good = ((rows >= 0) & (rows < height))[:, :, None] & ((columns >= 0) & (columns < width))[:, None, :]
-    return good.reshape(len(corner), -1).astype(float)
+    return np.asarray(good.reshape(len(corner), -1), dtype=float)
 
 
 def offsets(half: int) -> Float[Array, "Q 2"]:

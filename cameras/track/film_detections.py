@@ -71,7 +71,7 @@ def detect_film(task: FilmTask, progress: Progress) -> FilmDetections:
     ``progress`` is called with the count of frames done, and of all.
 
     Raises:
-        DatasetError: the film cannot be read, or a strobe's flashes cannot be told apart.
+        DatasetError: the film cannot be read, or a strobe's flashes cannot be separated.
     """
     frames = task.film.opened()
     folder = task.store / task.key if task.store else None

@@ -32,7 +32,7 @@ class _Places:
         self, times: Float[Array, " T"], positions: Float[Array, "T 3"], covariance: Array, least: float
     ) -> None:
         self.times, self.positions, self.covariance, self.least = times, positions, covariance, least
-        self.known = np.asarray(np.isfinite(positions).all(1))
+        self.known: Mask = np.asarray(np.isfinite(positions).all(1))
 
     def far(self) -> Mask:
         """Return which places are far: the farthest first, as it also displaces the polynomials of its neighbours."""

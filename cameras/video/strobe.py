@@ -94,7 +94,7 @@ def flashes(frames: Frames, dark: Background, first: int = 0) -> Iterator[Flash]
     """Return the flashes of a film in order, from frame ``first``, which must not be the second frame of a flash.
 
     Raises:
-        DatasetError: three frames in a row are lit, so that flashes cannot be told apart.
+        DatasetError: three frames in a row are lit, so that flashes cannot be separated.
     """
     before: tuple[int, Array] | None = None
     run, lit_frames = 0, 0

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from tests.cameras.markers.drawing import disc, drawn, noisy
+from tests.cameras.markers.drawing import Mark, disc, drawn, noisy
 from wingfit.cameras.camera import Camera, Lens
 from wingfit.cameras.files.camera_set import CameraSet
 from wingfit.cameras.files.project import write_cameras
@@ -55,7 +55,8 @@ def write_film(folder: Path, frames: int = FRAMES) -> Path:
     for camera in cameras():
         (folder / camera.name).mkdir()
         for number in range(frames):
-            marks = [(disc, place, 4.0 * np.eye(2)) for place in camera.project(wing(number / RATE))]
+            places = camera.project(wing(number / RATE))
+            marks: list[Mark] = [(disc, place, 4.0 * np.eye(2)) for place in places]
             image = noisy(drawn(SIZE, marks), 1.0, rng)
             cv2.imwrite(str(folder / camera.name / f"{number}.png"), image)
     (folder / "film.yaml").write_text(FILM)

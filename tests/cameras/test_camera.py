@@ -14,7 +14,7 @@ from wingfit.records.array_types import Array
 from wingfit.records.errors import DatasetError
 
 RNG = np.random.default_rng(5)
-POINTS = RNG.uniform(-0.12, 0.12, (25, 3)) + [0, 0, 0.6]
+POINTS = RNG.uniform(-0.12, 0.12, (25, 3)) + np.array([0, 0, 0.6])
 MODELS = list(LENSES)
 
 

@@ -110,7 +110,7 @@ def test_parallel_rays_have_no_point() -> None:
 def test_error_from_cameras_is_that_of_finite_differences() -> None:
     cameras = ring((-30.0, 25.0))
     rng = np.random.default_rng(4)
-    points = rng.uniform(-0.05, 0.05, (4, 3)) + [0, 0, 0.6]
+    points = rng.uniform(-0.05, 0.05, (4, 3)) + np.array([0, 0, 0.6])
     pixels, spread = seen(cameras, points), variances(2, 4)
     spread[1] *= 3.0
     pixels[1, 3] = np.nan

@@ -12,6 +12,7 @@ from wingfit.records.array_types import Array
 _OVER = 8  # samples along the edge of a pixel
 _AROUND = 40  # pixels around the image, from which light is blurred into it
 Inside = Callable[[Array, Array], Array]  # whether places (u, v) on the marker are bright
+Mark = tuple[Inside, Array, Array]  # what is bright, the place (px), the axes [2, 2] (px)
 
 
 def chequer(u: Array, v: Array) -> Array:
@@ -26,7 +27,7 @@ def disc(u: Array, v: Array) -> Array:
 
 def drawn(
     size: tuple[int, int],
-    marks: list[tuple[Inside, Array, Array]],
+    marks: list[Mark],
     blur: float = 0.7,
     levels: tuple[float, float] = (10.0, 150.0),
 ) -> Array:

@@ -12,7 +12,7 @@ from tests.cameras.markers.drawing import Inside, affine, chequer, disc, drawn, 
 from wingfit.cameras.markers.chequer import detect_chequers
 from wingfit.cameras.markers.detections import Detections, no_detections
 from wingfit.cameras.markers.dot import detect_dots
-from wingfit.records.array_types import Array
+from wingfit.records.array_types import Array, Index
 
 DARK = 10.0
 Detect = Callable[[Array, float, float], Detections]
@@ -36,7 +36,7 @@ def image_of(kind: str, size: float, blur: float, noise: float, count: int = 49,
     return noisy(drawn(area, marks, blur), noise, rng), places
 
 
-def matched(found: Detections, places: Array) -> tuple[Array, Array, Detections]:
+def matched(found: Detections, places: Array) -> tuple[Array, Index, Detections]:
     """Errors [N, 2] of the detections within a pixel of a place, the places [N] that they are, and they themselves."""
     apart = np.linalg.norm(places[:, None] - found.pixels[None], axis=2)
     index = apart.argmin(1)
@@ -78,7 +78,7 @@ def test_markers_are_found_within_parts_of_a_pixel(
     [("chequer", 4.5, 1.2, 4.0), ("chequer", 7.0, 0.8, 6.0), ("dot", 4.0, 1.0, 6.0), ("dot", 6.0, 0.7, 8.0)],
 )
 def test_the_covariance_covers_the_errors(kind: str, size: float, blur: float, noise: float) -> None:
-    """Where noise is all that disturbs, errors in deviations are between half and one and a third, and few are large."""
+    """Where noise is all that disturbs, errors in deviations are between 0.5 and 1.35, and few are large."""
     distances = []
     for seed in range(3):
         image, places = image_of(kind, size, blur, noise, seed=seed)

@@ -6,7 +6,7 @@ import numpy as np
 
 from wingfit.cameras.track.cloud import Cloud
 from wingfit.cameras.triangulation import Points
-from wingfit.records.array_types import Array
+from wingfit.records.array_types import Array, Mask
 
 BEAT = 3.0  # Hz
 DEVIATION = 1e-4  # m, of a point
@@ -30,7 +30,7 @@ def moved(rest: Array, time: float, bend: float = 1.0) -> Array:
     return np.asarray(places @ np.array([[0, 0, 1.0], [1, 0, 0], [0, 1, 0]]) + [0.1, -0.2, 0.9])
 
 
-def cloud_of(true: Array, seen: Array, rng: np.random.Generator, false: int = 0) -> tuple[Cloud, Array]:
+def cloud_of(true: Array, seen: Mask, rng: np.random.Generator, false: int = 0) -> tuple[Cloud, Array]:
     """Points [M, 3] of the markers ``seen`` [K], with false ones among them, and the index [K] of each marker's."""
     box = true.min(0), true.max(0)
     places = np.concatenate([true[seen], rng.uniform(*box, (false, 3))])

@@ -34,14 +34,14 @@ def filmed(row_s: float, frames: int = 60) -> tuple[list[Detections], Array]:
     for time in times:
         at = np.full(12, time)
         for _ in range(30):
-            each = np.diagonal(track(at), axis1=0, axis2=1).T
+            each: Array = np.diagonal(track(at), axis1=0, axis2=1).T
             at = time + row_s * each[:, 1]
         seen.append(detections(each[rng.permutation(12)]))
     return seen, times
 
 
 def order(pixels: Array, near: Array) -> Array:
-    return np.linalg.norm(near[:, None] - pixels[None], axis=2).argmin(1)
+    return np.asarray(np.linalg.norm(near[:, None] - pixels[None], axis=2).argmin(1))
 
 
 @pytest.mark.parametrize("row_s", [0.0, 1e-5])

@@ -24,7 +24,9 @@ DARK, LIT = 12.0, 120.0
 class Film(Frames):
     """Frames of flashes at given times (s); rows with markers are those in ``seen``."""
 
-    def __init__(self, times: Sequence[float], count: int, seen: Array | None = None, noise: float = 1.0) -> None:
+    def __init__(
+        self, times: Sequence[float] | Array, count: int, seen: Array | None = None, noise: float = 1.0
+    ) -> None:
         self.path, self.size_px, self.rate_hz, self.count = Path("film.avi"), SIZE, RATE, count
         self.wing = np.zeros(SIZE[::-1])
         self.wing[np.arange(SIZE[1]) if seen is None else seen, 5:35] = LIT
@@ -38,7 +40,7 @@ class Film(Frames):
         read = number / RATE + np.arange(SIZE[1]) * ROW
         light = ((self.times[:, None] <= read) & (self.times[:, None] > read - 1 / RATE)).sum(0)
         noise = self.noise * np.random.default_rng([9, number]).standard_normal(self.wing.shape)
-        return np.clip(np.rint(DARK + light[:, None] * self.wing + noise), 0, 255).astype(np.uint8)
+        return np.asarray(np.clip(np.rint(DARK + light[:, None] * self.wing + noise), 0, 255), dtype=np.uint8)
 
 
 def found(film: Film, first: int = 0) -> list[Flash]:
@@ -50,7 +52,7 @@ def timed(film: Film, row_s: float | None = None) -> FlashTimes:
 
 
 def steady(count: int, period: float, start: float = 0.05) -> Array:
-    return start + period * np.arange(count)
+    return np.asarray(start + period * np.arange(count), dtype=float)
 
 
 def test_the_halves_of_a_flash_are_merged() -> None:
