@@ -26,12 +26,9 @@ _NOISES = 6.0  # contrast above that of noise
 _FLOOR_PX = 0.01
 
 
-def detect_chequers(image: Array, dark: float, noise: float, near: Float[Array, "N 2"] | None = None) -> Detections:
-    """Return the chequers in ``image`` [H, W], whose dark level and noise (grey levels) are given.
-
-    With ``near``, only the saddles within the reach of a fit of these places are sought, and weaker ones are taken.
-    """
-    starts = _saddles(image, noise) if near is None else np.asarray(near, dtype=float)
+def detect_chequers(image: Array, dark: float, noise: float) -> Detections:
+    """Return the chequers in ``image`` [H, W], whose dark level and noise (grey levels) are given."""
+    starts = _saddles(image, noise)
     if not len(starts):
         return no_detections()
     angles, reach = _edges_and_reach(image, starts, dark)

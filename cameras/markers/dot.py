@@ -1,4 +1,4 @@
-"""Round markers, bright on dark or dark on bright: the centre of an ellipse with blurred edges is the marker's place.
+"""Round markers, bright on dark: the centre of an ellipse with blurred edges is the marker's place.
 
 Seen at a slant, the centre of a disc is not the centre of its image, by about its radius squared over the distance: for
 a disc of 10 mm, 1 m away, less than 0.03 mm.
@@ -22,11 +22,8 @@ _FLOOR_PX = 0.01  # as for chequers
 _MOST_SLANT = 6.0  # ratio of the axes of an ellipse
 
 
-def detect_dots(image: Array, dark: float, noise: float, near: Float[Array, "N 2"] | None = None) -> Detections:
-    """Return the dots in ``image`` [H, W], brighter than the level ``dark`` by many times ``noise`` (grey levels).
-
-    With ``near``, only dots whose centres are within their size of these places are returned.
-    """
+def detect_dots(image: Array, dark: float, noise: float) -> Detections:
+    """Return the dots in ``image`` [H, W], brighter than the level ``dark`` by many times ``noise`` (grey levels)."""
     cv2 = opencv()
     smooth = cv2.GaussianBlur(image.astype(np.float32), (0, 0), 0.8)
     bright = smooth - dark > max(_NOISES * noise, 0.25 * float(smooth.max() - dark))
@@ -35,9 +32,6 @@ def detect_dots(image: Array, dark: float, noise: float, near: Float[Array, "N 2
     sides = boxes[1:, [cv2.CC_STAT_WIDTH, cv2.CC_STAT_HEIGHT]].astype(float)
     starts = centres[1:]
     usable = (area >= _LEAST_PX) & (sides.max(1) < 2 * _LARGEST_PX) & (sides.max(1) < _MOST_SLANT * sides.min(1) + 2)
-    if near is not None and len(starts):
-        apart = np.linalg.norm(starts[:, None] - np.asarray(near)[None], axis=2).min(1)
-        usable &= apart < sides.max(1)
     starts, area, sides = starts[usable], area[usable], sides[usable]
     if not len(starts):
         return no_detections()
