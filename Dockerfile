@@ -26,6 +26,7 @@ COPY --chown=wingfit:wingfit LICENSE README.md ./
 COPY --chown=wingfit:wingfit records records
 COPY --chown=wingfit:wingfit importers importers
 COPY --chown=wingfit:wingfit tracking tracking
+COPY --chown=wingfit:wingfit cameras cameras
 COPY --chown=wingfit:wingfit sim sim
 COPY --chown=wingfit:wingfit checks checks
 COPY --chown=wingfit:wingfit rigs rigs
@@ -43,7 +44,7 @@ RUN pip install --no-deps --no-build-isolation --editable .
 USER wingfit
 # Compiled kernels are kept beside the code. Where that cannot be written, they are copied to HOME at the first use; on
 # another kind of processor they are compiled again, and kept there too.
-RUN python -m compileall -q records tracking sim checks calibration diagnosis report workers service client cli \
+RUN python -m compileall -q records tracking cameras sim checks calibration diagnosis report workers service client cli \
     && python -m wingfit.sim.warm
 
 # All that is written: /tmp and the data. The rest may be read-only.
