@@ -60,8 +60,9 @@ class FilmTask:
     def key(self) -> str:
         """Return a text that differs for another film, and for another way to detect."""
         path = self.film.path
-        of = path.stat()
-        stated = [_VERSION, str(path.resolve()), of.st_size, of.st_mtime_ns, self.film.rate_hz, self.kind, self.light]
+        files = sorted(path.iterdir()) if path.is_dir() else [path]
+        of = [(file.name, file.stat().st_size, file.stat().st_mtime_ns) for file in files]
+        stated = [_VERSION, str(path.resolve()), of, self.film.rate_hz, self.kind, self.light]
         return hashlib.sha256(json.dumps([*stated, self.first, self.last]).encode()).hexdigest()[:16]
 
 

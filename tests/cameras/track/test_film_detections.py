@@ -145,3 +145,14 @@ def test_a_damaged_store_is_refused(steady: Path, tmp_path: Path, damage: str) -
         chunk.write_bytes({"torn": raw[: len(raw) // 2], "empty": b"", "text": b"no archive"}[damage])
     with pytest.raises(DatasetError, match=r"000001\.npz: cannot be read .*; remove the folder, it is made anew"):
         detect_film(task, silent)
+
+
+def test_an_image_that_is_replaced_makes_another_film(tmp_path: Path) -> None:
+    folder = tmp_path / "film"
+    folder.mkdir()
+    for number in range(3):
+        (folder / f"{number}.png").write_bytes(b"an image")
+    task = FilmTask(Film(folder, 100.0), "dot", "continuous")
+    before = task.key
+    (folder / "1.png").write_bytes(b"another image")
+    assert task.key != before
