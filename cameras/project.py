@@ -9,6 +9,7 @@ from typing import Any, get_args
 
 import numpy as np
 
+from wingfit.cameras.files.keys import mapping_at, value_at
 from wingfit.cameras.files.read import read_cameras
 from wingfit.cameras.track.film_detections import Light, MarkerKind
 from wingfit.cameras.track.procedure import LEAST_MARKERS, Request
@@ -33,7 +34,7 @@ def read_film(path: Path, store: Path | None = None) -> Request:
     ``store`` is the folder for what is detected. DatasetError names line, value and remedy.
     """
     document = _document(path)
-    data = _mapping(document, (), _KEYS, _OPTIONAL)
+    data = mapping_at(document, (), _KEYS, _OPTIONAL)
     if data["format"] != FORMAT or data["version"] != VERSION:
         value = f"{data['format']} {data['version']}"
         raise fail(document.where(("format",)), value, f"{value!r} is not {FORMAT!r} version {VERSION}")
@@ -55,7 +56,7 @@ class _Reader:
             sizes = [len(camera.parameter_names) for camera in described.cameras]
             used = np.repeat([camera.name in films for camera in described.cameras], sizes)
             covariance = covariance[np.ix_(used, used)]
-        markers = _mapping(self.document, ("markers",), ("kind",), ("wing", "places"))
+        markers = mapping_at(self.document, ("markers",), ("kind",), ("wing", "places"))
         names, places = self._places(markers)
         light: Light = self._choice(("light",), get_args(Light))
         within = self._number(("clocks_within_ms",), 0.0, MOST_WITHIN_MS, 0.0)
@@ -79,13 +80,13 @@ class _Reader:
         )
 
     def _films(self, cameras: list[str]) -> dict[str, Film]:
-        films = _mapping(self.document, ("films",), (), tuple(cameras))
+        films = mapping_at(self.document, ("films",), (), tuple(cameras))
         if not 2 <= len(films) <= MOST_CAMERAS:
             where = self.document.where(("films",))
             raise fail(where, len(films), f"{len(films)} films; tracks in space take 2 to {MOST_CAMERAS} cameras")
         found = {}
         for name in films:
-            _mapping(self.document, ("films", name), ("path",), ("rate_hz",))
+            mapping_at(self.document, ("films", name), ("path",), ("rate_hz",))
             rate = self._number(("films", name, "rate_hz"), 1e-3, 1e6, 0.0)
             found[name] = Film(self._file(("films", name, "path")), rate or None)
         return found
@@ -118,7 +119,7 @@ class _Reader:
         return names, places
 
     def _file(self, path: tuple[str, ...]) -> Path:
-        value = self._value(path)
+        value = value_at(self.document, path)
         if not isinstance(value, str) or not value:
             raise fail(self.document.where(path), value, f"{shown(value)} is no path; state that of a file or folder")
         found = self.folder / value
@@ -129,13 +130,13 @@ class _Reader:
         return found
 
     def _choice(self, path: tuple[str, ...], of: tuple[Any, ...]) -> Any:
-        value = self._value(path)
+        value = value_at(self.document, path)
         if value not in of:
             raise fail(self.document.where(path), value, f"{shown(value)!r}; {nearest(str(value), of)}")
         return value
 
     def _number(self, path: tuple[str, ...], low: float, high: float, default: float) -> float:
-        value = self._value(path)
+        value = value_at(self.document, path)
         if value is None:
             return default
         # Decimal is what the reader of YAML makes of numbers with a point; true and false are no numbers.
@@ -152,12 +153,6 @@ class _Reader:
             raise fail(self.document.where(path), number, f"{number:g} is no whole number; frames are counted from 0")
         return int(number) if number >= 0 else None
 
-    def _value(self, path: tuple[str, ...]) -> Any:
-        value: Any = self.data
-        for key in path:
-            value = value.get(key) if isinstance(value, dict) else None
-        return value
-
 
 def _document(path: Path) -> Document:
     raw = _bytes(path)
@@ -171,24 +166,3 @@ def _bytes(path: Path) -> bytes:
         return path.read_bytes()
     except OSError as error:
         raise fail(str(path), None, f"cannot be read: {error.strerror or error}; check the path") from None
-
-
-def _mapping(
-    document: Document, path: tuple[str, ...], keys: tuple[str, ...], optional: tuple[str, ...] = ()
-) -> Mapping[str, Any]:
-    """Return the mapping at ``path``, which must have exactly ``keys``, and may have ``optional`` ones."""
-    data: Any = document.data
-    for key in path:
-        data = data.get(key) if isinstance(data, dict) else None
-    if not isinstance(data, dict):
-        raise fail(
-            document.where(path), data, f"{shown(data)} is no mapping with the keys {', '.join((*keys, *optional))}"
-        )
-    for key in keys:
-        if key not in data:
-            raise fail(document.where((*path, key)), None, f"the key {key!r} is missing; add it")
-    for key in data:
-        if key not in (*keys, *optional):
-            hint = nearest(str(key), (*keys, *optional))
-            raise fail(document.where((*path, key)), key, f"unknown key {key!r}; {hint}")
-    return data

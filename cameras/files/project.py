@@ -5,9 +5,6 @@ The covariance stands in the same file, so that one atomic replacement writes bo
 
 from __future__ import annotations
 
-import os
-import tempfile
-from collections.abc import Mapping
 from decimal import Decimal
 from pathlib import Path
 from typing import Any
@@ -17,9 +14,11 @@ from scipy.spatial.transform import Rotation
 
 from wingfit.cameras.camera import COEFFICIENTS, Camera, Lens
 from wingfit.cameras.files.camera_set import CameraSet, check_cameras
+from wingfit.cameras.files.keys import mapping_at, value_at
 from wingfit.records.array_types import Array
 from wingfit.records.description.yaml_text import Document, read_yaml, write_yaml
 from wingfit.records.errors import fail, nearest, shown
+from wingfit.records.files.replace import replace_file
 
 FORMAT, VERSION = "wingfit cameras", 1
 KEYS = ("name", "size_px", "focal_px", "centre_px", "lens", "rotation_rad", "translation_m", "row_us")
@@ -41,13 +40,13 @@ def write_cameras(path: Path, found: CameraSet) -> None:
     if found.covariance is not None:
         rows = [found.covariance[i, : i + 1].tolist() for i in range(len(found.covariance))]
         data["covariance"] = {"parameters": list(found.parameters), "lower_triangle": rows}
-    _replace(path, (HEADER + write_yaml(_decimals(data))).encode())
+    replace_file(path, (HEADER + write_yaml(_decimals(data))).encode())
 
 
 def read_project(raw: bytes, file: str) -> CameraSet:
     """Return the cameras in the contents ``raw`` of ``file``; DatasetError names line, value and remedy."""
     document = read_yaml(raw, file)
-    data = _mapping(document, (), ("format", "version", "cameras"), ("covariance",))
+    data = mapping_at(document, (), ("format", "version", "cameras"), ("covariance",))
     if data["format"] != FORMAT or data["version"] != VERSION:
         value = f"{data['format']} {data['version']}"
         message = f"{value!r} is not {FORMAT!r} version {VERSION}; write the file with this version of wingfit"
@@ -83,7 +82,7 @@ def _decimals(data: Any) -> Any:
 
 
 def _camera(document: Document, path: tuple[str | int, ...]) -> Camera:
-    data = _mapping(document, path, KEYS)
+    data = mapping_at(document, path, KEYS)
     name = data["name"]
     if not isinstance(name, str):
         raise fail(document.where((*path, "name")), name, f"{shown(name)} is no text; put the name in quotes")
@@ -102,19 +101,19 @@ def _camera(document: Document, path: tuple[str | int, ...]) -> Camera:
 
 
 def _lens(document: Document, path: tuple[str | int, ...]) -> Lens:
-    data = _at(document, path)
+    data = value_at(document, path)
     model = data.get("model") if isinstance(data, dict) else None
     if model not in COEFFICIENTS:
         message = f"{shown(model)} is no model of a lens; {nearest(str(model), COEFFICIENTS)}"
         raise fail(document.where((*path, "model")), model, message)
     names = COEFFICIENTS[model]
-    _mapping(document, path, ("model", *names))
+    mapping_at(document, path, ("model", *names))
     return Lens(model, tuple(_number(document, (*path, name)) for name in names))
 
 
 def _covariance(document: Document, cameras: tuple[Camera, ...]) -> Array:
     path = ("covariance",)
-    _mapping(document, path, COVARIANCE_KEYS)
+    mapping_at(document, path, COVARIANCE_KEYS)
     names = CameraSet(cameras).parameters
     stated = _list(document, (*path, "parameters"), len(names))
     for i, (one, name) in enumerate(zip(stated, names, strict=True)):
@@ -128,31 +127,8 @@ def _covariance(document: Document, cameras: tuple[Camera, ...]) -> Array:
     return covariance + np.tril(covariance, -1).T
 
 
-def _at(document: Document, path: tuple[str | int, ...]) -> Any:
-    data = document.data
-    for key in path:
-        data = data[key]
-    return data
-
-
-def _mapping(
-    document: Document, path: tuple[str | int, ...], keys: tuple[str, ...], optional: tuple[str, ...] = ()
-) -> Mapping[str, Any]:
-    """Return the mapping at ``path``, which must have exactly ``keys``, and may have ``optional`` ones."""
-    data = _at(document, path)
-    if not isinstance(data, dict):
-        raise fail(document.where(path), data, f"{shown(data)} is no mapping with the keys {', '.join(keys)}")
-    for key in keys:
-        if key not in data:
-            raise fail(document.where((*path, key)), None, f"the key {key!r} is missing; add it")
-    for key in data:
-        if key not in (*keys, *optional):
-            raise fail(document.where((*path, key)), key, f"unknown key {key!r}; {nearest(key, (*keys, *optional))}")
-    return data
-
-
 def _list(document: Document, path: tuple[str | int, ...], count: int | None) -> list[Any]:
-    data = _at(document, path)
+    data = value_at(document, path)
     if not isinstance(data, list) or (count is not None and len(data) != count):
         wanted = "a list" if count is None else f"a list of {count}"
         raise fail(document.where(path), data, f"{shown(data)} is not {wanted}; see docs/cameras.md")
@@ -165,22 +141,7 @@ def _numbers(document: Document, path: tuple[str | int, ...], count: int) -> Arr
 
 
 def _number(document: Document, path: tuple[str | int, ...]) -> float:
-    value = _at(document, path)
+    value = value_at(document, path)
     if not isinstance(value, Decimal) or not np.isfinite(float(value)):
         raise fail(document.where(path), value, f"{shown(value)} is no finite number; give a number")
     return float(value)
-
-
-def _replace(path: Path, data: bytes) -> None:
-    """Write ``data`` beside ``path`` and move it there, so that no reader sees a part of it."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    partial = Path(name)
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(data)
-        partial.chmod(0o644)
-        partial.replace(path)
-    except BaseException:
-        partial.unlink(missing_ok=True)
-        raise

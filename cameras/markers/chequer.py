@@ -16,7 +16,6 @@ from wingfit.records.array_types import Array, Float, Mask
 
 SMALLEST_PX = 3.0
 """Smallest distance (pixels) from the saddle to the end of a square, along it, that can be fitted."""
-LARGEST_PX = 60.0
 _LARGEST_RADIUS = 11.0  # of a patch, pixels
 _SCALES = (1.2, 2.4)  # pixels
 _EXPLAINED = 0.75
@@ -95,7 +94,7 @@ def _edges_and_reach(
     reach = np.where(inside > 0, radii[np.maximum(inside - 1, 0)], 0.0)
     best = np.maximum(inside - 1, 0)
     ring = rings[np.arange(len(starts)), best]
-    return _crossings(ring, steps), np.minimum(reach, LARGEST_PX)
+    return _crossings(ring, steps), reach
 
 
 def _crossings(ring: Float[Array, "N S"], steps: Float[Array, " S"]) -> Float[Array, "N 2"]:

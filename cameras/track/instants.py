@@ -31,18 +31,12 @@ class Instants:
         times: [T] (s), on the clock of the first camera.
         seen: of each instant, of each camera.
         frames: [T, C], number of the first frame of each camera that shows the instant; -1 if there is none.
-        offsets: of the clocks of cameras without strobe.
-        flashes: of the first camera, with a strobe.
-        row_s: time from row to row of each camera (s), as stated or as the flashes show it.
         remarks: what was estimated or is doubtful.
     """
 
     times: Float[Array, " T"]
     seen: list[tuple[Detections, ...]]
     frames: Array
-    offsets: tuple[Offset, ...]
-    flashes: FlashTimes | None
-    row_s: tuple[float, ...]
     remarks: tuple[str, ...]
 
 
@@ -77,15 +71,13 @@ def flash_instants(
         times=np.array([timed[0].times[row[0]] for row in rows]),
         seen=[tuple(one.seen[k] for one, k in zip(found, row, strict=True)) for row in rows],
         frames=np.array([[one.marks[k].frame for one, k in zip(found, row, strict=True)] for row in rows]),
-        offsets=(),
-        flashes=timed[0],
-        row_s=tuple(one.row_s for one in timed),
         remarks=tuple(remarks),
     )
 
 
 def _clock_remarks(cameras: Sequence[Camera], timed: Sequence[FlashTimes]) -> list[str]:
-    remarks = []
+    rows = ", ".join(f"{1e6 * one.row_s:.2f} us in {camera.name}" for camera, one in zip(cameras, timed, strict=True))
+    remarks = [f"the strobe flashes every {1e3 * timed[0].period:.3f} ms; from row to row {rows}"]
     for camera, one in zip(cameras[1:], timed[1:], strict=True):
         apart = one.period / timed[0].period - 1
         if abs(apart) > 1e-3:
@@ -158,8 +150,7 @@ def frame_instants(
             for of, offset in zip(films, seconds, strict=True)
         ]
     )
-    row_s = tuple(camera.row_s for camera in cameras)
-    return Instants(instants, seen, frames, tuple(offsets), None, row_s, _offset_remarks(cameras, offsets, within_s))
+    return Instants(instants, seen, frames, _offset_remarks(cameras, offsets, within_s))
 
 
 def _offset_remarks(cameras: Sequence[Camera], offsets: Sequence[Offset], within_s: float) -> tuple[str, ...]:

@@ -54,8 +54,8 @@ def surface_of(positions: Float[Array, "K 3"]) -> Surface:
     return Surface((positions - centre) @ axes[:2].T / size, centre, axes, size)
 
 
-def spacing(positions: Float[Array, "K 3"]) -> float:
-    """Return the median distance (m) of a marker to its nearest neighbour."""
+def spacing(positions: Float[Array, "K D"]) -> float:
+    """Return the median distance of a marker to its nearest neighbour, in space or in an image."""
     apart = np.linalg.norm(positions[:, None] - positions[None], axis=2) + np.diag(np.full(len(positions), np.inf))
     return float(np.median(apart.min(1)))
 

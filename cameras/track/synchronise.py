@@ -54,16 +54,15 @@ def offset_between(
     tried = np.linspace(-within_s, within_s, 2 * steps + 1)
     costs = np.array([misfits(offset).mean() for offset in tried])
     best = float(tried[int(np.argmin(costs))])
-    half = frame_s
     found = minimize_scalar(
-        lambda offset: float(misfits(offset).mean()), bounds=(best - half, best + half), method="bounded",
+        lambda offset: float(misfits(offset).mean()), bounds=(best - frame_s, best + frame_s), method="bounded",
         options={"xatol": 1e-3 * frame_s},
     )  # fmt: skip
     at, step = float(found.x), 0.1 * frame_s
-    here, up, down = (misfits(at + move).sum() for move in (0.0, step, -step))
-    curvature = max((up + down - 2 * here) / step**2, 1e-12)
-    freedom = max(len(misfits(at)) - 1, 1)
-    return Offset(at, float(np.sqrt(2 * max(here / freedom, 1.0) / curvature)))
+    here, up, down = (misfits(at + move) for move in (0.0, step, -step))
+    curvature = max((up.sum() + down.sum() - 2 * here.sum()) / step**2, 1e-12)
+    scatter = max(here.sum() / max(len(here) - 1, 1), 1.0)
+    return Offset(at, float(np.sqrt(2 * scatter / curvature)))
 
 
 def common_times(

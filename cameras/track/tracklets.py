@@ -13,6 +13,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from wingfit.cameras.markers.detections import Detections, no_detections
+from wingfit.cameras.track.registration import spacing
 from wingfit.records.array_types import Array, Float
 
 _NEIGHBOURS = 4  # of which the velocity is taken for a detection that has none
@@ -62,11 +63,6 @@ def _joined(frames: Sequence[Detections]) -> Detections:
     return Detections(*(np.concatenate([getattr(frame, name) for frame in frames]) for name in names))
 
 
-def _spacing(pixels: Float[Array, "N 2"]) -> float:
-    apart = cKDTree(pixels).query(pixels, k=2)[0][:, 1]
-    return float(np.median(apart))
-
-
 def _calmest(frames: Sequence[Detections]) -> int:
     """Return the frame from which the detections move least to the next, among those that see most of them."""
     many = np.percentile([len(frame) for frame in frames], 70)
@@ -88,7 +84,7 @@ def _step(
     one, two = frames[here], frames[there]
     if len(one) >= 2 and len(two) >= 1:
         expected = one.pixels + velocity[here]
-        gate = _GATE * _spacing(one.pixels)
+        gate = _GATE * spacing(one.pixels)
         apart, index = cKDTree(two.pixels).query(expected)
         back = cKDTree(expected).query(two.pixels)[1]
         good = (apart < gate) & (back[index] == np.arange(len(one)))
@@ -127,7 +123,7 @@ def at_time(tracklets: Tracklets, time: float, longest: float) -> Detections:
     pixels = np.einsum("nk,nki->ni", weights, seen.pixels[index])
     straight = (1 - share)[:, None] * seen.pixels[before] + share[:, None] * seen.pixels[before + 1]
     covariance = np.einsum("nk,nkij->nij", weights**2, seen.covariance[index])
-    covariance += (0.1 * np.linalg.norm(pixels - straight, axis=1) ** 2)[:, None, None] * 0.1 * np.eye(2)
+    covariance += ((0.1 * np.linalg.norm(pixels - straight, axis=1)) ** 2)[:, None, None] * np.eye(2)
     nearest = before + (share > 0.5)
     return _joined((Detections(pixels, covariance, seen.size_px[nearest], seen.contrast[nearest]), alone))
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
 from pathlib import Path
 
 from wingfit.records.dataset import AnyDataset
@@ -11,6 +9,7 @@ from wingfit.records.errors import check_most, fail, shown
 from wingfit.records.files.archive import read_zip, write_zip
 from wingfit.records.files.folder import read_folder, write_folder
 from wingfit.records.files.netcdf import read_netcdf, write_netcdf
+from wingfit.records.files.replace import replace_file
 from wingfit.records.limits import MAX_ARCHIVE_BYTES, MIB
 
 _ZIP = (b"PK\x03\x04", b"PK\x05\x06")
@@ -80,26 +79,12 @@ def save_dataset(dataset: AnyDataset, path: str | Path) -> None:
     path = Path(path)
     suffix = path.suffix.lower()
     if suffix == ".zip":
-        _replace(path, write_zip(dataset))
+        replace_file(path, write_zip(dataset))
     elif suffix == ".nc":
-        _replace(path, write_netcdf(dataset))
+        replace_file(path, write_netcdf(dataset))
     else:
         write_folder(dataset, path)
 
 
 def _check_size(size: int, label: str) -> None:
     check_most(label, "is", size / MIB, MAX_ARCHIVE_BYTES / MIB, "MiB", "split the dataset")
-
-
-def _replace(path: Path, data: bytes) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    partial = Path(name)
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(data)
-        partial.chmod(0o644)
-        partial.replace(path)
-    except BaseException:
-        partial.unlink(missing_ok=True)
-        raise
