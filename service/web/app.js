@@ -53,7 +53,7 @@ function setAway(away) {
 
 function showHealth(health) {
   const state = { starting: health.detail ?? "evaluator starting", degraded: `degraded: ${health.detail ?? "evaluator not available"}` }[health.status];
-  const count = health.runs_active + health.diagnoses_active;
+  const count = health.runs_active + health.diagnoses_active + health.trackings_active;
   const active = count ? `${plural(count, "job")} active` : "idle";
   $("health").textContent = [state ?? active, health.workers ? plural(health.workers, "worker") : null, `version ${health.version}`]
     .filter(Boolean).join(" · ");

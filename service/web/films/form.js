@@ -18,7 +18,7 @@ export function setUpForm(given) {
   const form = $("track-form");
   form.kind.addEventListener("change", hooks.onKind);
   form.light.addEventListener("change", showFields);
-  form.wing.addEventListener("change", wingChosen);
+  form.dataset_id.addEventListener("change", wingChosen);
   form.addEventListener("submit", submit);
 }
 
@@ -31,11 +31,11 @@ export async function showForm(next) {
   form.reset();
   showErrors(form, $("track-errors"), null);
   showFields();
-  form.wing.replaceChildren(new Option("none", ""));
+  form.dataset_id.replaceChildren(new Option("none", ""));
   wingChosen();
   hooks.onKind();
   const { items } = await get(`datasets?limit=${MOST_WINGS}`);
-  if (film.id === next.id) form.wing.append(...items.filter((one) => one.kind === "tracks").map((one) => new Option(`${one.name} (${one.markers} markers)`, one.id)));
+  if (film.id === next.id) form.dataset_id.append(...items.filter((one) => one.kind === "tracks").map((one) => new Option(`${one.name} (${one.markers} markers)`, one.id)));
 }
 
 // A strobe shows the clocks by its flashes.
@@ -45,7 +45,7 @@ function showFields() {
 }
 
 function wingChosen() {
-  const { value } = $("track-form").wing;
+  const { value } = $("track-form").dataset_id;
   $("track-wing-note").textContent = value ? "The markers are identified by their places on this wing, and get their names."
     : "Without a wing the markers get the names t01, t02, …; a marker that is ambiguous at every instant is left out.";
   showWing(value);
@@ -55,12 +55,12 @@ function wingChosen() {
 const number = (text) => (Number.isFinite(Number(text)) ? Number(text) : text);
 
 function body(form) {
-  const value = { film: film.id, kind: form.kind.value, light: form.light.value };
+  const value = { film_id: film.id, kind: form.kind.value, light: form.light.value };
   for (const name of NUMBERS) {
     const text = form.elements.namedItem(name).value.trim();
     if (text && !(name === "clocks_within_ms" && form.light.value === "strobe")) value[name] = number(text);
   }
-  if (form.wing.value) value.wing = form.wing.value;
+  if (form.dataset_id.value) value.dataset_id = form.dataset_id.value;
   const title = form.elements.namedItem("name").value.trim(); // form.name is the name of the form itself
   if (title) value.name = title;
   const labels = allLabels();

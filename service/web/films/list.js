@@ -105,13 +105,13 @@ function filmRow(film) {
   const missing = missingFiles(film);
   return el("tr", {}, el("td", {}, link("film", film)), el("td", {}, film.cameras.map((one) => one.name).join(", ")),
     el("td", {}, film.ready ? el("span", { className: "badge good" }, "ready") : `missing: ${missing.join(", ")}`), el("td", { className: "n" }, size(film.size_bytes)),
-    el("td", { className: "when" }, when(film.created_at)), el("td", {}, deletion("films", film)));
+    el("td", {}, when(film.created_at)), el("td", {}, deletion("films", film)));
 }
 
 function trackingRow(tracking) {
   const film = lists.films.find((one) => one.id === tracking.film_id);
   return el("tr", {}, el("td", {}, link("tracking", tracking)), el("td", {}, film ? link("film", film, tracking.id) : tracking.film_id),
-    el("td", {}, badge(tracking), el("small", {}, timeLeft(tracking) ? ` ${timeLeft(tracking)}` : "")), el("td", { className: "when" }, when(tracking.created_at)),
+    el("td", {}, badge(tracking), el("small", {}, timeLeft(tracking) ? ` ${timeLeft(tracking)}` : "")), el("td", {}, when(tracking.created_at)),
     el("td", {}, isFinal(tracking) ? deletion("trackings", tracking) : ""));
 }
 

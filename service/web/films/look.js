@@ -6,6 +6,9 @@ import { hintFor, isLabelling, label, labelsAt, nextMarker, undo } from "./label
 import { cameraView, circle, cross, gainOf, latest, LOOK, name } from "./view.js";
 
 const SNAP_PX = 18; // on the screen, from a click to a detection
+const LIT = 40; // of 255: a frame of a strobe film with brighter pixels shows a flash
+const SMALL_PX = 160; // width of the pictures in which a flash is sought
+const MOST_DARK = 500; // frames between flashes
 const SETTLED_MS = 200;
 const KEPT = 60; // detections of frames that are remembered
 const DIRECTIONS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
@@ -16,6 +19,7 @@ let detected = new Map(); // by camera, frame and kind: the markers
 
 export function setUpLook() {
   $("look-detections").addEventListener("change", () => views.forEach((one) => one.load()));
+  $("track-form").light.addEventListener("change", () => views.forEach(({ flash }) => { flash.hidden = $("track-form").light.value !== "strobe"; }));
   $("look-gain").addEventListener("input", () => views.forEach(({ view }) => view.setGain(gainOf($("look-gain")))));
 }
 
@@ -47,7 +51,7 @@ function panel(camera) {
   const note = el("p", { className: "quiet note", role: "status" });
   const one = { camera, frame: 0, markers: null, cursor: null, note, hint: el("p", { className: "hint" }) };
   one.view = cameraView(camera, {
-    paint: (pen, at) => paint(one, pen, at),
+    paint: (pen, at, size) => paint(one, pen, at, size),
     onPick: (pixel, size) => pick(one, pixel, size),
     onKey: (event) => key(one, event),
     onCloser: () => one.fetch(),
@@ -78,10 +82,12 @@ function panel(camera) {
   };
   range.addEventListener("input", () => one.go(Number(range.value)));
   number.addEventListener("change", () => one.go(Number(number.value)));
+  one.flash = el("button", { type: "button", ariaLabel: `Next flash, camera ${camera.name}`, onclick: () => nextFlash(one, last) }, "Next flash");
+  one.flash.hidden = $("track-form").light.value !== "strobe";
   const facts = [`${camera.width_px} × ${camera.height_px}`, plural(last + 1, "frame"), camera.rate_hz ? `${Number(camera.rate_hz.toPrecision(6))} per second` : null];
   one.node = el("div", { className: "film-view" },
     el("h4", {}, camera.name, " ", el("small", {}, facts.filter(Boolean).join(", "))), one.view.canvas,
-    el("div", { className: "controls" }, el("label", { className: "phase" }, "Frame ", range), number, one.view.buttons), one.hint, note);
+    el("div", { className: "controls" }, el("label", { className: "phase" }, "Frame ", range), number, one.flash, one.view.buttons), one.hint, note);
   one.view.setGain(gainOf($("look-gain")));
   return one;
 }
@@ -123,14 +129,40 @@ async function detect(one) {
   one.view.draw();
 }
 
+// Go to the next frame with light: in a strobe film most are dark.
+async function nextFlash(one, last) {
+  const { frame: from } = one;
+  one.flash.disabled = true;
+  try {
+    const end = Math.min(last, from + MOST_DARK);
+    for (let frame = from + 1; frame <= end && one.frame === from && one.node.isConnected; frame += 1) {
+      one.note.textContent = `Looking at frame ${frame}…`;
+      if ((await brightest(pathOf({ ...one, frame }))) > LIT) return one.go(frame);
+    }
+    if (one.frame === from) one.note.textContent = `No light in frames ${from + 1} to ${end}.`;
+  } catch (error) {
+    one.note.textContent = error.message;
+  } finally {
+    one.flash.disabled = false;
+  }
+}
+
+async function brightest(path) {
+  const picture = await createImageBitmap(await call("GET", `${path}?width_px=${SMALL_PX}`, { as: "blob" }));
+  const pen = new OffscreenCanvas(picture.width, picture.height).getContext("2d");
+  pen.drawImage(picture, 0, 0);
+  return pen.getImageData(0, 0, picture.width, picture.height).data.reduce((most, value, k) => (k % 4 === 0 && value > most ? value : most), 0);
+}
+
 const kindOf = () => $("track-form").kind.value;
 
 const pathOf = ({ camera, frame }) => `films/${part(film.id)}/frames/${part(camera.name)}/${frame}`;
 
-function paint(one, pen, at) {
+function paint(one, pen, at, size) {
+  const reach = Math.min(6, Math.max(3, 6 * size)); // small crosses leave small markers visible
   one.view?.canvas.classList.toggle("labels", isLabelling());
   one.hint.textContent = isLabelling() ? hintFor(one.camera.name) : "";
-  if ($("look-detections").checked) for (const { x_px: x, y_px: y } of one.markers ?? []) cross(pen, at(x, y), 5, LOOK.found);
+  if ($("look-detections").checked) for (const { x_px: x, y_px: y } of one.markers ?? []) cross(pen, at(x, y), reach, LOOK.found);
   for (const { x_px: x, y_px: y, marker } of labelsAt(one.camera.name, one.frame)) {
     circle(pen, at(x, y), 8, LOOK.label, 2);
     name(pen, at(x, y), marker, LOOK.label);

@@ -4,6 +4,7 @@ import { call, part } from "../base/api.js";
 import { $, el, fixed, plural, rounded } from "../base/format.js";
 import { cameraView, circle, cross, gainOf, latest, LOOK, name } from "./view.js";
 
+const ROOMY = "(min-width: 40rem)"; // narrower pictures have no room for names
 const WRONG_PX = 3; // seen and projected pixels that differ by more are drawn with a line between them
 
 let film = null;
@@ -29,6 +30,7 @@ export function showPictures(recorded, given, flashed) {
   [film, instants, strobe] = [recorded, given, flashed];
   $("seen-instant").replaceChildren(...instants.map((one, k) => new Option(`${fixed(one.time_s, 4)} s`, k)));
   if (!instants.length) return;
+  $("seen-names").checked = matchMedia(ROOMY).matches;
   panels = instants[0].cameras.map((one) => panel(one.camera));
   $("seen-views").replaceChildren(...panels.map((one) => one.node));
   for (const one of panels) {
