@@ -21,7 +21,11 @@ export function setUpFilm(given) {
   setUpLook();
   setUpForm({ onKind: detectAgain });
   setUpLabels({ onChange: drawLook, onGo: goTo });
-  setUpUpload((film) => film.id === id && show(film));
+  setUpUpload((film) => {
+    if (film.id !== id) return;
+    showLook(null); // what was seen may be of a file that was replaced
+    show(film);
+  });
   $("film-delete").addEventListener("click", async () => {
     if (await remove("films", id, $("film-name").textContent)) location.hash = "films";
   });

@@ -152,8 +152,8 @@ function draw() {
   const whole = markers.filter((marker) => seenBy(marker).length >= LEAST_CAMERAS);
   const enough = whole.length >= LEAST_MARKERS;
   $("label-summary").textContent = labels.length ? `Labels by hand: ${plural(markers.length, "marker")}` : "Label markers by hand (optional)";
-  const lacking = chosen() ? cameras().filter((camera) => !seenBy(chosen()).includes(camera)) : [];
-  const next = lacking.length ? `Next: ${chosen()} in camera ${lacking.join(" or ")}. ` : "";
+  const absent = chosen() ? cameras().filter((camera) => !seenBy(chosen()).includes(camera)) : [];
+  const next = absent.length ? `Next: ${chosen()} in camera ${absent.join(" or ")}. ` : "";
   say(`${next}${plural(whole.length, "marker")} labelled in ${LEAST_CAMERAS} cameras or more; ${enough ? "that is enough." : `at least ${LEAST_MARKERS} are needed.`}`);
   $("label-undo").disabled = !before.length;
   $("label-clear").disabled = !labels.length;

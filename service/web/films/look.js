@@ -94,6 +94,7 @@ function panel(camera) {
 
 // Fetch the picture of the present frame, if one with as many pixels is not there yet.
 async function fetchPicture(one) {
+  if (!views.includes(one)) return; // the page was left
   const { frame } = one;
   const width = one.view.pictureWidth();
   if (one.shown?.frame === frame && one.shown.width >= width) return;
@@ -107,22 +108,24 @@ async function fetchPicture(one) {
 }
 
 async function detect(one) {
+  if (!views.includes(one) || !$("look-detections").checked || one.markers) return;
   const { frame } = one;
   const kind = kindOf();
   const key = `${pathOf(one)}/markers?kind=${kind}`;
-  if (!$("look-detections").checked || one.markers) return;
-  try {
-    if (!detected.has(key)) {
-      one.note.textContent = "Detecting…";
-      detected.set(key, (await get(key)).markers);
-      if (detected.size > KEPT) detected.delete(detected.keys().next().value);
+  let markers = detected.get(key);
+  if (!markers) {
+    one.note.textContent = "Detecting…";
+    try {
+      ({ markers } = await get(key));
+    } catch (error) {
+      if (one.frame === frame) one.note.textContent = error.message;
+      return;
     }
-  } catch (error) {
-    if (one.frame === frame) one.note.textContent = error.message;
-    return;
+    detected.set(key, markers);
+    if (detected.size > KEPT) detected.delete(detected.keys().next().value);
   }
   if (one.frame !== frame || kindOf() !== kind) return;
-  one.markers = detected.get(key);
+  one.markers = markers;
   const found = plural(one.markers.length, kind === "dot" ? "dot" : "chequer");
   one.note.textContent = `${found} found in frame ${frame}`;
   one.view.canvas.ariaLabel = `Camera ${one.camera.name}, frame ${frame}, ${found}`;
