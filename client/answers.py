@@ -65,8 +65,9 @@ class Problem(TypedDict):
 class Health(TypedDict):
     """Status of the service; ``detail``: the cause if ``status`` is "degraded", or what a "starting" service does.
 
-    ``evaluator`` says how simulations are run: ray, processes or in_process. ``runs_active`` and ``diagnoses_active``
-    count jobs that have not ended; they are null if the database does not answer.
+    ``evaluator`` says how simulations are run: ray, processes or in_process. ``runs_active``,
+    ``diagnoses_active`` and ``trackings_active`` count jobs that have not ended; they are null if the database does not
+    answer.
     """
 
     status: Literal["starting", "ok", "degraded"]
@@ -76,6 +77,7 @@ class Health(TypedDict):
     workers: int | None
     runs_active: int | None
     diagnoses_active: int | None
+    trackings_active: int | None
     detail: str | None
 
 

@@ -44,12 +44,14 @@ from wingfit.service.routes import (
     drive,
     effects,
     exports,
+    films,
     forces,
     imports,
     keys,
     outcomes,
     runs,
     system,
+    trackings,
 )
 from wingfit.service.settings import Settings
 from wingfit.service.storage.database import Database
@@ -68,6 +70,8 @@ ROUTERS = (
     drive.router,
     exports.router,
     imports.router,
+    films.router,
+    trackings.router,
     effects.router,
     keys.router,
     backup.router,
@@ -115,7 +119,7 @@ def create_app(
     _mount_pages(app)
     if settings.keys:
         app.add_middleware(Authentication)
-    app.add_middleware(RequestLimits, allowed_hosts=settings.allowed_hosts)
+    app.add_middleware(RequestLimits, allowed_hosts=settings.allowed_hosts, film_mib=settings.max_film_mib)
     app.add_middleware(ErrorBoundary)
     app.add_middleware(MetricsAndLog)
     return app

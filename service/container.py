@@ -17,6 +17,8 @@ from wingfit.service.auth.access import KeyRing
 from wingfit.service.datasets.parsed_datasets import Datasets
 from wingfit.service.diagnoses.diagnoser import Diagnoser
 from wingfit.service.diagnoses.diagnosing import Diagnosing
+from wingfit.service.films.films import Films
+from wingfit.service.films.tracking import TrackingFilms
 from wingfit.service.http import concurrency_limit, threads
 from wingfit.service.http.concurrency_limit import ConcurrencyLimit
 from wingfit.service.http.events import Events
@@ -68,15 +70,19 @@ class Service:
         self.exports = ConcurrencyLimit("exports", concurrency_limit.EXPORTS)
         self.downloads = ConcurrencyLimit("downloads", concurrency_limit.DOWNLOADS)
         self.answers = ConcurrencyLimit("answers", concurrency_limit.ANSWERS)
+        self.film_uploads = ConcurrencyLimit("uploads of films", concurrency_limit.FILM_UPLOADS)
+        self.frames = ConcurrencyLimit("frames", concurrency_limit.FRAMES)
         self.backups = ConcurrencyLimit("backups", concurrency_limit.BACKUPS, concurrency_limit.MAX_WAITING_BACKUPS)
         self.datasets = Datasets(database, self.engine)
         self.calibrating = Calibrating(database, self.engine, self.datasets)
         self.diagnosing = Diagnosing(database, self.diagnoser, self.datasets)
-        kinds = (self.calibrating, self.diagnosing)
+        self.films = Films(settings, database)
+        self.tracking = TrackingFilms(database, self.films.files)
+        kinds = (self.calibrating, self.diagnosing, self.tracking)
         self.driving = Driving(database)
         limits = (settings.max_runs, settings.max_runs_per_owner, settings.max_starts)
         self.runner = Runner(database, self.changes, kinds, *limits, driving=self.driving)
-        self._housekeeping = Housekeeping(database, settings.keep_days, self.changes.publish)
+        self._housekeeping = Housekeeping(database, settings.keep_days, self.forget_job)
         make = parts.get("make_evaluator")
         prepare = None if make or settings.ray_address else _compile  # the nodes of a cluster compile for themselves
         self._pool = Pool(make or partial(_evaluator, settings), self.runner.attach, prepare)
@@ -87,6 +93,7 @@ class Service:
         """Load the API keys, queue the jobs that an earlier process did not finish, and start the evaluator."""
         self.load_keys()
         forget_snapshots(self.settings.data)
+        self.films.start()
         self.runner.recover()
         self._housekeeping.start()
         self._pool.start()
@@ -96,6 +103,11 @@ class Service:
         with self.database.read() as session:
             self.keys.load(session)
         self.changes.wake_all()
+
+    def forget_job(self, job_id: str) -> None:
+        """End the event streams of a job that was deleted from the database, and remove its files."""
+        self.films.files.forget_tracked(job_id)
+        self.changes.publish(job_id)
 
     def begin_stop(self) -> None:
         """End the event streams and start no more jobs. May be called in a signal handler."""
@@ -115,6 +127,7 @@ class Service:
         ended = threads.done_within(limits.jobs, "stop-jobs", lambda: self.runner.stop(limits.jobs))
         for line in () if ended else self._running_jobs():
             LOG.warning("given up after %g s: %s", limits.jobs, line)
+        self.films.stop()
         if not (closed := self._pool.close(limits.evaluator)):
             LOG.warning(
                 "given up: the evaluator has not stopped within %g s; its workers end by themselves", limits.evaluator
@@ -151,7 +164,7 @@ class Service:
     def gauges(self) -> Iterator[Metric]:
         """Yield the state of the service as Prometheus gauges, over all owners; jobs are those of the last count."""
         workers, pace = self._pool.standing or Standing(0), self.runner.pace()
-        jobs = GaugeMetricFamily("wingfit_jobs", "Calibrations and diagnoses by state.", labels=["kind", "state"])
+        jobs = GaugeMetricFamily("wingfit_jobs", "Jobs by kind and state.", labels=["kind", "state"])
         for kind, counts in (self.health.jobs or {}).items():
             for state in State:
                 jobs.add_metric([kind, state.value], counts.get(state, 0))
@@ -231,4 +244,5 @@ async def _read(service: ServiceDep, held: HeldSlots) -> AsyncIterator[None]:
 SIMULATION_SLOT = Depends(_simulate, scope="function")
 READ_SLOT = Depends(_read, scope="function")
 DOWNLOAD_SLOT = _slot(lambda service: service.downloads)
+FRAME_SLOT = _slot(lambda service: service.frames)
 UPLOAD_SLOT = _slot(lambda service: service.uploads)

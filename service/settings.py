@@ -30,6 +30,8 @@ RANGES = {
     "max_starts": (1, 1_000_000),
     "max_active": (1, 100_000),
     "max_stored_mb": (1, 10**9),
+    "max_film_mib": (1, 10**6),
+    "max_films_mib": (1, 10**9),
     "keep_days": (1, 36_500),
 }
 CHOICES = {"evaluator": get_args(EvaluatorKind), "log": get_args(LogFormat)}
@@ -57,7 +59,9 @@ class Settings:
             (``WINGFIT_MAX_STARTS``).
         max_active: largest number of jobs of one owner that have not ended (``WINGFIT_MAX_ACTIVE``).
         max_stored_mb: largest total size of the datasets of one owner, MB (``WINGFIT_MAX_STORED_MB``).
-        keep_days: days after which runs and diagnoses that have ended are deleted (``WINGFIT_KEEP_DAYS``); None: never.
+        max_film_mib: largest video, MiB (``WINGFIT_MAX_FILM_MIB``).
+        max_films_mib: largest total size of the videos of one owner, MiB (``WINGFIT_MAX_FILMS_MIB``).
+        keep_days: days after which jobs that have ended are deleted (``WINGFIT_KEEP_DAYS``); None: never.
         log: text, or json, which has one object per line and every request (``WINGFIT_LOG``).
         require_keys: require an API key also on loopback (``WINGFIT_REQUIRE_KEYS=1``).
         allow_remote: listen on other addresses than loopback without keys (``WINGFIT_ALLOW_REMOTE=1``).
@@ -75,6 +79,8 @@ class Settings:
     max_starts: int = 3
     max_active: int = 200
     max_stored_mb: int = 10_000
+    max_film_mib: int = 4096
+    max_films_mib: int = 65_536
     keep_days: int | None = None
     log: LogFormat = "text"
     require_keys: bool = False

@@ -105,6 +105,12 @@ def detect_film(task: FilmTask, progress: Progress) -> FilmDetections:
     return FilmDetections(seen + fresh.seen, marks + fresh.marks, (*bad, *fresh.bad_frames))
 
 
+def detect_frame(frame: Array, kind: MarkerKind) -> Detections:
+    """Return the markers in one ``frame`` [H, W] that is lit as a whole."""
+    detect = detect_chequers if kind == "chequer" else detect_dots
+    return detect(frame, float(np.median(frame)), _noise(frame))
+
+
 def _instants(task: FilmTask, frames: _Limited, first: int) -> Iterator[tuple[FlashMark, Detections, tuple[int, ...]]]:
     """Return instants with their detections, and the numbers of the bad frames before them."""
     detect = detect_chequers if task.kind == "chequer" else detect_dots

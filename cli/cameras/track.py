@@ -14,9 +14,6 @@ from wingfit.client.transport import WingfitError
 if TYPE_CHECKING:
     from wingfit.cameras.track.result import TrackedFilm
 
-# Parts of the time that each step takes.
-_STEPS = {"detecting": (0.0, 0.85), "instants": (0.85, 0.87), "rays": (0.87, 0.91), "following": (0.91, 1.0)}
-
 
 def track(
     film: Annotated[Path, typer.Argument(metavar="FILM", help="Description: film.yaml, with cameras, films, markers.")],
@@ -42,6 +39,7 @@ def track(
     """
     from wingfit.cameras.project import read_film  # imported late: other commands start faster
     from wingfit.cameras.track.procedure import track as run
+    from wingfit.cameras.track.progress import whole
     from wingfit.cameras.track.report import film_report
     from wingfit.records.errors import DatasetError
 
@@ -49,8 +47,7 @@ def track(
         with late_progress("tracking") as shown:
 
             def progress(step: str, part: float) -> None:
-                low, high = _STEPS[step]
-                shown(low + (high - low) * part, None, step)
+                shown(whole(step, part), None, step)
 
             found = run(read_film(film, store), progress)
     except DatasetError as error:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 from sqlalchemy.orm import Session
@@ -46,7 +46,7 @@ class Diagnosing(JobKind):
         row.stage, row.progress, row.evaluations, row.elapsed_seconds = None, 0.0, 0, 0.0
         return []
 
-    def steps(self, row: DiagnosisRow, evaluator: Evaluator) -> Iterator[Step]:
+    def steps(self, row: DiagnosisRow, evaluator: Evaluator, _interrupted: Callable[[], bool]) -> Iterator[Step]:
         """Yield a step at each new stage of the diagnosis, and within a stage at most every STORE_SECONDS."""
         spec, dataset = views.spec(row), self._datasets.get(row.dataset_id)
         rig = None if row.rig is None else rig_of(row.rig)

@@ -11,6 +11,8 @@ from wingfit.service.http.problems import ProblemError
 SIMULATIONS = 4
 # Reading a dataset of the largest size takes some gigabytes.
 UPLOADS = 2
+# Videos of gigabytes, written to the disk as they arrive; frames, each decoded in a process.
+FILM_UPLOADS, FRAMES = 8, 4
 # An export simulates every recording, which may take an hour, and is made in memory.
 EXPORTS = 1
 # Large answers, held until the client has taken them: stored ones, and simulated ones of some tens of megabytes.

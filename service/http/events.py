@@ -17,6 +17,7 @@ from starlette.responses import StreamingResponse
 
 from wingfit.client.answers import GenerationEvent, Run
 from wingfit.client.diagnosis_answers import Diagnosis, StepEvent
+from wingfit.client.films.answers import Tracking, TrackingStep
 from wingfit.service.answers import checked
 from wingfit.service.auth.access import CALLER, Caller, KeyRing
 from wingfit.service.http.problems import ProblemError, error_item, invalid
@@ -37,7 +38,7 @@ LastEventId = Annotated[
 
 
 # A job, and its steps after a sequence number, ascending.
-JobState = tuple[Run | Diagnosis, Sequence[GenerationEvent | StepEvent]]
+JobState = tuple[Run | Diagnosis | Tracking, Sequence[GenerationEvent | StepEvent | TrackingStep]]
 
 
 class Watched(NamedTuple):
@@ -138,7 +139,7 @@ class Events:
 
 
 def watched(kind: JobKind, job_id: str) -> Watched:
-    """Describe the job with this id to :class:`Events`: its steps are generations of a run or steps of a diagnosis."""
+    """Describe the job with this id to :class:`Events`: its steps are generations of a run or reports of progress."""
 
     def read(session: Session, after: int, limit: int) -> JobState:
         past = store.steps(session, kind.step_table, job_id, after, limit)

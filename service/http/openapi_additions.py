@@ -17,6 +17,8 @@ CREATING = (
     ("/v1/datasets", "201", "dataset_id"),
     ("/v1/runs", "202", "run_id"),
     ("/v1/diagnoses", "202", "diagnosis_id"),
+    ("/v1/films", "201", "film_id"),
+    ("/v1/trackings", "202", "tracking_id"),
 )
 ID = "$response.body#/id"
 # Settings in answers, and the requests that set them.

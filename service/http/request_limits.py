@@ -5,6 +5,7 @@ All middleware of the service is plain ASGI: middleware that returns a whole res
 
 from __future__ import annotations
 
+import re
 from urllib.parse import urlsplit
 
 from starlette.datastructures import Headers
@@ -20,6 +21,7 @@ UPLOAD_LIMIT = 64 * 2**20
 FORM_OVERHEAD = 64 * 2**10
 BODY_LIMIT = 2**20
 DRIVE_PATH, RESULTS, RESULTS_LIMIT = "/v1/drive/", "/results", 8 * 2**20  # of many simulations
+FILM_FILE = re.compile(r"/v1/films/[^/]+/files/[^/]+")  # streamed to the disk
 CHUNK = 256 * 2**10
 # Load balancers and Kubernetes probe these by IP address; they return nothing that was uploaded or computed.
 PROBES = frozenset({"/v1/health", "/v1/ready", "/v1/metrics"})
@@ -41,10 +43,13 @@ RAW_HEADERS = [(name.lower().encode(), value.encode()) for name, value in SECURI
 
 
 class RequestLimits:
-    """Middleware that refuses requests by host, origin or size; ``allowed_hosts``: host names of this server."""
+    """Middleware that refuses requests by host, origin or size.
 
-    def __init__(self, app: ASGIApp, allowed_hosts: tuple[str, ...]) -> None:
-        self.app, self.allowed_hosts = app, frozenset(allowed_hosts)
+    ``allowed_hosts``: host names of this server; ``film_mib``: most MiB of a file of a film.
+    """
+
+    def __init__(self, app: ASGIApp, allowed_hosts: tuple[str, ...], film_mib: int) -> None:
+        self.app, self.allowed_hosts, self._film_limit = app, frozenset(allowed_hosts), film_mib * 2**20
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Check one request, and pass it on or refuse it."""
@@ -59,7 +64,7 @@ class RequestLimits:
         headers_only = scope["method"] == "HEAD" and not scope["path"].endswith("/events")
         if headers_only:
             scope = {**scope, "method": "GET"}
-        await self.app(scope, _limited(receive, _limit(scope)), _response_sender(send, headers_only=headers_only))
+        await self.app(scope, _limited(receive, self._limit(scope)), _response_sender(send, headers_only=headers_only))
 
     def _refusal(self, scope: Scope) -> ProblemError | None:
         headers = Headers(scope=scope)
@@ -80,9 +85,17 @@ class RequestLimits:
                     403, "origin", f"a page of another site may not read or link to {API}; open the page of this server"
                 )
         length = headers.get("content-length", "0")
-        if length.isdecimal() and int(length) > _limit(scope):
-            return _too_large(_limit(scope))
+        if length.isdecimal() and int(length) > self._limit(scope):
+            return _too_large(self._limit(scope))
         return None
+
+    def _limit(self, scope: Scope) -> int:
+        path = scope["path"]
+        if scope["method"] == "PUT" and FILM_FILE.fullmatch(path):
+            return self._film_limit
+        if path.startswith(DRIVE_PATH) and path.endswith(RESULTS):
+            return RESULTS_LIMIT
+        return UPLOAD_LIMIT + FORM_OVERHEAD if path in UPLOAD_PATHS else BODY_LIMIT
 
 
 def _host_name(host: str) -> str:
@@ -100,12 +113,6 @@ def _is_foreign(headers: Headers, host: str) -> bool:
         return not _host_name(host) or urlsplit(origin).netloc.lower() != host.lower()
     except ValueError:
         return True
-
-
-def _limit(scope: Scope) -> int:
-    if scope["path"].startswith(DRIVE_PATH) and scope["path"].endswith(RESULTS):
-        return RESULTS_LIMIT
-    return UPLOAD_LIMIT + FORM_OVERHEAD if scope["path"] in UPLOAD_PATHS else BODY_LIMIT
 
 
 def _too_large(limit: int) -> ProblemError:

@@ -1,4 +1,4 @@
-"""Interface between the runner and the kinds of job (run, diagnosis), whose computation is stored step by step."""
+"""Interface between the runner and the kinds of job, whose computation is stored step by step."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from sqlalchemy.orm import Session
 from wingfit.calibration.evaluator import Evaluator
 from wingfit.client.answers import GenerationEvent, Run
 from wingfit.client.diagnosis_answers import Diagnosis, StepEvent
+from wingfit.client.films.answers import Tracking, TrackingStep
 from wingfit.service.storage.tables import JobRow, StepOfJob
 
 Points = list[tuple[float, float]]
@@ -27,7 +28,7 @@ class NotReadyError(Exception):
 
 @dataclass(frozen=True)
 class Step:
-    """One finished step of a job: a generation of a run, a report of progress of a diagnosis, or the final result.
+    """One finished step of a job: a generation of a run, a report of progress of another, or the final result.
 
     Attributes:
         progress: fraction of the whole job that is done, in [0, 1].
@@ -44,7 +45,7 @@ class Step:
 
 
 class JobKind(ABC):
-    """A kind of job (run or diagnosis): its resource in the API, its tables, and how one job is computed.
+    """A kind of job: its resource in the API, its tables, and how one job is computed.
 
     Attributes:
         what: singular name of the resource, e.g. "run", also for messages.
@@ -62,10 +63,10 @@ class JobKind(ABC):
     step_event: str
     table: type[JobRow]
     step_table: type[StepOfJob]
-    step_answer: type[GenerationEvent] | type[StepEvent]
+    step_answer: type[GenerationEvent] | type[StepEvent] | type[TrackingStep]
 
     @abstractmethod
-    def view(self, row: Any) -> Run | Diagnosis:
+    def view(self, row: Any) -> Run | Diagnosis | Tracking:
         """Return the JSON answer that describes the job stored in ``row`` (of ``table``)."""
 
     @abstractmethod
@@ -73,5 +74,8 @@ class JobKind(ABC):
         """Prepare ``row`` for a start or restart; return (elapsed time in s, progress) of the steps to keep."""
 
     @abstractmethod
-    def steps(self, row: Any, evaluator: Evaluator) -> Iterator[Step]:
-        """Compute the job in ``row`` and yield its steps; only the final one has ``last`` True."""
+    def steps(self, row: Any, evaluator: Evaluator, interrupted: Callable[[], bool]) -> Iterator[Step]:
+        """Compute the job in ``row`` and yield its steps; only the final one has ``last`` True.
+
+        InterruptedStepError soon after ``interrupted()`` returns True, within a step too; the ``evaluator`` raises it.
+        """

@@ -1,4 +1,4 @@
-"""Computes jobs (runs and diagnoses), a few at a time, one thread each; every step is stored before the next starts.
+"""Computes jobs, a few at a time, one thread each; every step is stored before the next starts.
 
 The state machine :mod:`wingfit.workers.jobs` decides what a job may do next and returns instructions, which the runner
 carries out. A :class:`wingfit.service.jobs.job_kind.JobKind` computes the steps. A job is computed only while its
@@ -26,7 +26,7 @@ from wingfit.service.rigs.driving import Driving
 from wingfit.service.runs.simulation_hints import with_remedy
 from wingfit.service.storage import store
 from wingfit.service.storage.database import Database, DatabaseClosedError, is_full
-from wingfit.service.storage.tables import JobRow
+from wingfit.service.storage.tables import DatasetJobRow, JobRow
 from wingfit.workers import RunningEvaluator, jobs
 from wingfit.workers.jobs import Instruction
 from wingfit.workers.share import lower_priority
@@ -41,7 +41,7 @@ Written = TypeVar("Written")
 
 
 class JobRef(NamedTuple):
-    """Identifies a job: its kind (run or diagnosis), id and owner, and whether drivers compute its simulations."""
+    """Identifies a job: its kind, id and owner, and whether drivers compute its simulations."""
 
     kind: JobKind
     id: str
@@ -51,7 +51,7 @@ class JobRef(NamedTuple):
     @classmethod
     def of(cls, kind: JobKind, row: JobRow) -> JobRef:
         """Return the job that ``row`` stores."""
-        return cls(kind, row.id, row.owner, bool(row.driven))
+        return cls(kind, row.id, row.owner, isinstance(row, DatasetJobRow) and bool(row.driven))
 
     def __str__(self) -> str:
         return f"{self.kind.what} {self.id}"
@@ -285,10 +285,12 @@ class Runner:
         earlier, began = row.elapsed_seconds, time.monotonic()
         LOG.info("%s: starts after step %d", job, row.generations)
         used = self._driving.evaluator(job.id) if job.driven else evaluator
-        interruptible = InterruptibleEvaluator(used, lambda: self._stopping or job in self._cancelled)
+
+        def interrupted() -> bool:
+            return self._stopping or job in self._cancelled
 
         def first_step() -> Iterator[Step]:
-            steps = job.kind.steps(row, interruptible)
+            steps = job.kind.steps(row, InterruptibleEvaluator(used, interrupted), interrupted)
             return chain([next(steps)], steps)
 
         # The preparation of the first step may need disk space, too.

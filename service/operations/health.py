@@ -48,15 +48,16 @@ class Health:
     async def now(self) -> HealthAnswer:
         """Return the health of the service as the JSON answer; jobs of all owners are counted, for every caller."""
         silent = await self.look()
-        run, diagnosis = (None if self.jobs is None else _active(self.jobs[kind.what]) for kind in self._kinds)
+        active = {kind.what: None if self.jobs is None else _active(self.jobs[kind.what]) for kind in self._kinds}
         return HealthAnswer(
             status="degraded" if silent else self._pool.status,
             version=wingfit_version(),
             sqlite_version=sqlite3.sqlite_version,
             evaluator=self._settings.evaluator,
             workers=self._pool.workers,
-            runs_active=run,
-            diagnoses_active=diagnosis,
+            runs_active=active["run"],
+            diagnoses_active=active["diagnosis"],
+            trackings_active=active["tracking"],
             detail="; ".join(reason for reason in (silent, self._pool.detail) if reason) or None,
         )
 

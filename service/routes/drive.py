@@ -20,11 +20,11 @@ from wingfit.service.http.problems import conflict, error_item, invalid, not_fou
 from wingfit.service.rigs.requests import ResultIn, ResultsIn, WorkIn
 from wingfit.service.rigs.stored_rig import DECLARED
 from wingfit.service.storage import store
-from wingfit.service.storage.tables import DiagnosisRow, JobRow, RunRow
+from wingfit.service.storage.tables import DatasetJobRow, DiagnosisRow, RunRow
 from wingfit.workers.jobs import State
 
 router = APIRouter(prefix="/v1", tags=["rigs"])
-TABLES: dict[str, type[JobRow]] = {"run": RunRow, "dx": DiagnosisRow}
+TABLES: dict[str, type[DatasetJobRow]] = {"run": RunRow, "dx": DiagnosisRow}
 
 
 @router.get("/rigs", response_model=a.InstalledRigs, responses=http.errors(), summary="List installed rigs")
@@ -103,7 +103,7 @@ def results(service: ServiceDep, body: ResultsIn, job_id: str) -> a.Settled:
     return {"taken": count, "unknown": len(body.results) - count}
 
 
-def _row(service: Service, job_id: str) -> JobRow:
+def _row(service: Service, job_id: str) -> DatasetJobRow:
     """Return the driven job that a request names; raise a 404 if there is none, a 409 if the server simulates it."""
     table = TABLES.get(job_id.partition("_")[0])
     if table is None:
@@ -115,7 +115,7 @@ def _row(service: Service, job_id: str) -> JobRow:
     return row
 
 
-def _work(row: JobRow, body: WorkIn, simulations: list[a.Simulation]) -> a.Work:
+def _work(row: DatasetJobRow, body: WorkIn, simulations: list[a.Simulation]) -> a.Work:
     return {
         "job_id": row.id,
         "dataset_id": row.dataset_id,

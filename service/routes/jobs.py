@@ -1,4 +1,4 @@
-"""Routes that runs and diagnoses share: fetch, watch, cancel, delete; and how their jobs are submitted."""
+"""Routes that runs, diagnoses and trackings share: fetch, watch, cancel, delete; and how their jobs are submitted."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def submit_job(
     """Store the job that a request describes, queue it, and return the answer. A repeated request gets the same answer.
 
     ``kind``: of the job; ``key``: the Idempotency-Key, if any; ``plan`` checks the request ``body`` and returns a job,
-    not yet stored, with its dataset_id, kind, name and spec. Two requests with one key are equal if they contain the
+    not yet stored, with its subject, name and spec. Two requests with one key are equal if they contain the
     same fields with the same values. A default written out differs from a field left out, because it overrides a run's
     setting.
     """
@@ -43,10 +43,11 @@ def submit_job(
     row = plan()
 
     def create(session: Session) -> store.Answer:
-        row.id, row.created_at, row.evaluations, row.elapsed_seconds = store.new_id(kind.prefix), store.now(), 0, 0.0
-        row.owner = store.admitted(session, row.dataset_id, service.settings.max_active)
+        row.id, row.created_at = store.new_id(kind.prefix), store.now()
+        row.owner = store.admitted(session, row, service.settings.max_active)
         store.put_job(row, jobs.step(None, jobs.Submit())[0])
         session.add(row)
+        session.flush()  # sets the columns that have a default
         return store.Answer(202, f"{kind.path}/{row.id}", kind.view(row))
 
     answer, new = http.created(service.database, again, create)
@@ -89,7 +90,7 @@ def add_job_routes(
     def delete(service: ServiceDep, job_id: str = in_path) -> None:
         with service.database.write() as session:
             store.delete_job(session, kind_of(service).table, job_id)
-        service.changes.publish(job_id)
+        service.forget_job(job_id)
 
     def add_action(name: str, event: jobs.Event, description: str) -> None:
         @router.post(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 from sqlalchemy.orm import Session
@@ -44,7 +44,7 @@ class Calibrating(JobKind):
         """Return (elapsed time in s, progress) of the stored generations, after which the run continues."""
         return [(g.elapsed_seconds, g.progress) for g in store.steps(session, GenerationRow, row.id)]
 
-    def steps(self, row: RunRow, evaluator: Evaluator) -> Iterator[Step]:
+    def steps(self, row: RunRow, evaluator: Evaluator, _interrupted: Callable[[], bool]) -> Iterator[Step]:
         """Yield a step for each generation of the search, then one with the result on every recording."""
         spec, whole = store.spec(row), self._datasets.get(row.dataset_id)
         with self._database.read() as session:

@@ -12,13 +12,12 @@ from sqlalchemy.orm import Session
 from wingfit.service.storage import store
 from wingfit.service.storage.clock import DAY, ServiceClock
 from wingfit.service.storage.database import Database, DatabaseClosedError
-from wingfit.service.storage.tables import DiagnosisRow, RunRow
+from wingfit.service.storage.tables import JobRow
 
 LOG = logging.getLogger("wingfit")
 EVERY_SECONDS = 3600.0
 
-JobTable = type[RunRow] | type[DiagnosisRow]
-TABLES: tuple[JobTable, ...] = (DiagnosisRow, RunRow)
+TABLES = store.JOBS[::-1]
 
 
 class Housekeeping:
@@ -70,7 +69,7 @@ class Housekeeping:
             LOG.info("%d jobs that ended more than %d days ago were deleted", len(ended), self._keep_days)
         return len(ended)
 
-    def _ended_before(self, seconds: float) -> list[tuple[JobTable, str]]:
+    def _ended_before(self, seconds: float) -> list[tuple[type[JobRow], str]]:
         with self._database.read() as session:
             return [
                 (table, job_id)

@@ -26,6 +26,7 @@ from wingfit.service.storage.tables import (
     CheckpointRow,
     DatasetRow,
     DiagnosisRow,
+    FilmRow,
     FindingRow,
     JobRow,
     KeyRow,
@@ -34,6 +35,7 @@ from wingfit.service.storage.tables import (
     RunRow,
     SimulatedRow,
     StepOfJob,
+    TrackingRow,
 )
 from wingfit.workers.jobs import Job, State, Wish
 
@@ -45,6 +47,7 @@ BEFORE = "before-"  # beginning of a cursor
 _SPEC = TypeAdapter(CalibrationSpec)
 BEFORE_METHODS: dict[str, Any] = {"method": "genetic"}
 ACTIVE = tuple(state.value for state in State if not state.final)
+JOBS: tuple[type[JobRow], ...] = (RunRow, DiagnosisRow, TrackingRow)
 
 Row = TypeVar("Row", bound=OwnedRow | KeyRow)
 Step = TypeVar("Step", bound=StepOfJob)
@@ -156,9 +159,9 @@ def make_room(session: Session, owner: str | None, size: int, most_mb: int) -> N
 
     Both the uploaded files and their forms in the internal format count. ``owner`` None: datasets without an owner.
     """
-    held = session.scalar(select(func.sum(DatasetRow.size_bytes)).where(_of(DatasetRow, owner))) or 0
+    held = session.scalar(select(func.sum(DatasetRow.size_bytes)).where(of_owner(DatasetRow, owner))) or 0
     beside = select(func.sum(func.length(ParsedRow.body))).join(DatasetRow, DatasetRow.id == ParsedRow.dataset_id)
-    held += session.scalar(beside.where(_of(DatasetRow, owner))) or 0
+    held += session.scalar(beside.where(of_owner(DatasetRow, owner))) or 0
     if held + size > most_mb * MB:
         raise ProblemError(
             429,
@@ -182,7 +185,7 @@ def delete_dataset(session: Session, dataset_id: str) -> None:
 
 
 def delete_job(session: Session, table: type[JobRow], job_id: str) -> None:
-    """Delete a job (run or diagnosis) that has ended, with its steps and results.
+    """Delete a job that has ended, with its steps and results.
 
     Raises a 409 for a job that is queued, running or paused, a 404 if ``table`` has no such job.
     """
@@ -216,15 +219,15 @@ def finding(session: Session, diagnosis_id: str) -> dict[str, Any]:
     return body
 
 
-def admitted(session: Session, dataset_id: str, most: int) -> str | None:
-    """Return the owner of a dataset, who will also own a new job on the dataset; None for a dataset without an owner.
+def admitted(session: Session, row: JobRow, most: int) -> str | None:
+    """Return the owner of the new job ``row``, that of its dataset or film; None for one without an owner.
 
-    Raises a 429 if ``most`` jobs of this owner have not ended, a 404 if there is no such dataset.
+    Raises a 429 if ``most`` jobs of this owner have not ended, a 404 if there is no such dataset or film.
     """
-    owner = one(session, DatasetRow, dataset_id).owner
+    table, subject_id = row.subject
+    owner = one(session, table, subject_id).owner
     unfinished = (
-        select(func.count()).select_from(table).where(table.state.in_(ACTIVE), _of(table, owner))
-        for table in (RunRow, DiagnosisRow)
+        select(func.count()).select_from(table).where(table.state.in_(ACTIVE), of_owner(table, owner)) for table in JOBS
     )
     count = sum(session.scalar(query) or 0 for query in unfinished)
     if count >= most:
@@ -233,7 +236,8 @@ def admitted(session: Session, dataset_id: str, most: int) -> str | None:
     return owner
 
 
-def _of(table: type[OwnedRow], owner: str | None) -> ColumnElement[bool]:
+def of_owner(table: type[OwnedRow], owner: str | None) -> ColumnElement[bool]:
+    """Return the condition that a row of ``table`` belongs to ``owner``; None: to nobody."""
     return table.owner.is_(None) if owner is None else table.owner == owner
 
 
@@ -306,7 +310,13 @@ def spec_json(given: CalibrationSpec | DiagnosisSpec) -> dict[str, Any]:
 
 
 # By the part of a location that names the resource.
-_MADE: dict[str, type[OwnedRow]] = {"datasets": DatasetRow, "runs": RunRow, "diagnoses": DiagnosisRow}
+_MADE: dict[str, type[OwnedRow]] = {
+    "datasets": DatasetRow,
+    "films": FilmRow,
+    "runs": RunRow,
+    "diagnoses": DiagnosisRow,
+    "trackings": TrackingRow,
+}
 
 
 @dataclass(frozen=True)

@@ -23,13 +23,12 @@ class Table(DeclarativeBase):
 
 
 class OwnedRow:
-    """The columns that datasets and jobs share.
+    """The columns that datasets, films and jobs share.
 
     Attributes:
         id: public id, e.g. "run_5c1e07a94bd83f26".
-        owner: of a dataset, the owner of the API key that uploaded it, None if no key was required; of a job, the owner
-            of its dataset.
-        kind: "tracks" (markers of a flexible wing), "forces" (of a vehicle) or "series" (of a rig of the user's own).
+        owner: of a dataset or film, the owner of the API key that made it, None if no key was required; of a job, the
+            owner of its dataset or film.
     """
 
     __tablename__: Any
@@ -38,7 +37,6 @@ class OwnedRow:
     id: Mapped[str] = mapped_column(unique=True)
     owner: Mapped[str | None] = mapped_column(index=True)
     name: Mapped[str]
-    kind: Mapped[str] = mapped_column(server_default="tracks")
     created_at: Mapped[str]
 
 
@@ -64,6 +62,7 @@ class KeyRow(Table):
 class DatasetRow(OwnedRow, Table):
     """The description of an uploaded dataset; its bytes are in :class:`ArchiveRow`.
 
+    ``kind``: "tracks" (markers of a flexible wing), "forces" (of a vehicle) or "series" (of a rig of the user's own).
     ``filename``, ``sha256`` and ``size_bytes`` are those of the uploaded file; ``markers`` is the number of markers on
     the wing (else 0); ``recordings`` describes each recording as JSON, ``rig`` the rig of a dataset of series (else
     None); ``warnings`` the likely mistakes found at its upload (None for one of an earlier version).
@@ -71,6 +70,7 @@ class DatasetRow(OwnedRow, Table):
 
     __tablename__ = "dataset"
 
+    kind: Mapped[str] = mapped_column(server_default="tracks")
     description: Mapped[str]
     filename: Mapped[str]
     sha256: Mapped[str]
@@ -113,25 +113,18 @@ class ClockRow(Table):
 
 
 class JobRow(OwnedRow):
-    """The columns that runs and diagnoses share.
+    """The columns that runs, diagnoses and trackings share.
 
     Attributes:
         spec: the specification (model, method, settings) as JSON.
-        rig: of a job on series, the rig as `service.rigs.stored_rig` stores it; else None.
-        rig_name, driven: its name, and whether drivers simulate it; lists of jobs do not read the rig.
         state, wish, generations, progress, error, starts: those of `workers.jobs.Job`.
         stage: name of the present stage of the search.
         eta_seconds: estimated remaining time (s), None if unknown.
-        evaluations: number of evaluated individuals so far.
         elapsed_seconds: computing time up to the last stored step (s).
         ended_at_service_seconds: reading of the service clock (s) when the end of the job was first noticed.
     """
 
-    dataset_id: Mapped[str] = mapped_column(ForeignKey("dataset.id", ondelete="RESTRICT"), index=True)
     spec: Mapped[dict[str, Any]]
-    rig: Mapped[dict[str, Any] | None] = mapped_column(JSON(none_as_null=True))
-    rig_name: Mapped[str | None]
-    driven: Mapped[bool] = mapped_column(default=False)
     state: Mapped[str] = mapped_column(index=True)
     wish: Mapped[str]
     stage: Mapped[str | None]
@@ -140,14 +133,41 @@ class JobRow(OwnedRow):
     started_at: Mapped[str | None]
     finished_at: Mapped[str | None]
     generations: Mapped[int] = mapped_column(default=0)
-    evaluations: Mapped[int] = mapped_column(default=0)
     elapsed_seconds: Mapped[float] = mapped_column(default=0.0)
     error: Mapped[str | None]
     starts: Mapped[int] = mapped_column(default=0)
     ended_at_service_seconds: Mapped[float | None]
 
+    @property
+    def subject(self) -> tuple[type[OwnedRow], str]:
+        """The table and the id of what the job computes on: of a dataset, or of a film."""
+        raise NotImplementedError
 
-class RunRow(JobRow, Table):
+
+class DatasetJobRow(JobRow):
+    """The columns that runs and diagnoses share, beside those of every job.
+
+    Attributes:
+        kind: of the dataset.
+        rig: of a job on series, the rig as `service.rigs.stored_rig` stores it; else None.
+        rig_name, driven: its name, and whether drivers simulate it; lists of jobs do not read the rig.
+        evaluations: number of evaluated individuals so far.
+    """
+
+    kind: Mapped[str] = mapped_column(server_default="tracks")
+    dataset_id: Mapped[str] = mapped_column(ForeignKey("dataset.id", ondelete="RESTRICT"), index=True)
+    rig: Mapped[dict[str, Any] | None] = mapped_column(JSON(none_as_null=True))
+    rig_name: Mapped[str | None]
+    driven: Mapped[bool] = mapped_column(default=False)
+    evaluations: Mapped[int] = mapped_column(default=0)
+
+    @property
+    def subject(self) -> tuple[type[OwnedRow], str]:
+        """The table of datasets, and the id of the dataset that the job computes on."""
+        return DatasetRow, self.dataset_id
+
+
+class RunRow(DatasetJobRow, Table):
     """A calibration run.
 
     Attributes:
@@ -167,7 +187,7 @@ class RunRow(JobRow, Table):
     result: Mapped[dict[str, Any] | None] = mapped_column(JSON(none_as_null=True))
 
 
-class DiagnosisRow(JobRow, Table):
+class DiagnosisRow(DatasetJobRow, Table):
     """A diagnosis; ``generations`` counts its steps.
 
     ``run_id``: the run whose best genome the diagnosis starts from, None if there is none or the run was deleted.
@@ -191,7 +211,7 @@ class FindingRow(Table):
 
 
 class StepOfJob:
-    """The columns that generations of runs and steps of diagnoses share: the progress of the job at that step.
+    """The columns that the steps of all jobs share: the progress of the job at that step.
 
     ``sequence`` counts the steps of a job from 1, over all stages and restarts; ``elapsed_seconds``: computing time so
     far.
@@ -201,19 +221,71 @@ class StepOfJob:
     sequence: Mapped[int] = mapped_column(primary_key=True)
     stage: Mapped[str]
     progress: Mapped[float]
-    evaluations: Mapped[int]
     elapsed_seconds: Mapped[float]
     eta_seconds: Mapped[float | None]
 
 
 class StepRow(StepOfJob, Table):
-    """One step of a diagnosis: its progress at that time."""
+    """One step of a diagnosis: its progress, and the count of evaluated individuals, at that time."""
 
     __tablename__ = "step"
 
     job_id: Mapped[str] = mapped_column(
         "diagnosis_id", ForeignKey("diagnosis.id", ondelete="CASCADE"), primary_key=True
     )
+    evaluations: Mapped[int]
+
+
+class FilmRow(OwnedRow, Table):
+    """The films of one recording with several cameras; the files are in the data folder (`service/films/files.py`).
+
+    Attributes:
+        cameras: as JSON, of each camera its name and stated rate, and what is known of its video
+            (`service.films.description.CameraOfFilm`).
+        calibration: name of the file of calibrated cameras; None before its upload.
+        size_bytes: of all files of the film.
+    """
+
+    __tablename__ = "film"
+
+    cameras: Mapped[list[dict[str, Any]]]
+    calibration: Mapped[str | None]
+    size_bytes: Mapped[int] = mapped_column(default=0)
+
+
+class TrackingRow(JobRow, Table):
+    """The tracking of the markers in a film; ``generations`` counts its steps.
+
+    ``dataset_id``: of the wing whose markers are tracked, as requested; their places are copied into ``spec``, so that
+    the dataset may be deleted.
+    """
+
+    __tablename__ = "tracking"
+
+    film_id: Mapped[str] = mapped_column(ForeignKey("film.id", ondelete="RESTRICT"), index=True)
+    dataset_id: Mapped[str | None]
+
+    @property
+    def subject(self) -> tuple[type[OwnedRow], str]:
+        """The table of films, and the id of the film that is tracked."""
+        return FilmRow, self.film_id
+
+
+class TrackingStepRow(StepOfJob, Table):
+    """One step of a tracking: its progress at that time."""
+
+    __tablename__ = "tracking_step"
+
+    job_id: Mapped[str] = mapped_column("tracking_id", ForeignKey("tracking.id", ondelete="CASCADE"), primary_key=True)
+
+
+class TrackedRow(Table):
+    """The result of a tracking that has succeeded, as JSON; the tracks themselves are files."""
+
+    __tablename__ = "tracked"
+
+    tracking_id: Mapped[str] = mapped_column(ForeignKey("tracking.id", ondelete="CASCADE"), primary_key=True)
+    body: Mapped[dict[str, Any]]
 
 
 class CheckpointRow(Table):
@@ -238,6 +310,7 @@ class GenerationRow(StepOfJob, Table):
     __tablename__ = "generation"
 
     job_id: Mapped[str] = mapped_column("run_id", ForeignKey("run.id", ondelete="CASCADE"), primary_key=True)
+    evaluations: Mapped[int]
     generation: Mapped[int]
     best: Mapped[float | None]
     mean: Mapped[float | None]

@@ -229,7 +229,7 @@ def test_a_large_body_is_sent_in_chunks() -> None:
         sent.append(message)
 
     scope: Scope = {"type": "http", "method": "GET", "path": "/", "headers": [(b"host", b"localhost")]}
-    asyncio.run(request_limits.RequestLimits(app, ("localhost",))(scope, None, send))  # type: ignore[arg-type]
+    asyncio.run(request_limits.RequestLimits(app, ("localhost",), 1)(scope, None, send))  # type: ignore[arg-type]
     bodies = sent[1:]
     assert b"".join(bytes(message["body"]) for message in bodies) == 2 * body
     assert max(len(message["body"]) for message in bodies) == request_limits.CHUNK

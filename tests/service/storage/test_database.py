@@ -29,7 +29,7 @@ def test_migrations_from_nothing_give_the_tables_that_the_code_means(tmp_path: P
     with engine.connect() as connection:
         context = MigrationContext.configure(connection, opts={"compare_type": True})
         assert compare_metadata(context, Table.metadata) == []
-        assert context.get_current_revision() == "0007"
+        assert context.get_current_revision() == "0008"
     engine.dispose()
 
 

@@ -1,0 +1,49 @@
+"""What the processes that read videos have in common.
+
+FFmpeg decodes what strangers upload: a damaged or malicious file may crash it, make it loop, or take gigabytes. Only a
+process of its own ends then.
+"""
+
+from __future__ import annotations
+
+import os
+import struct
+import sys
+from collections.abc import Sequence
+
+from wingfit.records.errors import DatasetError, Fault
+from wingfit.records.files.confined import ENVIRONMENT
+
+NICENESS = 5
+LENGTHS = struct.Struct("!II")  # of the JSON and of the bytes of an answer about a video
+FAULTS = 3  # exit status: the input has faults, which standard output lists
+OF_LIBRARIES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_CACHE_DIR")
+
+
+def command(module: str, *arguments: str) -> list[str]:
+    """Return the command that runs ``module`` as a process."""
+    return [sys.executable, "-P", "-m", module, *arguments]
+
+
+def environment() -> dict[str, str]:
+    """Return the necessary part of the server's environment, which may contain secrets."""
+    return {name: os.environ[name] for name in (*ENVIRONMENT, *OF_LIBRARIES) if name in os.environ} | {
+        "PYTHONPATH": os.pathsep.join(filter(None, sys.path)),
+        # A video is one file: no other program opens it, and it refers to no other file or address.
+        "OPENCV_VIDEOIO_PRIORITY_LIST": "FFMPEG",
+        "OPENCV_FFMPEG_CAPTURE_OPTIONS": "protocol_whitelist;file",
+        "OPENCV_LOG_LEVEL": "OFF",
+        "OPENCV_FFMPEG_LOGLEVEL": "-8",
+    }
+
+
+def listed(error: DatasetError) -> list[list[str | None]]:
+    """Return the faults of ``error`` as JSON."""
+    return [[fault.where, fault.value, fault.message] for fault in error.errors]
+
+
+def error_of(faults: Sequence[Sequence[object]]) -> DatasetError:
+    """Return the error with the ``faults`` that a process listed; not trusted, converted to text."""
+    return DatasetError(
+        [Fault(str(where), None if value is None else str(value), str(text)) for where, value, text in faults]
+    )

@@ -1,0 +1,219 @@
+"""Routes that submit, list, fetch, watch, cancel and delete trackings of films, and return their tracks."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Query, Request
+from starlette.responses import FileResponse, HTMLResponse, Response
+
+from wingfit.client.answers import Page
+from wingfit.client.films import answers as a
+from wingfit.records import DatasetError
+from wingfit.service.container import DOWNLOAD_SLOT, Service, ServiceDep
+from wingfit.service.films import views
+from wingfit.service.films.description import write_description
+from wingfit.service.films.files import COVARIANCE, REPORT, TRACKS
+from wingfit.service.films.films import refused, require_opencv
+from wingfit.service.films.requests import TrackingIn
+from wingfit.service.http import csv_text
+from wingfit.service.http import responses as http
+from wingfit.service.http.problems import ProblemError, conflict, error_item, invalid
+from wingfit.service.routes.jobs import Actions, add_job_routes, load, submit_job
+from wingfit.service.runs.spec_views import LONGEST_NAME
+from wingfit.service.storage import store
+from wingfit.service.storage.tables import FilmRow, TrackedRow, TrackingRow
+from wingfit.workers import jobs
+
+router = APIRouter(prefix="/v1/trackings", tags=["trackings"])
+ARCHIVE = "application/octet-stream"
+# The figures of the report run scripts, which the sandbox keeps from the API: they have an origin of their own, and
+# load and send nothing.
+REPORT_HEADERS = {
+    "Content-Security-Policy": (
+        "default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval'; style-src 'unsafe-inline'; img-src data: blob:; "
+        "base-uri 'none'; form-action 'none'; frame-ancestors 'self'; sandbox allow-scripts allow-downloads"
+    ),
+    "X-Frame-Options": "SAMEORIGIN",
+}
+_EVENTS = """id: 12
+event: step
+data: {"sequence": 12, "stage": "detecting", "progress": 0.42, "elapsed_seconds": 31.5, "eta_seconds": 43.0}
+
+id: 12
+event: state
+data: {"id": "tk_9e0b6a7c1d2f3458", "state": "SUCCEEDED"}
+
+"""
+_ACTIONS: Actions = {"cancel": (jobs.Cancel(), "Cancel a tracking; if it is running, it ends within seconds.")}
+add_job_routes(router, "tracking", lambda service: service.tracking, a.Tracking, _ACTIONS, "step", _EVENTS)
+
+
+@router.post(
+    "",
+    status_code=202,
+    response_model=a.Tracking,
+    responses={202: {"headers": http.LOCATION}, **http.errors(409, 429, 501)},
+    summary="Submit a tracking",
+)
+def submit(request: Request, service: ServiceDep, body: TrackingIn, idempotency_key: http.RepeatKey = None) -> Response:
+    """Submit the tracking of the markers in a film, all of whose files are there; computed when its turn comes."""
+
+    def plan() -> TrackingRow:
+        require_opencv()
+        film = _film(service, body.film_id)
+        spec = _spec(service, body)
+        _check(service, film, spec)
+        row = TrackingRow(film_id=film.id, dataset_id=body.dataset_id, spec=spec)
+        row.name = (body.name or f"{film.name}, {body.kind}")[:LONGEST_NAME]
+        return row
+
+    return submit_job(request, service, service.tracking, idempotency_key, body, plan)
+
+
+@router.get("", response_model=Page[a.Tracking], responses=http.errors(), summary="List trackings")
+def list_trackings(
+    service: ServiceDep,
+    film_id: Annotated[str | None, Query(max_length=200)] = None,
+    state: jobs.State | None = None,
+    limit: http.Limit = 50,
+    cursor: http.Cursor = None,
+) -> Page[a.Tracking]:
+    """List trackings, newest first."""
+    with service.database.read() as session:
+        rows, following = store.page(session, TrackingRow, limit, cursor, film_id=film_id, state=state)
+    return {"items": [views.tracking(row) for row in rows], "next_cursor": following}
+
+
+@router.get(
+    "/{tracking_id}/result",
+    response_model=a.TrackingResult,
+    responses=http.errors(404, 409),
+    summary="Summary of the tracks",
+    dependencies=[DOWNLOAD_SLOT],
+)
+def result(service: ServiceDep, tracking_id: str, if_none_match: http.IfNoneMatch = None) -> Response:
+    """Return the summary of the tracks of a tracking that has succeeded, with some instants to look at."""
+    with service.database.read() as session:
+        _succeeded(store.one(session, TrackingRow, tracking_id))
+        found = session.get_one(TrackedRow, tracking_id)
+    return http.tagged(found.body, if_none_match)
+
+
+@router.get(
+    "/{tracking_id}/tracks.csv",
+    response_class=FileResponse,
+    responses={200: {"content": {csv_text.MEDIA_TYPE: {"schema": {"type": "string"}}}}, **http.errors(404, 409)},
+    summary="Tracks",
+    dependencies=[DOWNLOAD_SLOT],
+)
+def tracks(service: ServiceDep, tracking_id: str) -> Response:
+    """Return the tracks as CSV: `time_s`, and x, y, z of each marker (m), as 'wingfit track' writes them."""
+    path = _file(service, tracking_id, TRACKS)
+    return FileResponse(path, media_type=csv_text.MEDIA_TYPE, filename=f"{tracking_id}-{TRACKS}")
+
+
+@router.get(
+    "/{tracking_id}/covariance.npz",
+    response_class=FileResponse,
+    responses={
+        200: {"content": {ARCHIVE: {"schema": {"type": "string", "format": "binary"}}}},
+        **http.errors(404, 409),
+    },
+    summary="Covariances of the tracks",
+    dependencies=[DOWNLOAD_SLOT],
+)
+def covariance(service: ServiceDep, tracking_id: str) -> Response:
+    """Return the covariances of all places (m^2) as a NumPy archive: `names`, `times`, `covariance`."""
+    path = _file(service, tracking_id, COVARIANCE)
+    return FileResponse(path, media_type=ARCHIVE, filename=f"{tracking_id}-{COVARIANCE}")
+
+
+@router.get(
+    "/{tracking_id}/report.html",
+    response_class=HTMLResponse,
+    responses=http.errors(404, 409),
+    summary="Pictures of the tracks",
+    dependencies=[DOWNLOAD_SLOT],
+)
+def report(service: ServiceDep, tracking_id: str) -> Response:
+    """Return pictures of the tracks: one HTML file, with its scripts, without external resources."""
+    return FileResponse(_file(service, tracking_id, REPORT), media_type="text/html", headers=REPORT_HEADERS)
+
+
+def _film(service: Service, film_id: str) -> FilmRow:
+    """Return the film that the request names; a 422 if there is none, a 409 if files are not there."""
+    try:
+        with service.database.read() as session:
+            row = store.one(session, FilmRow, film_id)
+    except ProblemError as problem:
+        message = "there is no such film; GET /v1/films lists them"
+        raise invalid(problem.detail, [error_item("body.film_id", film_id, message)]) from None
+    if lacking := views.lacking(row, service.films.files):
+        raise conflict(
+            f"film {film_id} has not all its files on this server: {', '.join(lacking)}; upload each: "
+            f"PUT /v1/films/{film_id}/files/NAME"
+        )
+    return row
+
+
+def _spec(service: Service, body: TrackingIn) -> dict[str, Any]:
+    """Return the settings of a tracking, as its row stores them."""
+    if body.dataset_id is not None and body.places:
+        message = "name a dataset or give places of the markers, not both"
+        raise invalid("the markers have two places", [error_item("body.places", None, message)])
+    if body.last_frame is not None and body.last_frame <= body.first_frame:
+        message = f"must be more than first_frame, {body.first_frame}"
+        raise invalid("there is no frame to track", [error_item("body.last_frame", body.last_frame, message)])
+    if body.light == "strobe" and body.clocks_within_ms:
+        message = "with a strobe, its flashes show the clocks; leave it out"
+        raise invalid(
+            "the clocks are not needed", [error_item("body.clocks_within_ms", body.clocks_within_ms, message)]
+        )
+    spec = body.model_dump(include=set(a.TrackingSpec.__annotations__))
+    if body.dataset_id is not None:
+        spec["places"] = _places(service, body.dataset_id)
+    return spec
+
+
+def _places(service: Service, dataset_id: str) -> list[dict[str, Any]]:
+    dataset = load(service, dataset_id)
+    if dataset.kind != "tracks":
+        message = "describes a vehicle; name the dataset of a wing, or give places"
+        raise invalid("the dataset has no markers", [error_item("body.dataset_id", dataset_id, message)])
+    axes = ("x_m", "y_m", "z_m")
+    return [
+        {"marker": one.name, **dict(zip(axes, map(float, one.position), strict=True))} for one in dataset.wing.markers
+    ]
+
+
+def _check(service: Service, film: FilmRow, spec: dict[str, Any]) -> None:
+    """Raise a 422 if the description of the film cannot be read, such as for markers too near to each other."""
+    from wingfit.cameras.project import read_film
+
+    with TemporaryDirectory(prefix="wingfit-") as scratch:
+        try:
+            read_film(write_description(Path(scratch), film, spec, service.films.files))
+        except DatasetError as error:
+            raise refused("the film cannot be tracked so", error, "body.places") from None
+
+
+def _succeeded(row: TrackingRow) -> TrackingRow:
+    if row.state != jobs.State.SUCCEEDED:
+        raise conflict(f"tracking {row.id} is {row.state}; it has tracks when it has SUCCEEDED", state=row.state)
+    return row
+
+
+def _file(service: Service, tracking_id: str, name: str) -> Path:
+    """Return the path of a file with tracks; a 409 before the tracking has succeeded, and if the file is gone."""
+    with service.database.read() as session:
+        row = _succeeded(store.one(session, TrackingRow, tracking_id))
+    path = service.films.files.tracked(row.film_id, row.id) / name
+    if not path.is_file():
+        raise conflict(
+            f"{name} of tracking {tracking_id} is not on this server (backups hold no films and tracks): submit the "
+            f"tracking of film {row.film_id} again"
+        )
+    return path
