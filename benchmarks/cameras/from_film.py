@@ -16,7 +16,8 @@ from wingfit.cameras.calibrate.result import Calibration
 from wingfit.cameras.track.procedure import Request, track
 from wingfit.cameras.track.result import TrackedFilm
 from wingfit.cameras.video.source import Film
-from wingfit.records import Condition, Dataset, Recording, Wing
+from wingfit.records import Condition, Dataset, FrameError, Recording, Wing
+from wingfit.records.array_types import Array
 from wingfit.sim.virtual_rigs.campaign import robird_wing
 from wingfit.tracking.alignment import AlignedTracks, Known, Tracks, align, in_common_frame
 
@@ -47,7 +48,8 @@ def dataset_from_films(folder: Path, genes: Mapping[str, float], report: Report,
     tracks = [Tracks(f"film{k}", one.times, one.names, one.positions) for k, one in enumerate(films)]
     every = in_common_frame([align(one, wing, known) for one in tracks])
     recordings = tuple(_recording(one, condition) for one, condition in zip(every, CONDITIONS, strict=True))
-    return Dataset("films of a wing", wing, recordings, (recordings[HELD_OUT].name,))
+    frame = FrameError(_triple(every[0].rotation_error), _triple(every[0].origin_error))
+    return Dataset("films of a wing", wing, recordings, (recordings[HELD_OUT].name,), frame_error=frame)
 
 
 def _tracked(place: Path, wing: Wing, calibration: Calibration) -> TrackedFilm:
@@ -69,3 +71,8 @@ def _recording(aligned: AlignedTracks, condition: tuple[float, float]) -> Record
     values = aligned.positions.reshape(len(aligned.times), -1)
     known = Condition(aligned.flap_frequency, lag, pressure, KELVIN)
     return Recording(aligned.file, "vacuum_chamber", known, aligned.times, aligned.markers, values)
+
+
+def _triple(values: Array) -> tuple[float, float, float]:
+    x, y, z = values.tolist()
+    return x, y, z

@@ -25,6 +25,8 @@ def show(found: AlignedTracks, *, is_true: bool) -> None:
     origin = ", ".join(f"{1e3 * value:.2f}" for value in found.origin)
     errors = ", ".join(f"{1e3 * value:.2f}" for value in found.origin_error)
     say(f"origin in the tracks: {origin} mm; standard errors along wing x, y, z: {errors} mm")
+    turns, moves = (", ".join(f"{value:.3g}" for value in one) for one in (turned, found.origin_error))
+    say(f"for the dataset: frame_error: {{rotation_deg: [{turns}], origin_m: [{moves}]}}")
     say(f"side: {found.side}, {_evidence(found.side_evidence)}")
     where = "on the clock of the cameras" if is_true else "as it appears in the frames"
     period = f"{number(found.flap_frequency, 7)} Hz {where}"
