@@ -9,6 +9,7 @@ from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
+from wingfit.client import private_files
 from wingfit.records.description.yaml_text import write_yaml
 from wingfit.service.films.files import FilmFiles
 from wingfit.service.films.requests import CALIBRATION
@@ -26,7 +27,7 @@ def write_description(folder: Path, row: FilmRow, spec: Mapping[str, Any], files
     named = {name: str(files.video(row.id, file).resolve()) for name, file in uploaded(row).items()}
     markers: dict[str, Any] = {"kind": spec["kind"]}
     if spec["places"]:
-        (folder / PLACES).write_text(_table(spec["places"]), encoding="utf-8", newline="")
+        _write(folder / PLACES, _table(spec["places"]))
         markers["places"] = PLACES
     data = {
         "format": "wingfit film",
@@ -41,8 +42,13 @@ def write_description(folder: Path, row: FilmRow, spec: Mapping[str, Any], files
     if spec["last_frame"] is not None:
         data["last_frame"] = spec["last_frame"]
     path = folder / DESCRIPTION
-    path.write_text(write_yaml(data), encoding="utf-8")
+    _write(path, write_yaml(data))
     return path
+
+
+def _write(path: Path, text: str) -> None:
+    with private_files.open_new(path) as stream:
+        stream.write(text.encode())
 
 
 def _film(path: str, rate_hz: float | None) -> dict[str, Any]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
 from wingfit.client.films.answers import Light, MarkerKind
@@ -50,6 +50,16 @@ class FilmIn(BaseModel):
         dict[CameraName, Rate],
         Field(max_length=MOST_CAMERAS, description="frames per second, where a video states that of playback"),
     ] = {}
+
+    @field_validator("rate_hz")
+    @classmethod
+    def _of_cameras(cls, rates: dict[str, float], info: ValidationInfo) -> dict[str, float]:
+        cameras = info.data.get("cameras")
+        other = next((name for name in rates if cameras and name not in cameras), None)
+        if other is not None:
+            listed = {"name": other, "cameras": ", ".join(cameras or ())}
+            raise PydanticCustomError("unknown", "there is no camera '{name}', but {cameras}", listed)
+        return rates
 
 
 class MarkerIn(BaseModel):

@@ -62,9 +62,9 @@ def submit(request: Request, service: ServiceDep, body: TrackingIn, idempotency_
     """Submit the tracking of the markers in a film, all of whose files are there; computed when its turn comes."""
 
     def plan() -> TrackingRow:
-        require_opencv()
         film = _film(service, body.film_id)
         spec = _spec(service, body)
+        require_opencv()
         _check(service, film, spec)
         row = TrackingRow(film_id=film.id, dataset_id=body.dataset_id, spec=spec)
         row.name = (body.name or f"{film.name}, {body.kind}")[:LONGEST_NAME]
