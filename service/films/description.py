@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from decimal import Decimal
 from pathlib import Path
 from typing import Any
@@ -16,18 +16,18 @@ from wingfit.service.films.requests import CALIBRATION
 from wingfit.service.films.views import uploaded
 from wingfit.service.storage.tables import FilmRow
 
-DESCRIPTION, PLACES = "film.yaml", "markers.csv"
+DESCRIPTION, PLACES, LABELS = "film.yaml", "markers.csv", "labels.csv"
 
 
 def write_description(folder: Path, row: FilmRow, spec: Mapping[str, Any], files: FilmFiles) -> Path:
-    """Write ``film.yaml`` into ``folder``, with the places of the markers beside it; return its path.
+    """Write ``film.yaml`` into ``folder``, with the tables that it names beside it; return its path.
 
     ``row``: the film, all of whose files are there; ``spec``: settings of a tracking.
     """
     named = {name: str(files.video(row.id, file).resolve()) for name, file in uploaded(row).items()}
     markers: dict[str, Any] = {"kind": spec["kind"]}
     if spec["places"]:
-        _write(folder / PLACES, _table(spec["places"]))
+        _write(folder / PLACES, _table(("marker", "x_m", "y_m", "z_m"), spec["places"]))
         markers["places"] = PLACES
     data = {
         "format": "wingfit film",
@@ -41,6 +41,9 @@ def write_description(folder: Path, row: FilmRow, spec: Mapping[str, Any], files
     }
     if spec["last_frame"] is not None:
         data["last_frame"] = spec["last_frame"]
+    if spec["labels"]:
+        _write(folder / LABELS, _table(("camera", "frame", "marker", "x_px", "y_px"), spec["labels"]))
+        data["labels"] = LABELS
     path = folder / DESCRIPTION
     _write(path, write_yaml(data))
     return path
@@ -55,9 +58,12 @@ def _film(path: str, rate_hz: float | None) -> dict[str, Any]:
     return {"path": path} if rate_hz is None else {"path": path, "rate_hz": Decimal(repr(rate_hz))}
 
 
-def _table(places: list[dict[str, Any]]) -> str:
+def _table(columns: Sequence[str], rows: Sequence[Mapping[str, Any]]) -> str:
+    """Return ``rows`` as CSV, numbers in full precision."""
     text = io.StringIO()
-    rows = csv.writer(text)
-    rows.writerow(["marker", "x_m", "y_m", "z_m"])
-    rows.writerows([one["marker"], *(repr(float(one[f"{axis}_m"])) for axis in "xyz")] for one in places)
+    table = csv.writer(text)
+    table.writerow(columns)
+    table.writerows(
+        [repr(value) if isinstance(value, float) else value for value in map(row.get, columns)] for row in rows
+    )
     return text.getvalue()

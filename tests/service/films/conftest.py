@@ -12,7 +12,7 @@ import pytest
 from tests.service.conftest import Api, toy_service
 from tests.service.films.films import CAMERAS, FRAMES, uploaded, write_video, write_videos
 
-REPEATED = 20
+REPEATED = 6
 
 
 @pytest.fixture(scope="session")

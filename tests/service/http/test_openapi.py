@@ -19,6 +19,7 @@ from wingfit.records import Dataset
 from wingfit.records.files.netcdf import write_netcdf
 from wingfit.service.diagnoses.requests import DiagnosisIn
 from wingfit.service.examples import EXAMPLES
+from wingfit.service.films.requests import FilmIn, TrackingIn
 from wingfit.service.outcomes.requests import LoadsIn, PredictionIn, SimulationIn
 from wingfit.service.runs.requests import Method, Mode, RunIn
 from wingfit.sim.virtual_rigs.balance import delfly
@@ -134,7 +135,7 @@ def test_every_call_is_in_the_documentation_and_every_documented_one_exists(spec
     text = DOCS.read_text()
     documented = {
         (method, re.sub(r"{\w+}", "{}", path.split("?")[0]))
-        for method, path in re.findall(r"`(GET|POST|DELETE) (/v1/[^`\s]*)", text)
+        for method, path in re.findall(r"`(GET|POST|PUT|DELETE) (/v1/[^`\s]*)", text)
     }
     for action in ("pause", "resume"):
         assert f"(`/{action}`" in text.replace(", `/", "`(`/") or f"/{action}" in text
@@ -155,6 +156,8 @@ def test_every_call_is_in_the_documentation_and_every_documented_one_exists(spec
         LoadsIn,
         PredictionIn,
         DiagnosisIn,
+        FilmIn,
+        TrackingIn,
     ],
 )
 def test_examples_of_requests_are_valid(model: type[BaseModel]) -> None:
