@@ -40,7 +40,7 @@ class LabelIn(BaseModel):
 
     camera: CameraName
     frame: Frame
-    marker: Annotated[str, Field(pattern=r"^[A-Za-z0-9_.-]{1,64}$")]
+    marker: Annotated[Title, Field(max_length=100)]
     x_px: Number
     y_px: Number
 

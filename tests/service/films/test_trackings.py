@@ -12,15 +12,28 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.cameras.films import cameras, wing
 from tests.command_line import in_process
 from tests.service.conftest import Api, toy_service
-from tests.service.films.films import FRAMES, MARKERS, NAMES, ended, new_film, processes_of, put, submitted, uploaded
+from tests.service.films.films import (
+    FRAMES,
+    MARKERS,
+    NAMES,
+    RATE,
+    ended,
+    new_film,
+    processes_of,
+    put,
+    submitted,
+    uploaded,
+)
 from tests.service.shapes import valid
 from wingfit.cli.main import app
 from wingfit.client.films.answers import Film, Tracking, TrackingResult, TrackingStep
 from wingfit.client.transport import parse_events
 
 wingfit = in_process(app)
+LABEL = {"camera": "left", "frame": 0, "marker": "m00", "x_px": 100.0, "y_px": 100.0}
 
 
 @pytest.fixture(scope="module")
@@ -117,6 +130,11 @@ def test_damaged_detections_are_made_anew(served: Api, data: Path, film: str, do
         ({"places": [MARKERS[0], *MARKERS]}, "body.places", "two markers have the name 'm00'"),
         ({"places": [one | {"z_m": 1000.0 * k} for k, one in enumerate(MARKERS)]}, "body.places", "in metres"),
         ({"places": [{**MARKERS[0], "w_m": 1.0}]}, "body.places.0.w_m", "not permitted"),
+        ({"labels": [LABEL | {"camera": "top"}]}, "body.labels.0", "unknown camera 'top'"),
+        ({"labels": [LABEL, LABEL | {"marker": "m99"}]}, "body.labels.1", "unknown marker 'm99'"),
+        ({"labels": [LABEL | {"x_px": 320.0}]}, "body.labels.0", "outside the image of 320 x 240 px"),
+        ({"labels": [LABEL]}, "body.labels", "0 markers are labelled in two cameras"),
+        ({"labels": [LABEL | {"frame": -1}]}, "body.labels.0.frame", "greater than or equal to 0"),
         ({"lihgt": "strobe"}, "body.lihgt", "not permitted"),
     ],
 )  # fmt: skip
@@ -129,6 +147,27 @@ def test_a_tracking_that_cannot_be_is_refused(
     (error,) = answer.json()["errors"]
     assert error["where"] == where
     assert words in error["message"]
+
+
+def test_labels_name_markers(served: Api, film: str, folder: Path, tmp_path: Path) -> None:
+    """As in the command: eight markers without known places, named in frame 5 of both cameras."""
+    labels = [
+        {"camera": camera.name, "frame": 5, "marker": f"tip{k}", "x_px": float(x), "y_px": float(y)}
+        for camera in cameras()
+        for k, (x, y) in enumerate(camera.project(wing(5 / RATE))[:8])
+    ]
+    done = ended(served, submitted(served, film, places=[], labels=labels)["id"])
+    assert (done["state"], done["error"]) == ("SUCCEEDED", None)
+    assert len(done["spec"]["labels"]) == 16
+    tracks = served.client.get(f"/v1/trackings/{done['id']}/tracks.csv")
+    rows = [f"{one['camera']},5,{one['marker']},{one['x_px']!r},{one['y_px']!r}" for one in labels]
+    (folder / "labels.csv").write_text("\n".join(["camera,frame,marker,x_px,y_px", *rows]) + "\n")
+    text = (folder / "film.yaml").read_text().replace("  places: markers.csv\n", "") + "labels: labels.csv\n"
+    (folder / "labelled.yaml").write_text(text)
+    code, _, err = wingfit("track", folder / "labelled.yaml", "-o", tmp_path / "tracks.csv")
+    assert code == 0, err
+    assert tracks.content == (tmp_path / "tracks.csv").read_bytes()
+    assert tracks.text.startswith("time_s,tip0_x_m,")
 
 
 def test_the_markers_of_a_wing_are_those_of_its_dataset(served: Api, film: str) -> None:
