@@ -227,12 +227,12 @@ def read_calibration(path: Path) -> CameraSet:
 
 def _check_has(row: FilmRow, found: CameraSet) -> None:
     names = [camera.name for camera in found.cameras]
-    lacking = [camera["name"] for camera in row.cameras if camera["name"] not in names]
-    if lacking:
+    unknown = [camera["name"] for camera in row.cameras if camera["name"] not in names]
+    if unknown:
         raise fail(
             "cameras.yaml",
-            lacking[0],
-            f"has no camera {lacking[0]!r}, but {', '.join(names)}; upload the file with all cameras of the film",
+            unknown[0],
+            f"has no camera {unknown[0]!r}, but {', '.join(names)}; upload the file with all cameras of the film",
         )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import shutil
 import socket
 import time
 from collections.abc import Iterator
@@ -234,9 +235,9 @@ def test_the_database_keeps_room_on_the_disk(
     served: Api, data: Path, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     film, video = new_film(served)["id"], (folder / "left.avi").read_bytes()
-    usage = film_files.shutil.disk_usage(data)
+    usage = shutil.disk_usage(data)
     left = film_files.RESERVED_MIB * 2**20 + len(video) // 2
-    monkeypatch.setattr(film_files.shutil, "disk_usage", lambda _: usage._replace(free=left))
+    monkeypatch.setattr("shutil.disk_usage", lambda _: usage._replace(free=left))
     answer = put(served.client, film, "left", video)
     assert (answer.status_code, answer.json()["type"]) == (507, "urn:wingfit:problem:disk-full")
     assert "has no room for the file" in answer.json()["detail"]
