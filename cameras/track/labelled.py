@@ -13,7 +13,7 @@ from wingfit.cameras.track.cloud import Cloud
 from wingfit.cameras.track.instants import Instants
 from wingfit.cameras.track.labels import LEAST_LABELLED, too_few
 from wingfit.cameras.track.reference import reference_with, unused
-from wingfit.cameras.track.registration import Deformed, assign, deformed, rigid, spacing, surface_of
+from wingfit.cameras.track.registration import Deformed, assign, deformed, kabsch, spacing, surface_of
 from wingfit.cameras.triangulation import triangulate
 from wingfit.records.array_types import Array, Float, Index, Mask
 from wingfit.records.errors import Faults, fail
@@ -193,13 +193,10 @@ def _most_agreed(reference: Float[Array, "N 3"], places: Float[Array, "N 3"], ha
     triples = np.array([*combinations(range(len(reference)), 3)])
     if len(triples) > _TRIPLES:
         triples = triples[np.random.default_rng(0).choice(len(triples), _TRIPLES, replace=False)]
-    best, least = reference, np.inf
-    for triple in triples:
-        moved = rigid(reference[triple], places[triple], reference)
-        cost = float(np.minimum(np.linalg.norm(moved - places, axis=1) / half, 1.0).sum())
-        if cost < least:
-            best, least = moved, cost
-    return best
+    rotations, moves = kabsch(reference[triples], places[triples])
+    moved = reference @ np.swapaxes(rotations, 1, 2) + moves[:, None]
+    cost = np.minimum(np.linalg.norm(moved - places, axis=2) / half, 1.0).sum(1)
+    return np.asarray(moved[int(cost.argmin())])
 
 
 def completed(reference: Float[Array, "K 3"], cloud: Cloud, fixed: Index) -> tuple[Index, Float[Array, "K 3"]]:

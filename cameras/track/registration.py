@@ -109,11 +109,12 @@ def _prior(plane: Float[Array, "K 2"], length: float, smooth: float) -> Float[Ar
 
 def rigid(source: Array, target: Array, points: Array) -> Float[Array, "K 3"]:
     """Return ``points`` after the rigid motion that best takes ``source`` to ``target`` (Kabsch 1976)."""
-    rotation, move = _kabsch(source[None], target[None])
+    rotation, move = kabsch(source[None], target[None])
     return np.asarray(points @ rotation[0].T + move[0])
 
 
-def _kabsch(source: Float[Array, "H N 3"], target: Float[Array, "H N 3"]) -> tuple[Array, Array]:
+def kabsch(source: Float[Array, "H N 3"], target: Float[Array, "H N 3"]) -> tuple[Array, Array]:
+    """Return rotations [H, 3, 3] and moves [H, 3] that best take ``source`` to ``target`` (Kabsch 1976)."""
     a, b = source.mean(1), target.mean(1)
     covariance = np.einsum("hni,hnj->hij", target - b[:, None], source - a[:, None])
     u, _, vt = np.linalg.svd(covariance)
@@ -220,7 +221,7 @@ def _hypotheses(reference: Array, points: Array, size: float, random: np.random.
             picked = random.choice(len(pair), _HYPOTHESES // 20, replace=False)
             pair, three = pair[picked], three[picked]
         target = points[np.stack([one[pair], two[pair], three], axis=1)]
-        rotations, moves = _kabsch(np.broadcast_to(reference[triple], target.shape), target)
+        rotations, moves = kabsch(np.broadcast_to(reference[triple], target.shape), target)
         found.extend(zip(rotations, moves, strict=True))
         if len(found) > _HYPOTHESES:
             break

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import cv2
 import httpx
 
-from tests.cameras.films import FRAMES, NAMES, PLACES, RATE, SIZE, write_film
+from tests.cameras.films import FRAMES, NAMES, PLACES, RATE, write_film
 from tests.service.conftest import FINAL, Api, Json
-from wingfit.records.array_types import Array
 
 CAMERAS = ("left", "right")
 MARKERS = [
@@ -32,7 +32,7 @@ def write_videos(folder: Path, frames: int = FRAMES) -> Path:
     return folder
 
 
-def write_video(path: Path, images: list[Array], codec: str = "MJPG") -> None:
+def write_video(path: Path, images: Sequence[Any], codec: str = "MJPG") -> None:
     height, width = images[0].shape[:2]
     video = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*codec), RATE, (width, height))
     for image in images:
@@ -76,4 +76,17 @@ def ended(api: Api, tracking_id: str, seconds: float = 60.0) -> Json:
     return job
 
 
-__all__ = ["CAMERAS", "FRAMES", "MARKERS", "NAMES", "SIZE"]
+def processes_of(film_id: str) -> list[int]:
+    """The processes that track the film."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*/cmdline"):
+        try:
+            command = path.read_bytes()
+        except OSError:  # it has ended
+            continue
+        if b"tracking_process" in command and film_id.encode() in command:
+            found.append(int(path.parent.name))
+    return found
+
+
+__all__ = ["CAMERAS", "FRAMES", "MARKERS", "NAMES", "RATE"]
