@@ -12,7 +12,9 @@ import numpy as np
 from wingfit.cameras.files.keys import mapping_at, value_at
 from wingfit.cameras.files.read import read_cameras
 from wingfit.cameras.track.film_detections import Light, MarkerKind
-from wingfit.cameras.track.procedure import LEAST_MARKERS, Request
+from wingfit.cameras.track.labels import Label, read_labels
+from wingfit.cameras.track.procedure import Request
+from wingfit.cameras.track.reference import LEAST_MARKERS
 from wingfit.cameras.video.source import Film
 from wingfit.records.array_types import Array
 from wingfit.records.description.wing_description import read_wing
@@ -25,7 +27,7 @@ FORMAT, VERSION = "wingfit film", 1
 MOST_CAMERAS = 8
 MOST_WITHIN_MS = 1000.0
 _KEYS = ("format", "version", "cameras", "films", "markers", "light")
-_OPTIONAL = ("clocks_within_ms", "first_frame", "last_frame")
+_OPTIONAL = ("clocks_within_ms", "first_frame", "last_frame", "labels")
 
 
 def read_film(path: Path, store: Path | None = None) -> Request:
@@ -77,6 +79,7 @@ class _Reader:
             first=first,
             last=last,
             store=store,
+            labels=self._labels(),
         )
 
     def _films(self, cameras: list[str]) -> dict[str, Film]:
@@ -117,6 +120,12 @@ class _Reader:
         if not 1e-3 < size < 20:
             raise fail(where, f"{size:g}", f"the markers extend over {size:g} m; give their places in metres")
         return names, places
+
+    def _labels(self) -> tuple[Label, ...]:
+        if "labels" not in self.data:
+            return ()
+        path = self._file(("labels",))
+        return read_labels(_bytes(path), path.name)
 
     def _file(self, path: tuple[str, ...]) -> Path:
         value = value_at(self.document, path)

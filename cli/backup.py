@@ -15,6 +15,8 @@ from wingfit.client.client import DEFAULT_URL, Client, WingfitError
 if TYPE_CHECKING:
     from wingfit.service.storage.backup_contents import Contents
 
+HELD = ("datasets", "runs", "diagnoses", "films", "trackings")
+
 
 def backup(
     file: Annotated[Path, typer.Argument(help="File to write, e.g. wings.sqlite3.")],
@@ -24,7 +26,7 @@ def backup(
     force: Annotated[bool, typer.Option("--force", help="Overwrite FILE.")] = False,
     url: Url = DEFAULT_URL,
 ) -> None:
-    """Copy all datasets, runs, diagnoses and keys into one file, while the server continues to work.
+    """Copy the database into one file, while the server continues to work: all but the files of films.
 
     Example: wingfit backup wings.sqlite3
     """
@@ -68,6 +70,8 @@ def restore(
         raise WingfitError("nothing was restored", str(error)) from None
     _list(brought)
     note(_about_keys(len(brought.keys), data, keep_keys))
+    if films := sum(one.films for one in brought.owners):
+        note(f"{films} film(s) came without their videos, which no backup has: copy the folder films of the old server")
     note(f"restored into {data}; start it: wingfit serve --data {data}")
 
 
@@ -77,10 +81,10 @@ def _list(brought: Contents) -> None:
     table(["id", "name", "owner", "scopes", "created"], keys)
     say("owners of its data:")
     owners = [
-        ["(no key)" if one.owner is None else one.owner, one.datasets, one.runs, one.diagnoses]
+        ["(no key)" if one.owner is None else one.owner, *(getattr(one, what) for what in HELD)]
         for one in brought.owners
     ]
-    table(["owner", ">datasets", ">runs", ">diagnoses"], owners, "none: there is no data")
+    table(["owner", *(f">{what}" for what in HELD)], owners, "none: there is no data")
 
 
 def _about_keys(count: int, data: Path, keep_keys: bool) -> str:

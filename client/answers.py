@@ -387,7 +387,7 @@ class Simulation(Comparison):
 
 
 class Event(TypedDict):
-    """A server-sent event: "generation" (of a run), "step" (of a diagnosis) or "state" (``data``: the whole job)."""
+    """A server-sent event: "generation" (of a run), "step" (of another job) or "state" (``data``: the whole job)."""
 
     id: str | None
     event: str

@@ -26,6 +26,7 @@ from wingfit.client.diagnosis_client import DiagnosisCalls
 from wingfit.client.drive_client import DriveCalls
 from wingfit.client.effect_answers import Effect
 from wingfit.client.export_answers import Format
+from wingfit.client.films.calls import FilmCalls
 from wingfit.client.importing.calls import ImportCalls
 from wingfit.client.key_client import KeyCalls
 from wingfit.client.load_answers import Loads
@@ -46,7 +47,7 @@ __all__ = ["DEFAULT_URL", "Client", "ServerAwayError", "WingfitError"]
 OnRun = Callable[[a.Run], None]
 
 
-class Client(DiagnosisCalls, DriveCalls, ImportCalls, KeyCalls):
+class Client(DiagnosisCalls, DriveCalls, FilmCalls, ImportCalls, KeyCalls):
     """Sends requests to one server and returns the answers; a context manager, at whose end the connections close."""
 
     def health(self) -> a.Health:

@@ -1,4 +1,4 @@
-"""Follows a run or diagnosis by its server-sent events until it ends, reconnecting if the connection is lost."""
+"""Follows a job by its server-sent events until it ends, reconnecting if the connection is lost."""
 
 from __future__ import annotations
 
@@ -8,9 +8,10 @@ from typing import Any, TypeVar, cast
 
 from wingfit.client import answers as a
 from wingfit.client.diagnosis_answers import Diagnosis
+from wingfit.client.films.answers import Tracking
 from wingfit.client.transport import ServerAwayError, Transport, WingfitError, is_passing
 
-JobT = TypeVar("JobT", a.Run, Diagnosis)
+JobT = TypeVar("JobT", a.Run, Diagnosis, Tracking)
 
 # Event that reports a finished step: the field of a job that counts such steps.
 COUNTS = {"generation": "generations", "step": "steps"}
@@ -18,7 +19,7 @@ UPDATED = ("stage", "progress", "eta_seconds", "best_mm", "best_mn", "best_perce
 
 
 class Watching(Transport):
-    """Base class of the client: follows jobs (runs and diagnoses), given by their URL paths, e.g. ``/v1/runs/ID``."""
+    """Base class of the client: follows jobs, given by their URL paths, e.g. ``/v1/runs/ID``."""
 
     def _events(self, path: str, last_event_id: str | None, patience_s: float) -> Iterator[a.Event]:
         """Yield the events after ``last_event_id`` (None: all) of the job at ``path`` until the job has ended.

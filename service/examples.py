@@ -7,10 +7,12 @@ from collections.abc import Mapping
 from wingfit.calibration.spec import CalibrationSpec
 from wingfit.client.answers import Dataset, Job, Problem, RecordingInfo, Run
 from wingfit.client.diagnosis_answers import Diagnosis
+from wingfit.client.films.answers import Film, Tracking
 from wingfit.client.key_answers import Key, NewKey, Session
 from wingfit.diagnosis.spec import DiagnosisSpec
 from wingfit.service.auth.key_schemas import SECRET
 from wingfit.service.diagnoses.views import diagnosis_settings
+from wingfit.service.films.requests import FILM_ID
 from wingfit.service.outcomes.requests import RECORDING
 from wingfit.service.runs.requests import DATASET_ID
 from wingfit.service.runs.spec_views import run_settings
@@ -83,6 +85,44 @@ _DIAGNOSIS: Diagnosis = {
     "verdict": None,
     "summary": None,
 }
+_FILM: Film = {
+    "id": FILM_ID,
+    "name": "run 3",
+    "created_at": "2026-11-05T09:30:00.000000Z",
+    "cameras": [
+        {"name": name, "bytes": 48_120_331, "frames": 3100, "width_px": 1920, "height_px": 1080, "rate_hz": 100.0}
+        for name in ("left", "right")
+    ],
+    "calibration": True,
+    "ready": True,
+    "missing": [],
+    "size_bytes": 96_240_662,
+}
+_TRACKING: Tracking = {
+    "id": "tk_9e0b6a7c1d2f3458",
+    "name": "run 3, chequer",
+    "film_id": FILM_ID,
+    "dataset_id": None,
+    "spec": {
+        "kind": "chequer",
+        "light": "strobe",
+        "clocks_within_ms": 0.0,
+        "first_frame": 0,
+        "last_frame": None,
+        "places": [{"marker": "m01", "x_m": 0.02, "y_m": 0.11, "z_m": 0.0}],
+        "labels": [],
+    },
+    "state": "RUNNING",
+    "stage": "detecting",
+    "progress": 0.42,
+    "eta_seconds": 43.0,
+    "created_at": "2026-11-05T09:31:00.000000Z",
+    "started_at": "2026-11-05T09:31:00.120000Z",
+    "finished_at": None,
+    "pending_action": None,
+    "steps": 61,
+    "error": None,
+}
 _PROBLEM: Problem = {
     "type": "urn:wingfit:problem:invalid",
     "title": "Unprocessable Entity",
@@ -105,6 +145,8 @@ EXAMPLES: Mapping[type, Mapping[str, object]] = {
     Dataset: _DATASET,
     Run: _RUN,
     Diagnosis: _DIAGNOSIS,
+    Film: _FILM,
+    Tracking: _TRACKING,
     Problem: _PROBLEM,
     Key: _KEY,
     NewKey: _NEW_KEY,

@@ -6,7 +6,7 @@ the wing since then, and this predicts the markers again, also those that were n
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,11 +30,16 @@ class Followed:
         chosen: [T, K], index of a point of the cloud, -1 where a marker was not found.
         predicted: [T, K, 3] (m), where the smooth motion of the wing places the markers; NaN at instants that are lost.
         start: the instant at which the markers were identified first.
+        again: instants at which the wing was found again, after others at which it was lost.
+        renamed: instants at which markers were followed to other points than those that are known there, and these
+            markers.
     """
 
     chosen: Index
     predicted: Float[Array, "T K 3"]
     start: int
+    again: tuple[int, ...]
+    renamed: Mapping[int, tuple[int, ...]]
 
 
 def follow(
@@ -42,15 +47,22 @@ def follow(
     reference: Float[Array, "K 3"],
     surface: Surface,
     progress: Progress,
+    known: Mapping[int, tuple[Index, Array]] | None = None,
 ) -> Followed | None:
     """Identify the markers in the ``clouds`` of all instants; None if the wing is seen in none of those tried.
 
     ``reference`` are the markers in any axes, for example at rest. ``progress`` is called with the count of instants
-    done, and of all.
+    done, and of all. ``known`` are instants at which they are identified, with the index [K] of the point of each
+    marker and where the markers are predicted; there the wing is not sought.
     """
-    start, found = _start(clouds, reference)
-    if found is None:
-        return None
+    known = known or {}
+    start = min(known) if known else None
+    if start is None:
+        start, found = _start(clouds, reference)
+        if found is None:
+            return None
+    else:
+        found = known[start]
     state = _State(clouds, surface, reference)
     state.put(start, *found)
     done = 1
@@ -58,9 +70,11 @@ def follow(
         state.restart(start)
         for instant in range(start + direction, len(clouds) if direction > 0 else -1, direction):
             state.step(instant)
+            if instant in known:
+                state.correct(instant, *known[instant])
             done += 1
             progress(done, len(clouds))
-    return Followed(state.chosen, state.predicted, start)
+    return Followed(state.chosen, state.predicted, start, tuple(sorted(state.again)), state.renamed)
 
 
 def _start(clouds: Sequence[Cloud], reference: Float[Array, "K 3"]) -> tuple[int, tuple[Index, Array] | None]:
@@ -86,12 +100,15 @@ class _State:
         self.clouds, self.surface, self.reference = clouds, surface, reference
         count = len(reference)
         # Errors of predictions are not all alike; a search that is narrower than this loses markers, and gains nothing.
-        self.least = _NARROWEST * spacing(reference)
+        self.spacing = spacing(reference)
+        self.least = _NARROWEST * self.spacing
         self.chosen = np.full((len(clouds), count), -1)
         self.predicted = np.full((len(clouds), count, 3), np.nan)
         self.places = np.full((len(clouds), count, 3), np.nan)
         self.known: list[int] = []
         self.error = np.inf
+        self.again: list[int] = []
+        self.renamed: dict[int, tuple[int, ...]] = {}
 
     def restart(self, instant: int) -> None:
         """Go on from ``instant`` alone."""
@@ -102,6 +119,21 @@ class _State:
         found = chosen >= 0
         self.chosen[instant], self.predicted[instant] = chosen, smooth
         self.places[instant] = np.where(found[:, None], self.clouds[instant].positions[chosen], smooth)
+
+    def correct(self, instant: int, chosen: Index, smooth: Float[Array, "K 3"]) -> None:
+        """Replace what was followed to ``instant`` by what is known there; if they differ, go on from that alone."""
+        followed, cloud = self.chosen[instant].copy(), self.clouds[instant]
+        both = (followed >= 0) & (chosen >= 0)
+        apart = np.linalg.norm(cloud.positions[followed] - cloud.positions[chosen], axis=1)
+        other = np.flatnonzero(both & (apart > self.spacing / 2))
+        if len(other):
+            self.renamed[instant] = tuple(int(marker) for marker in other)
+        if len(other) or self.known[-1] != instant:
+            self.put(instant, chosen, smooth)
+            self.restart(instant)
+        else:
+            free = np.where(np.isin(followed, chosen), -1, followed)
+            self.put(instant, np.where(chosen >= 0, chosen, free), smooth)
 
     def step(self, instant: int) -> None:
         """Identify the markers at ``instant`` from those of the instants before."""
@@ -114,6 +146,8 @@ class _State:
                 found = again
         if found is None or (found[0] >= 0).sum() < _LEAST_MARKERS:
             return
+        if abs(instant - self.known[-1]) > 1:
+            self.again.append(instant)
         self.put(instant, *found)
         self._learn(instant)
 
@@ -171,7 +205,8 @@ class _State:
 
     def _anew(self, cloud: Cloud) -> tuple[Index, Array] | None:
         """Return the identification by the shape at the last instant, wherever the wing is now."""
-        chosen, smooth = register(self.places[self.known[-1]], cloud.positions, cloud.points.covariance)
+        last = self.places[self.known[-1]]
+        chosen, smooth = register(last, cloud.positions, cloud.points.covariance, nearby=True)
         return (chosen, smooth) if (chosen >= 0).any() else None
 
     def _learn(self, instant: int) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +11,8 @@ from wingfit.cameras.camera import Camera
 from wingfit.cameras.markers.detections import Detections
 from wingfit.cameras.track.cloud import possible_points
 from wingfit.cameras.track.film_detections import FilmDetections
+from wingfit.cameras.track.labels import Spot
+from wingfit.cameras.track.named import Clock, Named, named_flashes, named_frames
 from wingfit.cameras.track.synchronise import Offset, common_times, offset_between
 from wingfit.cameras.track.tracklets import at_time, join
 from wingfit.cameras.video.source import Frames
@@ -32,18 +34,29 @@ class Instants:
         seen: of each instant, of each camera.
         frames: [T, C], number of the first frame of each camera that shows the instant; -1 if there is none.
         remarks: what was estimated or is doubtful.
+        named: of each labelled instant, of each camera: the index of the detection of each labelled marker.
     """
 
     times: Float[Array, " T"]
     seen: list[tuple[Detections, ...]]
     frames: Array
     remarks: tuple[str, ...]
+    named: Mapping[int, Named]
+
+    def shown(self, instant: int, cameras: Sequence[str]) -> str:
+        """Return the frames of the ``cameras`` that show the ``instant``, as text."""
+        pairs = zip(cameras, self.frames[instant], strict=True)
+        return ", ".join(f"frame {frame} of {name}" for name, frame in pairs)
 
 
 def flash_instants(
-    cameras: Sequence[Camera], films: Sequence[Frames], found: Sequence[FilmDetections], tolerance_px: float
+    cameras: Sequence[Camera],
+    films: Sequence[Frames],
+    found: Sequence[FilmDetections],
+    tolerance_px: float,
+    labelled: Sequence[Spot] = (),
 ) -> Instants:
-    """Return the flashes that all cameras saw, matched by where their rays meet best."""
+    """Return the flashes that all cameras saw, matched by where their rays meet best, and what is ``labelled``."""
     timed = [
         flash_times(one.marks, frames, camera.row_s or None)
         for camera, frames, one in zip(cameras, films, found, strict=True)
@@ -67,11 +80,13 @@ def flash_instants(
     if lost:
         remarks.append(f"{lost} of {len(index[0])} flashes were not seen by all cameras, and are left out")
     rows = [[one[number] for one in index] for number in common]
+    instant_of = [{row[camera]: instant for instant, row in enumerate(rows)} for camera in range(len(cameras))]
     return Instants(
         times=np.array([timed[0].times[row[0]] for row in rows]),
         seen=[tuple(one.seen[k] for one, k in zip(found, row, strict=True)) for row in rows],
         frames=np.array([[one.marks[k].frame for one, k in zip(found, row, strict=True)] for row in rows]),
         remarks=tuple(remarks),
+        named=named_flashes(labelled, instant_of),
     )
 
 
@@ -118,10 +133,11 @@ def frame_instants(
     found: Sequence[FilmDetections],
     tolerance_px: float,
     within_s: float,
+    labelled: Sequence[Spot] = (),
 ) -> Instants:
     """Return the detections at the times of the first camera's frames; clocks up to ``within_s`` apart are compared.
 
-    With ``within_s`` zero the cameras are synchronised.
+    With ``within_s`` zero the cameras are synchronised. What is ``labelled`` is found again at the instants.
     """
     times = [
         np.array([one.frame for one in of.marks]) / frames.rate_hz for of, frames in zip(found, films, strict=True)
@@ -150,7 +166,12 @@ def frame_instants(
             for of, offset in zip(films, seconds, strict=True)
         ]
     )
-    return Instants(instants, seen, frames, _offset_remarks(cameras, offsets, within_s))
+    clocks = [
+        Clock(one, at + camera.row_s * camera.size_px[1] / 2, offset, 1 / of.rate_hz, _APART * frame_s)
+        for camera, one, at, offset, of in zip(cameras, joined, times, seconds, films, strict=True)
+    ]
+    named = named_frames(labelled, found, clocks, instants, within_s)
+    return Instants(instants, seen, frames, _offset_remarks(cameras, offsets, within_s), named)
 
 
 def _offset_remarks(cameras: Sequence[Camera], offsets: Sequence[Offset], within_s: float) -> tuple[str, ...]:

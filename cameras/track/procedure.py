@@ -14,12 +14,15 @@ from wingfit.cameras.track.cloud import Cloud, possible_points
 from wingfit.cameras.track.film_detections import FilmDetections, FilmTask, Light, MarkerKind, detect_film
 from wingfit.cameras.track.follow import Followed, follow
 from wingfit.cameras.track.instants import Instants, flash_instants, frame_instants
+from wingfit.cameras.track.labelled import Labelled, Starts
+from wingfit.cameras.track.labels import LEAST_LABELLED, Label, check_frames, check_labels, spots
 from wingfit.cameras.track.outliers import jumps
-from wingfit.cameras.track.registration import spacing, surface_of
+from wingfit.cameras.track.reference import LEAST_MARKERS, reference_of
+from wingfit.cameras.track.registration import looks_alike, spacing, surface_of
 from wingfit.cameras.track.result import TrackedFilm
 from wingfit.cameras.triangulation import Points, error_from_cameras, triangulate
-from wingfit.cameras.video.source import Film
-from wingfit.records.array_types import Array, Float, Index
+from wingfit.cameras.video.source import Film, Frames
+from wingfit.records.array_types import Array, Float
 from wingfit.records.errors import counted, fail
 
 Report = Callable[[str, float], object]
@@ -32,7 +35,8 @@ def _silent(step: str, part: float) -> None:
 TOLERANCE_PX = 0.3
 """Error of the calibration (standard deviation) that the search for meeting rays allows."""
 MOST_PLACES = 20_000_000  # instants times markers
-LEAST_MARKERS = 6
+Names = tuple[str, ...]
+Places = Float[Array, "K 3"]
 _JUMP = 0.05  # of the distance between neighbouring markers
 _UNLIKELY = 15.1  # chi-square with one degree of freedom, 99.99 %
 
@@ -52,6 +56,7 @@ class Request:
         within_s: the clocks of cameras without strobe may be so far apart; zero if they are synchronised.
         first, last: frames that are used, of each film.
         store: folder for what is detected, so that an interrupted run can go on.
+        labels: markers that a person named, at one instant or more; there the wing is not sought.
     """
 
     cameras: tuple[Camera, ...]
@@ -65,6 +70,7 @@ class Request:
     first: int = 0
     last: int | None = None
     store: Path | None = None
+    labels: tuple[Label, ...] = ()
 
 
 def track(request: Request, report: Report = _silent) -> TrackedFilm:
@@ -74,21 +80,23 @@ def track(request: Request, report: Report = _silent) -> TrackedFilm:
         DatasetError: a film cannot be read, the cameras do not see the wing at the same instants, or the markers are
             not identified.
     """
-    found = _detected(request, report)
     films = [film.opened() for film in request.films]
+    _check(request, films)
+    found = _detected(request, report)
     report("instants", 0.0)
+    named = spots(request.labels, request.cameras, found, request.light)
     if request.light == "strobe":
-        instants = flash_instants(request.cameras, films, found, TOLERANCE_PX)
+        instants = flash_instants(request.cameras, films, found, TOLERANCE_PX, named)
     else:
-        instants = frame_instants(request.cameras, films, found, TOLERANCE_PX, request.within_s)
+        instants = frame_instants(request.cameras, films, found, TOLERANCE_PX, request.within_s, named)
     clouds = []
     for number, seen in enumerate(instants.seen):
         clouds.append(possible_points(request.cameras, seen, TOLERANCE_PX, (0.0, np.inf)))
         report("rays", (number + 1) / len(instants.seen))
-    names, reference = _reference(request, clouds)
+    names, reference, starts = _identified(request, instants, clouds)
     if len(names) * len(clouds) > MOST_PLACES:
         raise fail("films", len(clouds), f"{len(clouds)} instants; track fewer with first_frame and last_frame")
-    followed = follow(clouds, reference, surface_of(reference), lambda done, of: report("following", done / of))
+    followed = follow(clouds, reference, surface_of(reference), lambda done, of: report("following", done / of), starts)
     if followed is None:
         most = max(len(cloud) for cloud in clouds)
         raise fail(
@@ -128,50 +136,36 @@ def _detected(request: Request, report: Report) -> list[FilmDetections]:
     return found
 
 
-def _reference(request: Request, clouds: Sequence[Cloud]) -> tuple[tuple[str, ...], Float[Array, "K 3"]]:
-    """Return names and places of the markers: the described ones, or those of the instant that shows most of them."""
-    if request.reference is not None:
-        return request.names, request.reference
-    best = max(clouds, key=lambda cloud: len(_single(cloud)))
-    places = best.positions[_on_surface(best, _single(best))]
-    if len(places) < LEAST_MARKERS:
-        raise fail(
-            "markers", len(places), f"at most {len(places)} markers are seen by two cameras; {LEAST_MARKERS} are needed"
-        )
-    return tuple(f"t{number + 1:02d}" for number in range(len(places))), places
+def _identified(request: Request, instants: Instants, clouds: Sequence[Cloud]) -> tuple[Names, Places, Starts]:
+    """Return names and places of the markers, and what they are at labelled instants.
 
-
-def _single(cloud: Cloud) -> Index:
-    """Return the points whose detections belong to no other point."""
-    alone = np.ones(len(cloud), dtype=bool)
-    for row in cloud.detections:
-        used, index, counts = np.unique(row, return_inverse=True, return_counts=True)
-        alone &= (counts[index] == 1) | (used[index] < 0)
-    return np.flatnonzero(alone)
-
-
-def _on_surface(cloud: Cloud, single: Index) -> Index:
-    """Return the points ``single``, and of the ambiguous ones those near the smooth surface through these.
-
-    Each detection is used once, first by the points whose rays meet best.
+    The places are the described ones, those of a labelled instant, or those of the instant that shows most of them.
     """
-    if len(single) < 2 * LEAST_MARKERS:
-        return single
-    surface = surface_of(cloud.positions[single])
-    design, height = surface.quadratic(cloud.positions)
-    fitted, *_ = np.linalg.lstsq(design[single], height[single], rcond=None)
-    apart = np.abs(height - design @ fitted)
-    near = max(4 * float(np.sqrt(np.mean(apart[single] ** 2))), 0.01 * surface.size)
-    used = [set(row[single]) for row in cloud.detections]
-    chosen = list(single)
-    for point in np.argsort(cloud.points.misfit, kind="stable"):
-        row = cloud.detections[:, point]
-        free = all(index < 0 or index not in taken for index, taken in zip(row, used, strict=True))
-        if free and apart[point] < near and np.abs(design[point, 1:3]).max() < 3:
-            chosen.append(int(point))
-            for index, taken in zip(row, used, strict=True):
-                taken.add(int(index))
-    return np.array(sorted(chosen))
+    if not request.labels:
+        names, places = reference_of(clouds) if request.reference is None else (request.names, request.reference)
+        return names, places, {}
+    labelled = Labelled(request.cameras, instants, clouds)
+    points = labelled.points()
+    if request.reference is None:
+        names, places = labelled.reference(points)
+    else:
+        names, places = request.names, request.reference
+    return names, places, labelled.starts(points, names, places)
+
+
+def _check(request: Request, films: Sequence[Frames]) -> None:
+    """Raise DatasetError for labels that the films cannot have, and for a layout that takes labels but has none."""
+    check_labels(request.labels, request.cameras, request.names)
+    check_frames(request.labels, request.cameras, films, (request.first, request.last))
+    alike = looks_alike(request.reference) if request.reference is not None and not request.labels else None
+    if alike is not None:
+        one, two = (request.names[marker] for marker in alike)
+        raise fail(
+            "markers",
+            one,
+            f"the layout looks the same after a turn that takes {one!r} to the place of {two!r}: distances cannot tell "
+            f"the markers apart. Label {LEAST_LABELLED} or more in one frame of each camera (labels: labels.csv)",
+        )
 
 
 def _result(
@@ -209,7 +203,7 @@ def _result(
         pixel_error=error,
         rejected=wrong.reshape(shape).sum(0) + jumped.sum(0),
         bad_frames=tuple(of.bad_frames for of in found),
-        remarks=(*instants.remarks, *_remarks(request, found)),
+        remarks=(*instants.remarks, *_label_remarks(request, instants, followed, markers), *_remarks(request, found)),
     )
 
 
@@ -264,6 +258,25 @@ def _by_calibration(request: Request, points: Points, pixels: Array, covariance:
     each = np.einsum("nip,pq,njq->nij", changes, request.calibration, changes, optimize=True)
     each[~known] = np.nan
     return np.asarray(np.nanmean(each.reshape(pixels.shape[0], -1, 3, 3), axis=0))
+
+
+def _label_remarks(
+    request: Request, instants: Instants, followed: Followed, markers: tuple[Names, Places]
+) -> list[str]:
+    """Return remarks about names that labels of another instant contradict, or that nothing confirms."""
+    cameras = [camera.name for camera in request.cameras]
+    remarks = [
+        f"at {instants.shown(instant, cameras)}, {', '.join(markers[0][one] for one in renamed[:5])} were followed to "
+        "other points than those labelled: names between here and the labels before may be wrong; label a frame between"
+        for instant, renamed in sorted(followed.renamed.items())
+    ]
+    if followed.again and looks_alike(markers[1]) is not None:
+        lost = [instants.shown(instant, cameras) for instant in followed.again[:5]]
+        remarks.append(
+            f"the wing was lost and found again at {', '.join(lost)}: on this layout, which looks the same after a "
+            "turn, names beyond are those of the smallest motion; label a frame there to be sure"
+        )
+    return remarks
 
 
 def _remarks(request: Request, found: Sequence[FilmDetections]) -> list[str]:

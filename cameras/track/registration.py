@@ -20,6 +20,8 @@ _STRETCH = 0.02  # of a distance, beside a share of the wing's size for bending
 # Of the smooth displacement: lengths in sizes of the wing, sizes and noises over the affine part.
 _LENGTHS, _SMOOTH, _NOISE = (0.6, 1.2, 2.4), (0.3, 3.0), (0.003, 0.03, 0.3)
 _LEAST_DEVIATION_M = 5e-5
+_ALIKE = 0.95  # of the best score: motions that fit as well
+_SAME_PLACE = 0.01  # of the size of a layout: markers that take the places of others are so near to them
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +79,7 @@ def deformed(surface: Surface, found: Float[Array, "K 3"], reference: Float[Arra
     known = np.isfinite(found).all(1) & np.isfinite(reference).all(1)
     if known.sum() < 4:
         return Deformed(np.full_like(reference, np.nan), np.full(len(reference), np.inf))
-    moved = _rigid(reference[known], found[known], reference)
+    moved = rigid(reference[known], found[known], reference)
     residual = found[known] - moved[known]
     size = max(float(np.sqrt(np.median(residual**2) / 0.455)), 1e-5)
     best: tuple[float, Array, Array] | None = None
@@ -105,13 +107,14 @@ def _prior(plane: Float[Array, "K 2"], length: float, smooth: float) -> Float[Ar
     return np.asarray(1 + known @ known.T + smooth**2 * np.exp(-squared / (2 * length**2)))
 
 
-def _rigid(source: Array, target: Array, points: Array) -> Float[Array, "K 3"]:
+def rigid(source: Array, target: Array, points: Array) -> Float[Array, "K 3"]:
     """Return ``points`` after the rigid motion that best takes ``source`` to ``target`` (Kabsch 1976)."""
-    rotation, move = _kabsch(source[None], target[None])
+    rotation, move = kabsch(source[None], target[None])
     return np.asarray(points @ rotation[0].T + move[0])
 
 
-def _kabsch(source: Float[Array, "H N 3"], target: Float[Array, "H N 3"]) -> tuple[Array, Array]:
+def kabsch(source: Float[Array, "H N 3"], target: Float[Array, "H N 3"]) -> tuple[Array, Array]:
+    """Return rotations [H, 3, 3] and moves [H, 3] that best take ``source`` to ``target`` (Kabsch 1976)."""
     a, b = source.mean(1), target.mean(1)
     covariance = np.einsum("hni,hnj->hij", target - b[:, None], source - a[:, None])
     u, _, vt = np.linalg.svd(covariance)
@@ -144,12 +147,18 @@ def assign(
 
 
 def register(
-    reference: Float[Array, "K 3"], points: Float[Array, "M 3"], covariance: Float[Array, "M 3 3"], seed: int = 0
+    reference: Float[Array, "K 3"],
+    points: Float[Array, "M 3"],
+    covariance: Float[Array, "M 3 3"],
+    seed: int = 0,
+    *,
+    nearby: bool = False,
 ) -> tuple[Index, Float[Array, "K 3"]]:
     """Return the index [K] of the point of each marker (-1: none), and where the markers are predicted.
 
-    ``reference`` are the markers in any axes, for example those of the wing at rest. Fewer than 6 markers that agree
-    are no registration: all indices are -1.
+    ``reference`` are the markers in any axes, for example those of the wing at rest; with ``nearby``, they are where
+    the wing was before: of motions that fit alike, as on a symmetric wing, the smallest is taken. Fewer than 6 markers
+    that agree are no registration: all indices are -1.
     """
     size = float(np.linalg.norm(np.ptp(reference, axis=0)))
     hypotheses = _hypotheses(reference, points, size, np.random.default_rng(seed))
@@ -158,15 +167,36 @@ def register(
         return nothing, reference
     tree = cKDTree(points)
     reach = 0.03 * size
-    best, most = hypotheses[0], -1.0
-    for rotation, move in hypotheses:
-        apart, index = tree.query(reference @ rotation.T + move)
+    scores, moved = np.empty(len(hypotheses)), np.empty(len(hypotheses))
+    for number, (rotation, move) in enumerate(hypotheses):
+        placed = reference @ rotation.T + move
+        apart, index = tree.query(placed)
         near = apart < reach
         # Each point counts once; closer ones count more, so that a lattice shifted by one row loses.
-        score = len(np.unique(index[near])) - float((apart[near] / reach).sum()) / 2
-        if score > most:
-            best, most = (rotation, move), score
+        scores[number] = len(np.unique(index[near])) - float((apart[near] / reach).sum()) / 2
+        moved[number] = float(((placed - reference) ** 2).sum())
+    alike = scores >= (_ALIKE * scores.max() if nearby else scores.max())
+    best = hypotheses[int(np.flatnonzero(alike)[moved[alike].argmin() if nearby else 0])]
     return _refined(reference, best, points, covariance, reach)
+
+
+def looks_alike(reference: Float[Array, "K 3"]) -> tuple[int, int] | None:
+    """Return a marker, and the one whose place it takes in a turn that takes all markers to places of others.
+
+    None if there is no such turn. Of a flat layout a mirror image is a turn too, by half about the line of the mirror.
+    """
+    size = float(np.linalg.norm(np.ptp(reference, axis=0)))
+    tree, own = cKDTree(reference), np.arange(len(reference))
+    for rotation, move in _hypotheses(reference, reference, size, np.random.default_rng(0)):
+        apart, index = tree.query(reference @ rotation.T + move)
+        if len(np.unique(index)) < len(index) or (index == own).all() or apart.max() > 5 * _SAME_PLACE * size:
+            continue
+        if np.linalg.norm(rigid(reference, reference[index], reference) - reference[index], axis=1).max() < (
+            _SAME_PLACE * size
+        ):
+            marker = int(np.flatnonzero(index != own)[0])
+            return marker, int(index[marker])
+    return None
 
 
 def _hypotheses(reference: Array, points: Array, size: float, random: np.random.Generator) -> list[tuple[Array, Array]]:
@@ -191,7 +221,7 @@ def _hypotheses(reference: Array, points: Array, size: float, random: np.random.
             picked = random.choice(len(pair), _HYPOTHESES // 20, replace=False)
             pair, three = pair[picked], three[picked]
         target = points[np.stack([one[pair], two[pair], three], axis=1)]
-        rotations, moves = _kabsch(np.broadcast_to(reference[triple], target.shape), target)
+        rotations, moves = kabsch(np.broadcast_to(reference[triple], target.shape), target)
         found.extend(zip(rotations, moves, strict=True))
         if len(found) > _HYPOTHESES:
             break

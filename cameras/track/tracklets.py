@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 
 from wingfit.cameras.markers.detections import Detections, no_detections
 from wingfit.cameras.track.registration import spacing
-from wingfit.records.array_types import Array, Float
+from wingfit.records.array_types import Array, Float, Index
 
 _NEIGHBOURS = 4  # of which the velocity is taken for a detection that has none
 _SAME = 1e-6  # of the longest time between samples
@@ -31,7 +31,7 @@ class Tracklets:
         seen: the detections, N of them.
     """
 
-    owner: Array
+    owner: Index
     times: Float[Array, " N"]
     seen: Detections
 
@@ -48,7 +48,7 @@ def join(frames: Sequence[Detections], frame_times: Float[Array, " F"], row_s: f
         last = len(frames) - 1 if direction > 0 else 0
         for at in range(start, last, direction):
             names = _step(frames, labels, velocity, (at, at + direction), names)
-    owner = np.concatenate(labels)
+    owner = np.concatenate(labels).astype(int)
     whole = _joined(frames)
     number = np.concatenate([np.full(len(frame), k) for k, frame in enumerate(frames)]).astype(int)
     times = frame_times[number] + whole.pixels[:, 1] * row_s
@@ -105,14 +105,20 @@ def at_time(tracklets: Tracklets, time: float, longest: float) -> Detections:
     A tracklet is read if its samples around ``time`` are at most ``longest`` (s) apart. The covariance has that of the
     samples, and a tenth of the difference to a straight line between the nearest two for what a cubic cannot follow.
     """
+    return owned_at_time(tracklets, time, longest)[0]
+
+
+def owned_at_time(tracklets: Tracklets, time: float, longest: float) -> tuple[Detections, Index]:
+    """Return the detections of ``at_time``, and the number [N] of the tracklet of each."""
     times, owner = tracklets.times, tracklets.owner
     before = np.flatnonzero((times[:-1] <= time) & (times[1:] > time) & (owner[:-1] == owner[1:]))
     before = before[times[before + 1] - times[before] <= longest]
     # The last sample of a tracklet, and one before a gap, can be read at their own time.
     exact = np.flatnonzero(np.abs(times - time) < _SAME * longest)
-    alone = tracklets.seen.only(exact[~np.isin(owner[exact], owner[before])])
+    exact = exact[~np.isin(owner[exact], owner[before])]
+    alone = tracklets.seen.only(exact)
     if not len(before):
-        return alone
+        return alone, owner[exact]
     around = before[:, None] + np.arange(-1, 3)
     index = np.clip(around, 0, len(times) - 1)
     inside = (owner[index] == owner[before][:, None]) & (index == around)  # each sample once
@@ -125,7 +131,8 @@ def at_time(tracklets: Tracklets, time: float, longest: float) -> Detections:
     covariance = np.einsum("nk,nkij->nij", weights**2, seen.covariance[index])
     covariance += ((0.1 * np.linalg.norm(pixels - straight, axis=1)) ** 2)[:, None, None] * np.eye(2)
     nearest = before + (share > 0.5)
-    return _joined((Detections(pixels, covariance, seen.size_px[nearest], seen.contrast[nearest]), alone))
+    between = Detections(pixels, covariance, seen.size_px[nearest], seen.contrast[nearest])
+    return _joined((between, alone)), np.concatenate([owner[before], owner[exact]])
 
 
 def _lagrange(times: Float[Array, "N 4"], time: float, use: Array) -> Float[Array, "N 4"]:

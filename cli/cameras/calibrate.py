@@ -1,4 +1,4 @@
-"""``wingfit cameras``: calibrates cameras from images of a chessboard, and reads calibrations of other programs."""
+"""``wingfit cameras``: calibrates cameras with a chessboard or a wand, and reads calibrations of other programs."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from wingfit.cli.base.files import new_file, write_text
+from wingfit.cli.base.files import new_file, read_bytes, write_text
 from wingfit.cli.base.output import late_progress, note
 from wingfit.client.transport import WingfitError
 
@@ -69,6 +69,72 @@ def boards(
 
 
 @app.command()
+def wand(
+    points: Annotated[
+        Path,
+        typer.Argument(metavar="POINTS", help="Pixels of the wand: a CSV of docs/cameras.md, or xypts.csv of DLTdv."),
+    ],
+    length_mm: Annotated[
+        list[float],
+        typer.Option(help="Distance of the two markers in mm; three times (1-2, 2-3, 1-3) for three markers."),
+    ],
+    size_px: Annotated[
+        list[str] | None, typer.Option(help="WIDTHxHEIGHT of images, for all or for each camera, without --lenses.")
+    ] = None,
+    focal_px: Annotated[
+        list[float] | None,
+        typer.Option(help="Rough focal length in pixels, for all or for each camera; it is estimated too."),
+    ] = None,
+    lenses: Annotated[
+        Path | None, typer.Option(help="Cameras whose lenses are known (cameras.yaml), in place of --focal-px.")
+    ] = None,
+    free: Annotated[
+        list[str] | None, typer.Option(help="Parameters of the lenses to estimate; default: f_x and f_y of --focal-px.")
+    ] = None,
+    origin: Annotated[
+        Literal["lower-left", "upper-left", "opencv"] | None,
+        typer.Option(help="Where pixels of DLTdv count from: lower-left to version 7, upper-left in version 8."),
+    ] = None,
+    output: Annotated[Path, new_file("Write the calibrated cameras: FILE.yaml.", "--output", "-o")] = Path(
+        "cameras.yaml"
+    ),
+    report: Annotated[Path | None, new_file("Write pictures of the residuals: FILE.html.", "--report")] = None,
+) -> None:
+    """Calibrate the poses of cameras from a wand of known length that was waved in front of them.
+
+    Axes are those of the first camera. One frame in five is not used: it shows the error of the wand's length.
+
+    Example: wingfit cameras wand wand.csv --length-mm 240 --size-px 1280x1024 --focal-px 1900 -o cameras.yaml
+    """
+    from wingfit.cameras.calibrate.report import calibration_report  # imported late: other commands start faster
+    from wingfit.cameras.calibrate.wand import Wand, calibrate_wand
+    from wingfit.cameras.files.camera_set import CameraSet
+    from wingfit.cameras.files.project import write_cameras
+    from wingfit.cameras.files.wand_cameras import known_cameras, rough_cameras
+    from wingfit.cameras.files.wand_points import camera_names, read_wand_points
+    from wingfit.records.errors import DatasetError
+
+    if (lenses is None) == (not focal_px) or (lenses is not None) == bool(size_px):
+        raise typer.BadParameter("give either --lenses, or --size-px and --focal-px", param_hint="--lenses")
+    sizes = [_size(one) for one in size_px or []]
+    raw = read_bytes(points)
+    try:
+        names = camera_names(raw, points.name)
+        start = known_cameras(lenses, names) if lenses else rough_cameras(names, sizes, focal_px or [])
+        stick = Wand(tuple(one / 1000 for one in length_mm))
+        tracks = read_wand_points(raw, points.name, stick.markers, [one.size_px for one in start], origin)
+        found = calibrate_wand(tracks, start, stick, free=free or (() if lenses else ("f_x", "f_y")))
+        write_cameras(output, CameraSet(found.cameras, found.covariance))
+    except DatasetError as error:
+        raise _refused(error) from error
+    _show(found)
+    note(f"cameras written to {output}")
+    if report:
+        write_text(report, calibration_report(found), "report of the calibration")
+    note("next: describe the films in film.yaml (docs/cameras.md), then: wingfit track film.yaml -o tracks.csv")
+
+
+@app.command()
 def convert(
     file: Annotated[
         Path, typer.Argument(help="Calibration by OpenCV or Anipose, or DLT coefficients of DLTdv or easyWand.")
@@ -109,6 +175,11 @@ def _show(found: Calibration) -> None:
     print(f"RMS distance {found.rms_px:.3f} px over {len(found.images)} views; world: {found.world}")
     for camera, errors, coverage in zip(found.cameras, found.errors, found.coverage, strict=True):
         print(f"  camera {camera.name}: {errors.rms_px:.3f} px, {100 * coverage.fraction:.0f} % of the image seen")
+    if found.wand is not None:
+        print(
+            f"  length of the wand: RMS error {found.wand.used_rms_percent:.3f} %, and "
+            f"{found.wand.held_out_rms_percent:.3f} % in frames that were not used"
+        )
     for rejection in found.rejected:
         note(f"rejected: {rejection}")
     for warning in found.warnings:

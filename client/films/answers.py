@@ -67,6 +67,16 @@ class MarkerPlace(TypedDict):
     z_m: float
 
 
+class Label(TypedDict):
+    """A marker that a person named in a frame of a camera."""
+
+    camera: str
+    frame: int
+    marker: str
+    x_px: float
+    y_px: float
+
+
 class TrackingSpec(TypedDict):
     """The settings of a tracking; ``places`` are those of the request or of the dataset, empty if there are none."""
 
@@ -76,6 +86,7 @@ class TrackingSpec(TypedDict):
     first_frame: int
     last_frame: int | None
     places: list[MarkerPlace]
+    labels: list[Label]
 
 
 class Tracking(TypedDict):

@@ -4,29 +4,30 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
+from wingfit.client import private_files
 from wingfit.records.description.yaml_text import write_yaml
 from wingfit.service.films.files import FilmFiles
 from wingfit.service.films.requests import CALIBRATION
 from wingfit.service.films.views import uploaded
 from wingfit.service.storage.tables import FilmRow
 
-DESCRIPTION, PLACES = "film.yaml", "markers.csv"
+DESCRIPTION, PLACES, LABELS = "film.yaml", "markers.csv", "labels.csv"
 
 
 def write_description(folder: Path, row: FilmRow, spec: Mapping[str, Any], files: FilmFiles) -> Path:
-    """Write ``film.yaml`` into ``folder``, with the places of the markers beside it; return its path.
+    """Write ``film.yaml`` into ``folder``, with the tables that it names beside it; return its path.
 
     ``row``: the film, all of whose files are there; ``spec``: settings of a tracking.
     """
     named = {name: str(files.video(row.id, file).resolve()) for name, file in uploaded(row).items()}
     markers: dict[str, Any] = {"kind": spec["kind"]}
     if spec["places"]:
-        (folder / PLACES).write_text(_table(spec["places"]), encoding="utf-8", newline="")
+        _write(folder / PLACES, _table(("marker", "x_m", "y_m", "z_m"), spec["places"]))
         markers["places"] = PLACES
     data = {
         "format": "wingfit film",
@@ -40,18 +41,29 @@ def write_description(folder: Path, row: FilmRow, spec: Mapping[str, Any], files
     }
     if spec["last_frame"] is not None:
         data["last_frame"] = spec["last_frame"]
+    if spec["labels"]:
+        _write(folder / LABELS, _table(("camera", "frame", "marker", "x_px", "y_px"), spec["labels"]))
+        data["labels"] = LABELS
     path = folder / DESCRIPTION
-    path.write_text(write_yaml(data), encoding="utf-8")
+    _write(path, write_yaml(data))
     return path
+
+
+def _write(path: Path, text: str) -> None:
+    with private_files.open_new(path) as stream:
+        stream.write(text.encode())
 
 
 def _film(path: str, rate_hz: float | None) -> dict[str, Any]:
     return {"path": path} if rate_hz is None else {"path": path, "rate_hz": Decimal(repr(rate_hz))}
 
 
-def _table(places: list[dict[str, Any]]) -> str:
+def _table(columns: Sequence[str], rows: Sequence[Mapping[str, Any]]) -> str:
+    """Return ``rows`` as CSV, numbers in full precision."""
     text = io.StringIO()
-    rows = csv.writer(text)
-    rows.writerow(["marker", "x_m", "y_m", "z_m"])
-    rows.writerows([one["marker"], *(repr(float(one[f"{axis}_m"])) for axis in "xyz")] for one in places)
+    table = csv.writer(text)
+    table.writerow(columns)
+    table.writerows(
+        [repr(value) if isinstance(value, float) else value for value in map(row.get, columns)] for row in rows
+    )
     return text.getvalue()

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import asyncio
 import os
+import re
 import secrets
 import shutil
 from collections.abc import AsyncIterator, Iterable
@@ -29,6 +30,10 @@ MIB = 2**20
 RESERVED_MIB = 512  # of the disk, for the database
 SILENT_SECONDS = 60.0  # a client that sends nothing for so long is given up
 
+# The database may be a backup of a stranger, whose names must not lead out of the folder.
+FILM, TRACKING = re.compile(r"fl_[0-9a-f]{16}"), re.compile(r"tk_[0-9a-f]{16}")
+UPLOADED = re.compile(r"[A-Za-z0-9_-]{1,40}\.[0-9a-f]{8}")
+
 TRACKS, COVARIANCE, REPORT, RESULT = "tracks.csv", "covariance.npz", "report.html", "result.json"
 
 
@@ -38,13 +43,18 @@ class FilmFiles:
     def __init__(self, data: Path) -> None:
         self._root = data / ROOT
 
+    @property
+    def root(self) -> Path:
+        """The folder of all films."""
+        return self._root
+
     def folder(self, film_id: str) -> Path:
-        """Return the folder of a film."""
-        return self._root / film_id
+        """Return the folder of a film. This and the next raise ValueError for names that the server never makes."""
+        return self._root / _name(FILM, film_id)
 
     def video(self, film_id: str, file: str) -> Path:
         """Return the path of an uploaded file of a film."""
-        return self.folder(film_id) / "videos" / file
+        return self.folder(film_id) / "videos" / _name(UPLOADED, file)
 
     def detected(self, film_id: str) -> Path:
         """Return the folder of what was detected in a film."""
@@ -52,7 +62,7 @@ class FilmFiles:
 
     def tracked(self, film_id: str, tracking_id: str) -> Path:
         """Return the folder of the tracks of a tracking."""
-        return self.folder(film_id) / "tracked" / tracking_id
+        return self.folder(film_id) / "tracked" / _name(TRACKING, tracking_id)
 
     def new_folder(self, path: Path) -> Path:
         """Create ``path``, in the folder of a film, and its parents for this user alone; return it."""
@@ -90,9 +100,7 @@ class FilmFiles:
             held += piece
             received += len(piece)
             if received > most:
-                detail = (
-                    f"the file is larger than {most / MIB:g} MiB (WINGFIT_MAX_FILM_MIB): film fewer frames, or cut it"
-                )
+                detail = f"the file is larger than {most / MIB:g} MiB (of a video: WINGFIT_MAX_FILM_MIB); send less"
                 raise ProblemError(413, "too-large", detail)
             if len(held) >= PIECE:
                 await run_in_threadpool(stream.write, bytes(held))
@@ -139,8 +147,9 @@ class FilmFiles:
 
     def forget_tracked(self, tracking_id: str) -> None:
         """Remove the tracks of a tracking that was deleted."""
-        for folder in self._root.glob(f"*/tracked/{tracking_id}"):
-            shutil.rmtree(folder, ignore_errors=True)
+        if TRACKING.fullmatch(tracking_id):
+            for folder in self._root.glob(f"*/tracked/{tracking_id}"):
+                shutil.rmtree(folder, ignore_errors=True)
 
     def tidy(self, known: Iterable[str]) -> list[str]:
         """Remove what a killed process left; return the names of folders of films that are not ``known``."""
@@ -153,6 +162,12 @@ class FilmFiles:
         for part in self._root.glob(f"*/videos/*{PART}"):
             part.unlink(missing_ok=True)
         return sorted(one.name for one in self._root.iterdir() if one.is_dir() and one.name not in films)
+
+
+def _name(pattern: re.Pattern[str], name: str) -> str:
+    if not pattern.fullmatch(name):
+        raise ValueError(f"{name!a} names nothing that the server stores")
+    return name
 
 
 async def _next(body: AsyncIterator[bytes]) -> bytes | None:

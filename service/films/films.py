@@ -45,7 +45,7 @@ class Films:
         with self._database.read() as session:
             known = session.scalars(select(FilmRow.id)).all()
         if unknown := self.files.tidy(known):
-            place, named = self.files.folder(""), ", ".join(unknown[:5])
+            place, named = self.files.root, ", ".join(unknown[:5])
             LOG.warning(
                 "%d folders in %s belong to no film of the database: %s; delete them to free space",
                 len(unknown),
@@ -70,16 +70,21 @@ class Films:
             if name == CALIBRATION:
                 return row, MAX_DESCRIPTION_BYTES
             require_opencv()
-            held = session.scalar(select(func.sum(FilmRow.size_bytes)).where(store.of_owner(FilmRow, row.owner))) or 0
-        most = self._settings.max_films_mib * MIB - held + _size_of(row, name)
-        if most <= 0:
+            self._check_share(session, row, name, 0)
+        return row, self._settings.max_film_mib * MIB
+
+    def _check_share(self, session: Session, row: FilmRow, name: str, size: int) -> None:
+        """Raise a 429 if the owner has no room for a video ``name`` of ``size`` bytes, in place of the one before."""
+        held = session.scalar(select(func.sum(FilmRow.size_bytes)).where(store.of_owner(FilmRow, row.owner))) or 0
+        held -= next((camera["bytes"] or 0 for camera in row.cameras if camera["name"] == name), 0)
+        most = self._settings.max_films_mib
+        if held + max(size, 1) > most * MIB:
             raise ProblemError(
                 429,
                 "too-many",
-                f"the films of one owner may take {self._settings.max_films_mib} MiB (WINGFIT_MAX_FILMS_MIB), and "
-                f"{held / MIB:.0f} MiB are there; delete films that are not needed",
+                f"the videos of one owner may take {most} MiB (WINGFIT_MAX_FILMS_MIB); the others take "
+                f"{held / MIB:.1f} MiB, this one {size / MIB:.1f} MiB more; delete films that are not needed",
             )
-        return row, min(self._settings.max_film_mib * MIB, most)
 
     def keep(self, film_id: str, name: str, path: Path) -> a.Film:
         """Check the uploaded file ``path``, make it the file ``name`` of a film, and return the film.
@@ -92,6 +97,8 @@ class Films:
                 row = store.one(session, FilmRow, film_id)
                 _check_idle(session, film_id)
                 self._check_sizes(row, name, path, facts)
+                if name != CALIBRATION:
+                    self._check_share(session, row, name, path.stat().st_size)
                 _put(row, name, path, facts)
         except BaseException:
             self.videos.forget(path)
@@ -120,9 +127,11 @@ class Films:
 
     def _check_sizes(self, row: FilmRow, name: str, path: Path, facts: Mapping[str, Any]) -> None:
         """Raise a 422 if the images of a video have another size than its camera was calibrated with."""
-        calibration = path if name == CALIBRATION else self.files.video(row.id, row.calibration or "none")
-        if not calibration.is_file():
-            return
+        calibration = path
+        if name != CALIBRATION:
+            if row.calibration is None or not self.files.video(row.id, row.calibration).is_file():
+                return
+            calibration = self.files.video(row.id, row.calibration)
         sizes = {camera.name: camera.size_px for camera in read_calibration(calibration).cameras}
         for camera in row.cameras:
             known = facts if camera["name"] == name else camera
@@ -156,8 +165,8 @@ class Films:
         with self._database.read() as session:
             row = store.one(session, FilmRow, film_id)
         found = _camera_of(row, camera)
-        path = self.files.video(film_id, found["file"] or "none")
-        if not path.is_file():
+        path = self.files.video(film_id, found["file"]) if found["file"] else None
+        if path is None or not path.is_file():
             raise not_found("video of camera", camera, f"upload it: PUT /v1/films/{film_id}/files/{camera}")
         return path, found["stated_rate_hz"], found["frames"]
 
@@ -249,10 +258,6 @@ def _check_idle(session: Session, film_id: str) -> None:
         raise conflict(
             f"tracking {busy.id} of the film is {busy.state}; wait for its end, or cancel it", state=busy.state
         )
-
-
-def _size_of(row: FilmRow, name: str) -> int:
-    return next((int(camera["bytes"] or 0) for camera in row.cameras if camera["name"] == name), 0)
 
 
 def _put(row: FilmRow, name: str, path: Path, facts: Mapping[str, Any]) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
 from wingfit.client.films.answers import Light, MarkerKind
@@ -13,8 +13,8 @@ from wingfit.service.runs.requests import DATASET_ID, Name, Number, Title, Whole
 MOST_CAMERAS = 8
 CALIBRATION = "cameras"  # name of the file of calibrated cameras
 FILM_ID = "fl_3b9ac1d07e5f2468"
-MOST_MARKERS = 2000
-MOST_FRAMES = 10**9
+MOST_MARKERS, MOST_LABELS = 2000, 5000
+MOST_FRAMES = 10**9 - 1
 
 
 def _different(cameras: list[str]) -> list[str]:
@@ -29,7 +29,20 @@ def _different(cameras: list[str]) -> list[str]:
 
 
 CameraName = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{1,40}$")]
+Frame = Annotated[Whole, Field(ge=0, le=MOST_FRAMES)]
 Rate = Annotated[Number, Field(ge=1e-3, le=1e6)]
+
+
+class LabelIn(BaseModel):
+    """A marker that a person named in a frame of a camera; pixel (0, 0) is the centre of the upper left one."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    camera: CameraName
+    frame: Frame
+    marker: Annotated[Title, Field(max_length=100)]
+    x_px: Number
+    y_px: Number
 
 
 class FilmIn(BaseModel):
@@ -51,6 +64,16 @@ class FilmIn(BaseModel):
         Field(max_length=MOST_CAMERAS, description="frames per second, where a video states that of playback"),
     ] = {}
 
+    @field_validator("rate_hz")
+    @classmethod
+    def _of_cameras(cls, rates: dict[str, float], info: ValidationInfo) -> dict[str, float]:
+        cameras = info.data.get("cameras")
+        other = next((name for name in rates if cameras and name not in cameras), None)
+        if other is not None:
+            listed = {"name": other, "cameras": ", ".join(cameras or ())}
+            raise PydanticCustomError("unknown", "there is no camera '{name}', but {cameras}", listed)
+        return rates
+
 
 class MarkerIn(BaseModel):
     """The place of a marker on the wing, in any axes (m)."""
@@ -61,9 +84,6 @@ class MarkerIn(BaseModel):
     x_m: Number
     y_m: Number
     z_m: Number
-
-
-Frame = Annotated[Whole, Field(ge=0, le=MOST_FRAMES)]
 
 
 class TrackingIn(BaseModel):
@@ -88,4 +108,7 @@ class TrackingIn(BaseModel):
     dataset_id: Annotated[Name | None, Field(description="of a wing, whose markers are on the filmed one")] = None
     places: Annotated[
         list[MarkerIn], Field(max_length=MOST_MARKERS, description="of the markers, instead of a dataset")
+    ] = []
+    labels: Annotated[
+        list[LabelIn], Field(max_length=MOST_LABELS, description="markers named by hand in some frames")
     ] = []

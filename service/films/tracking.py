@@ -86,6 +86,7 @@ def _reports(command: list[str], interrupted: Callable[[], bool]) -> Iterator[di
             stderr=log,
             env=child.environment(),
             start_new_session=True,
+            umask=0o077,
         )
         try:
             assert process.stdout is not None  # noqa: S101  # for the type checker

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import sys
 import threading
 import time
@@ -18,6 +19,7 @@ from wingfit.cameras.project import read_film
 from wingfit.cameras.track.procedure import track
 from wingfit.cameras.track.progress import whole
 from wingfit.cameras.track.report import film_report
+from wingfit.cameras.track.result import TrackedFilm
 from wingfit.records.errors import DatasetError
 from wingfit.service.films.child import FAULTS, listed
 from wingfit.service.films.files import COVARIANCE, REPORT, RESULT, TRACKS
@@ -31,7 +33,7 @@ def main(arguments: list[str]) -> None:
     film, store, folder = (Path(one) for one in arguments)
     threading.Thread(target=_end_with_server, daemon=True).start()
     try:
-        found = track(read_film(film, store), _Lines())
+        found = _tracked(film, store)
     except DatasetError as error:
         print(json.dumps({"faults": listed(error)}), flush=True)
         sys.exit(FAULTS)
@@ -39,6 +41,16 @@ def main(arguments: list[str]) -> None:
     found.write_covariance(folder / COVARIANCE)
     (folder / REPORT).write_text(film_report(found), encoding="utf-8")
     (folder / RESULT).write_text(json.dumps(summary(found), allow_nan=False), encoding="utf-8")
+
+
+def _tracked(film: Path, store: Path) -> TrackedFilm:
+    try:
+        return track(read_film(film, store), _Lines())
+    except DatasetError as error:
+        if not Path(error.where).is_relative_to(store):
+            raise
+        shutil.rmtree(store)  # damaged, as when the machine stopped while it was written
+        return track(read_film(film, store), _Lines())
 
 
 class _Lines:

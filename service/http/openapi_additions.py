@@ -22,7 +22,7 @@ CREATING = (
 )
 ID = "$response.body#/id"
 # Settings in answers, and the requests that set them.
-SETTINGS = {"RunSpec": "RunIn", "DiagnosisSpec": "DiagnosisIn"}
+SETTINGS = {"RunSpec": "RunIn", "DiagnosisSpec": "DiagnosisIn", "TrackingSpec": "TrackingIn"}
 FORM = "multipart/form-data"
 
 

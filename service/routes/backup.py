@@ -43,7 +43,7 @@ async def _copy(request: Request, service: ServiceDep) -> AsyncIterator[BinaryIO
     summary="Fetch a backup",
 )
 async def backup(copy: Annotated[BinaryIO, Depends(_copy)]) -> StreamingResponse:
-    """Return a checked copy of the database as it is now: datasets, runs, diagnoses and keys."""
+    """Return a checked copy of the database as it is now: datasets, jobs, keys, and films without their files."""
     name = f"wingfit-{store.now()[:19].replace(':', '')}Z.sqlite3"
     headers = {"Content-Length": str(os.fstat(copy.fileno()).st_size), **http.attachment(name)}
     return StreamingResponse(_pieces(copy), media_type=MEDIA_TYPE, headers=headers)

@@ -123,7 +123,7 @@ def frame(
     summary="Detect markers in a frame",
     dependencies=[FRAME_SLOT],
 )
-def markers(service: ServiceDep, film_id: str, camera: str, number: Frame, kind: a.MarkerKind) -> Any:
+def markers(service: ServiceDep, film_id: str, camera: str, number: Frame, kind: a.MarkerKind = "chequer") -> Any:
     """Return the markers that the detector sees in one frame as it is: half-lit frames of a strobe are not merged."""
     return service.films.markers(film_id, camera, number, kind)
 

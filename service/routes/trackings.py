@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Annotated, Any
@@ -14,9 +15,9 @@ from wingfit.client.films import answers as a
 from wingfit.records import DatasetError
 from wingfit.service.container import DOWNLOAD_SLOT, Service, ServiceDep
 from wingfit.service.films import views
-from wingfit.service.films.description import write_description
+from wingfit.service.films.description import LABELS, write_description
 from wingfit.service.films.files import COVARIANCE, REPORT, TRACKS
-from wingfit.service.films.films import refused, require_opencv
+from wingfit.service.films.films import require_opencv
 from wingfit.service.films.requests import TrackingIn
 from wingfit.service.http import csv_text
 from wingfit.service.http import responses as http
@@ -62,9 +63,9 @@ def submit(request: Request, service: ServiceDep, body: TrackingIn, idempotency_
     """Submit the tracking of the markers in a film, all of whose files are there; computed when its turn comes."""
 
     def plan() -> TrackingRow:
-        require_opencv()
         film = _film(service, body.film_id)
         spec = _spec(service, body)
+        require_opencv()
         _check(service, film, spec)
         row = TrackingRow(film_id=film.id, dataset_id=body.dataset_id, spec=spec)
         row.name = (body.name or f"{film.name}, {body.kind}")[:LONGEST_NAME]
@@ -190,14 +191,25 @@ def _places(service: Service, dataset_id: str) -> list[dict[str, Any]]:
 
 
 def _check(service: Service, film: FilmRow, spec: dict[str, Any]) -> None:
-    """Raise a 422 if the description of the film cannot be read, such as for markers too near to each other."""
-    from wingfit.cameras.project import read_film
+    """Raise a 422 for places and labels of markers that cannot be right."""
+    from wingfit.cameras.project import read_film  # imported late: the server starts faster
+    from wingfit.cameras.track.labels import check_labels
 
     with TemporaryDirectory(prefix="wingfit-") as scratch:
         try:
-            read_film(write_description(Path(scratch), film, spec, service.films.files))
+            described = read_film(write_description(Path(scratch), film, spec, service.films.files))
+            check_labels(described.labels, described.cameras, described.names)
         except DatasetError as error:
-            raise refused("the film cannot be tracked so", error, "body.places") from None
+            items = [error_item(_where(fault.where), fault.value, fault.message) for fault in error.errors]
+            raise invalid("the film cannot be tracked so", items) from None
+
+
+def _where(place: str) -> str:
+    """Return where in the request something is that stands at ``place`` in the files of a description."""
+    if not place.startswith(LABELS):
+        return "body.places"
+    line = re.search(r", line (\d+)", place)
+    return f"body.labels.{int(line[1]) - 2}" if line else "body.labels"  # after the header
 
 
 def _succeeded(row: TrackingRow) -> TrackingRow:

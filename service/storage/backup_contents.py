@@ -12,7 +12,7 @@ from typing import Any, get_args
 from wingfit.service.auth.access import Scope
 from wingfit.service.storage.store import now
 
-TABLES = ("dataset", "run", "diagnosis")
+TABLES = ("dataset", "run", "diagnosis", "film", "tracking")
 
 
 class ContentsError(ValueError):
@@ -32,12 +32,17 @@ class BackupKey:
 
 @dataclass(frozen=True)
 class BackupOwner:
-    """Numbers of datasets, runs and diagnoses of one owner in a backup; owner None: made while no key was required."""
+    """Numbers of what one owner has in a backup; owner None: made while no key was required.
+
+    Of films and trackings a backup has the descriptions, without videos and tracks.
+    """
 
     owner: str | None
     datasets: int
     runs: int
     diagnoses: int
+    films: int
+    trackings: int
 
 
 @dataclass(frozen=True)

@@ -1,21 +1,25 @@
-"""Checks that the server can read every dataset, run and diagnosis of a restored database, which is not trusted."""
+"""Checks that the server can read every dataset, film and job of a restored database, which is not trusted."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from wingfit.service.diagnoses import views as diagnosis_views
+from wingfit.service.films import views as film_views
+from wingfit.service.films.files import FilmFiles
 from wingfit.service.runs import views
 from wingfit.service.storage import store
 from wingfit.service.storage.database import Database
-from wingfit.service.storage.tables import ClockRow, DatasetRow, DiagnosisRow, RunRow
+from wingfit.service.storage.tables import ClockRow, DatasetRow, DiagnosisRow, FilmRow, RunRow, TrackingRow
 
-Table = type[DatasetRow] | type[RunRow] | type[DiagnosisRow]
+Table = type[DatasetRow] | type[RunRow] | type[DiagnosisRow] | type[FilmRow] | type[TrackingRow]
 LONGEST_CAUSE = 200
+FILES = FilmFiles(Path())  # checks the names of films and their files; a backup has no files
 
 
 class RowError(ValueError):
@@ -48,4 +52,6 @@ _READERS: dict[Table, Callable[[Any], object]] = {
     DatasetRow: views.dataset,
     RunRow: lambda row: (views.run(row), store.job(row)),
     DiagnosisRow: lambda row: (diagnosis_views.diagnosis(row), store.job(row)),
+    FilmRow: lambda row: film_views.film(row, FILES),
+    TrackingRow: lambda row: (film_views.tracking(row), store.job(row), FILES.tracked(row.film_id, row.id)),
 }

@@ -12,6 +12,7 @@ from tests.cameras.films import FILM, NAMES, PLACES, cameras, write_film
 from wingfit.cameras.files.camera_set import CameraSet
 from wingfit.cameras.files.project import write_cameras
 from wingfit.cameras.project import read_film
+from wingfit.cameras.track.labels import Label
 from wingfit.records.errors import DatasetError
 
 
@@ -27,7 +28,7 @@ def test_a_description_is_read(film: Path, tmp_path: Path) -> None:
     assert {one.rate_hz for one in found.films} == {100.0}
     assert (found.kind, found.light, found.names) == ("dot", "continuous", NAMES)
     assert found.reference == pytest.approx(PLACES, abs=1e-6)
-    assert (found.calibration, found.within_s, found.first, found.last) == (None, 0.0, 0, None)
+    assert (found.calibration, found.within_s, found.first, found.last, found.labels) == (None, 0.0, 0, None, ())
     assert found.store == tmp_path / "store"
 
 
@@ -37,6 +38,17 @@ def test_options_are_read(film: Path) -> None:
     found = read_film(film)
     assert (found.within_s, found.first, found.last) == (0.0025, 3, 9)
     assert (found.names, found.reference, found.store) == ((), None, None)
+
+
+def test_labels_are_read(film: Path) -> None:
+    film.write_text(FILM + "labels: labels.csv\n")
+    with pytest.raises(DatasetError, match=r"line 11.*there is no .*labels\.csv"):
+        read_film(film)
+    (film.parent / "labels.csv").write_text("camera,frame,marker,x_px,y_px\nleft,3,m04,10.5,20\n")
+    assert read_film(film).labels == (Label("left", 3, "m04", (10.5, 20.0)),)
+    (film.parent / "labels.csv").write_text("camera,frame,marker\n")
+    with pytest.raises(DatasetError, match=r"labels\.csv, line 1: the header is"):
+        read_film(film)
 
 
 def test_cameras_without_film_are_left_out_with_their_covariance(film: Path) -> None:

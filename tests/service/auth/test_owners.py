@@ -13,11 +13,13 @@ import pytest
 
 from tests.service import toy
 from tests.service.conftest import As
+from tests.service.films.films import ended, submitted, uploaded, write_videos
 from wingfit.service.settings import Settings
 
 ADMINISTRATION = re.compile(r"/v1/(?:keys|backup)(?:/|$)")
 OPEN = ("/v1/health", "/v1/ready", "/v1/session")
-OF_A_THING = re.compile(r"{(dataset_id|run_id|diagnosis_id|job_id)}")
+OF_A_THING = re.compile(r"{(dataset_id|run_id|diagnosis_id|job_id|film_id|tracking_id)}")
+KINDS = ("datasets", "runs", "diagnoses", "films", "trackings")
 Call = tuple[str, str, dict[str, Any]]
 
 
@@ -41,13 +43,16 @@ def _calls(specification: dict[str, Any]) -> Iterator[Call]:
             yield method.upper(), path, specification["components"]["schemas"][name]["examples"][0] if name else {}
 
 
-def test_every_call_with_an_id_is_closed_to_other_owners(as_: As, calls: list[Call]) -> None:
+def test_every_call_with_an_id_is_closed_to_other_owners(as_: As, calls: list[Call], tmp_path: Path) -> None:
     ann, bob = as_("ann"), as_("bob")
     dataset = ann.upload()["id"]
     run, diagnosis = ann.submit(dataset)["id"], ann.diagnose(dataset)["id"]
     ann.finish(run)
     ann.diagnosed(diagnosis)
-    ids = {"dataset_id": dataset, "run_id": run, "diagnosis_id": diagnosis, "job_id": run}
+    film = uploaded(ann, write_videos(tmp_path, frames=3))["id"]
+    tracking = submitted(ann, film)["id"]
+    ids = {"dataset_id": dataset, "run_id": run, "diagnosis_id": diagnosis, "job_id": run, "film_id": film}
+    ids |= {"tracking_id": tracking, "name": "left", "camera": "left", "number": "0"}
     tried = 0
     for method, path, body in calls:
         if not OF_A_THING.search(path):
@@ -57,7 +62,8 @@ def test_every_call_with_an_id_is_closed_to_other_owners(as_: As, calls: list[Ca
         assert answer.status_code == 404, (method, asked, answer.text)
         assert answer.json()["type"] == "urn:wingfit:problem:not-found"
         tried += 1
-    assert tried >= 22
+    assert tried >= 33
+    assert ended(ann, tracking)["state"] == "SUCCEEDED"
     assert ann.diagnosis(diagnosis)["state"] == ann.run(run)["state"] == "SUCCEEDED"
 
 
@@ -76,8 +82,8 @@ def test_no_body_reaches_data_of_another_owner(as_: As, calls: list[Call]) -> No
             assert answer.status_code == 422, (path, name, answer.text)
             assert "there is no" in answer.json()["detail"], (path, name)
             tried += 1
-    assert tried == 5
-    assert [bob.get(f"/v1/{kind}")["items"] for kind in ("datasets", "runs", "diagnoses")] == [[], [], []]
+    assert tried == 6
+    assert all(bob.get(f"/v1/{kind}")["items"] == [] for kind in KINDS)
 
 
 def test_every_call_needs_its_scope(as_: As, calls: list[Call]) -> None:

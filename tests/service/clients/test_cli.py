@@ -99,7 +99,7 @@ def test_the_commands_are_those_promised() -> None:
         | {f"runs {c}" for c in steer}
         | {f"datasets {c}" for c in data}
         | {"backup", "restore", "rig check", "rig list"}
-        | {"track", "cameras boards", "cameras convert"}
+        | {"track", "cameras boards", "cameras wand", "cameras convert"}
         | {f"keys {c}" for c in ("create", "list", "revoke")}
     )
     assert set(COMMANDS) == expected

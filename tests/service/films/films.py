@@ -9,7 +9,7 @@ from typing import Any
 import cv2
 import httpx
 
-from tests.cameras.films import FRAMES, NAMES, PLACES, RATE, SIZE, write_film
+from tests.cameras.films import FRAMES, NAMES, PLACES, RATE, write_film
 from tests.service.conftest import FINAL, Api, Json
 from wingfit.records.array_types import Array
 
@@ -76,4 +76,17 @@ def ended(api: Api, tracking_id: str, seconds: float = 60.0) -> Json:
     return job
 
 
-__all__ = ["CAMERAS", "FRAMES", "MARKERS", "NAMES", "SIZE"]
+def processes_of(film_id: str) -> list[int]:
+    """The processes that track the film."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*/cmdline"):
+        try:
+            command = path.read_bytes()
+        except OSError:  # it has ended
+            continue
+        if b"tracking_process" in command and film_id.encode() in command:
+            found.append(int(path.parent.name))
+    return found
+
+
+__all__ = ["CAMERAS", "FRAMES", "MARKERS", "NAMES", "RATE"]

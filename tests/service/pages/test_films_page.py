@@ -199,11 +199,18 @@ def test_markers_are_labelled_by_clicks_and_keys(seen: Seen, api: Api, files: Pa
         seen.wait(f"{NOTE.format(camera)} === '{FOUND.format(1)}'")
     click(seen, 0, cameras()[0].project(wing(1 / RATE))[6])
     assert "The labels of camera left are in frame 0" in seen.page.inner_text("#label-state")
+    seen.page.select_option("#track-form [name=light]", "continuous")
+    seen.page.fill("#track-form [name=last_frame]", "12")
     with seen.page.expect_request("**/v1/trackings") as sent:
         seen.page.click("#track-form [type=submit]")
     labels = sent.value.post_data_json["labels"]
     assert {(one["camera"], one["frame"]) for one in labels} == {("left", 0), ("right", 0)}
     assert sorted(one["marker"] for one in labels) == [f"m0{k // 2 + 1}" for k in range(12)]
+    seen.wait(TRACKED, 60)
+    assert "labelled by hand" in seen.page.inner_text("#tracking-about")
+    names = [row[0] for row in seen.rows("tracked-markers")]
+    assert {*names} >= {f"m0{k + 1}" for k in range(6)}
+    assert len(names) == len(NAMES)
 
 
 @pytest.mark.parametrize(("scheme", "width"), [("light", 1280), ("dark", 390)])

@@ -76,7 +76,7 @@ def test_keys_are_revoked_unless_they_are_to_stay(copy: Path, tmp_path: Path) ->
         ("root", "root", ("admin",)),
         ("ann", "ann", ("read", "write")),
     ]
-    assert brought.owners == (BackupOwner("root", 1, 1, 0),)
+    assert brought.owners == (BackupOwner("root", 1, 1, 0, 0, 0),)
     assert good_keys(tmp_path / "new") == []
     assert restore(copy, tmp_path / "same", keep_keys=True) == brought
     assert good_keys(tmp_path / "same") == ["ann", "root"]
@@ -94,7 +94,7 @@ def test_the_command_lists_what_a_backup_brings(copy: Path, tmp_path: Path) -> N
     assert "root root admin 20" in listed
     assert "ann ann read, write 20" in listed
     assert " old " not in listed
-    assert "owner datasets runs diagnoses root 1 1 0" in listed
+    assert "owner datasets runs diagnoses films trackings root 1 1 0 0 0" in listed
     said = " ".join(done.stderr.split())
     assert "2 API keys of the backup are revoked" in said
     assert "--keep-keys" in said
@@ -238,7 +238,7 @@ def test_a_real_backup_of_every_version_is_put_back(tmp_path: Path, revision: st
     migrate(engine, revision)
     engine.dispose()
     brought = restore(old, tmp_path / "new")
-    assert (brought.keys, brought.owners) == ((), (BackupOwner(None, 1, 2, 0),))
+    assert (brought.keys, brought.owners) == ((), (BackupOwner(None, 1, 2, 0, 0, 0),))
     with toy_service(tmp_path / "new") as (_, api):
         assert api.finish("run_2")["state"] == "SUCCEEDED"
 
