@@ -158,7 +158,9 @@ async function brightest(path) {
   const picture = await createImageBitmap(await call("GET", `${path}?width_px=${SMALL_PX}`, { as: "blob" }));
   const pen = new OffscreenCanvas(picture.width, picture.height).getContext("2d");
   pen.drawImage(picture, 0, 0);
-  return pen.getImageData(0, 0, picture.width, picture.height).data.reduce((most, value, k) => (k % 4 === 0 && value > most ? value : most), 0);
+  const { data } = pen.getImageData(0, 0, picture.width, picture.height);
+  picture.close();
+  return data.reduce((most, value, k) => (k % 4 === 0 && value > most ? value : most), 0);
 }
 
 const kindOf = () => $("track-form").kind.value;

@@ -65,14 +65,21 @@ def seen(browser: Browser, api: Api) -> Iterator[Seen]:
     seen.page.context.close()
 
 
-def made(api: Api, files: Path, name: str) -> str:
-    """The id of a film with all files, made through the API."""
-    answer = api.client.post("/v1/films", json={"name": name, "cameras": list(CAMERAS)})
-    film = str(answer.json()["id"])
+@pytest.fixture(scope="module")
+def film(api: Api, files: Path) -> str:
+    """The id of a film with all files."""
+    answer = api.client.post("/v1/films", json={"name": "whole", "cameras": list(CAMERAS)})
+    made = str(answer.json()["id"])
     for slot, file in (("cameras", "cameras.yaml"), *((one, f"clip-{one}.avi") for one in CAMERAS)):
-        answer = api.client.put(f"/v1/films/{film}/files/{slot}", content=(files / file).read_bytes())
+        answer = api.client.put(f"/v1/films/{made}/files/{slot}", content=(files / file).read_bytes())
         assert answer.status_code == 200, answer.text
-    return film
+    return made
+
+
+@pytest.fixture(scope="module")
+def tracking(api: Api, film: str) -> str:
+    body = {"film_id": film, "kind": "dot", "light": "continuous", "last_frame": 12}
+    return str(api.client.post("/v1/trackings", json=body).json()["id"])
 
 
 def look(seen: Seen, film: str) -> None:
@@ -167,8 +174,7 @@ def click(seen: Seen, camera: int, pixel: Array, beside: float = 4.0) -> None:
     canvas.click(position={"x": float(x) + beside, "y": float(y)})
 
 
-def test_markers_are_labelled_by_clicks_and_keys(seen: Seen, api: Api, files: Path) -> None:
-    film = made(api, files, "labelled")
+def test_markers_are_labelled_by_clicks_and_keys(seen: Seen, film: str) -> None:
     look(seen, film)
     pixels = [camera.project(wing(0.0)) for camera in cameras()]
     seen.page.click("#label-summary")
@@ -214,11 +220,8 @@ def test_markers_are_labelled_by_clicks_and_keys(seen: Seen, api: Api, files: Pa
 
 
 @pytest.mark.parametrize(("scheme", "width"), [("light", 1280), ("dark", 390)])
-def test_nothing_is_in_the_way(browser: Browser, api: Api, files: Path, scheme: Any, width: int) -> None:
+def test_nothing_is_in_the_way(browser: Browser, api: Api, film: str, tracking: str, scheme: Any, width: int) -> None:
     axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="pip install -e '.[dev]'")
-    film = made(api, files, "seen")
-    body = {"film_id": film, "kind": "dot", "light": "continuous", "last_frame": 12}
-    tracking = api.client.post("/v1/trackings", json=body).json()["id"]
     seen = opened(browser, api, viewport={"width": width, "height": 800}, color_scheme=scheme)
     look(seen, film)
     seen.page.click("#label-summary")
