@@ -244,3 +244,20 @@ def violations(seen: Seen, axe: Any) -> list[Any]:
     found = axe.Axe().run(seen.page).response["violations"]
     wide = seen.page.evaluate("document.documentElement.scrollWidth > innerWidth")
     return [(one["id"], [node["target"] for node in one["nodes"]][:3]) for one in found] + ["wide"] * wide
+
+
+def test_a_tracking_is_cancelled_and_deleted(seen: Seen, api: Api, film: str) -> None:
+    body = {"film_id": film, "kind": "dot", "light": "continuous", "last_frame": 10}
+    ids = [api.client.post("/v1/trackings", json=body | {"name": f"turn {k}"}).json()["id"] for k in range(4)]
+    seen.show(f"tracking={ids[-1]}")  # waits for its turn
+    seen.page.click("#tracking-actions [data-action=cancel]")
+    seen.wait("document.getElementById('tracking-name').textContent === 'turn 3 cancelled'")
+    for other in ids[:-1]:
+        api.client.post(f"/v1/trackings/{other}/cancel")
+    seen.page.click("#tracking-film")
+    seen.wait("document.getElementById('film-trackings')?.textContent.includes('turn 3 cancelled')")
+    seen.page.click("#film-trackings a:text('turn 3')")
+    seen.page.once("dialog", lambda dialog: dialog.accept())
+    seen.page.click("#tracking-actions [data-action=delete]")
+    seen.wait("location.hash === '#films' && document.querySelectorAll('#trackings-table tbody tr').length > 0")
+    assert api.client.get(f"/v1/trackings/{ids[-1]}").status_code == 404
