@@ -25,8 +25,9 @@ MarkerKind = Literal["chequer", "dot"]
 Light = Literal["strobe", "continuous"]
 Progress = Callable[[int, int], object]
 _CHUNK = 50  # instants
-_VERSION = 1
+_VERSION = 2
 _COMPLETE = "complete"
+_COUNT_OFF = 3  # frames by which the count of a container may be wrong
 _LEAST_NOISE = 1.0  # grey levels: quantisation, and compression that removes noise
 
 
@@ -38,11 +39,13 @@ class FilmDetections:
         seen: of each instant: of each flash with a strobe, else of each frame.
         marks: where the flashes are; without strobe ``frame`` is the number of the frame, and the rest has no meaning.
         bad_frames: numbers of frames that could not be decoded, or whose size differs.
+        ended: number of frames at which the film ends, if its container states more; else None.
     """
 
     seen: list[Detections]
     marks: list[FlashMark]
     bad_frames: tuple[int, ...]
+    ended: int | None = None
 
 
 @dataclass(frozen=True)
@@ -72,7 +75,7 @@ def detect_film(task: FilmTask, progress: Progress) -> FilmDetections:
     ``progress`` is called with the count of frames done, and of all.
 
     Raises:
-        DatasetError: the film cannot be read, or a strobe's flashes cannot be separated.
+        DatasetError: the film cannot be read, or less than half of it, or a strobe's flashes cannot be separated.
     """
     frames = task.film.opened()
     folder = task.store / task.key if task.store else None
@@ -81,7 +84,8 @@ def detect_film(task: FilmTask, progress: Progress) -> FilmDetections:
     marks = [one for chunk in chunks for one in chunk.marks]
     bad = [one for chunk in chunks for one in chunk.bad_frames]
     if folder and (folder / _COMPLETE).exists():
-        return FilmDetections(seen, marks, tuple(bad))
+        stored = (folder / _COMPLETE).read_text()
+        return FilmDetections(seen, marks, tuple(bad), int(stored) if stored else None)
     first = task.first
     if marks:
         first = marks[-1].frame + (2 if task.light == "strobe" else 1)
@@ -99,10 +103,26 @@ def detect_film(task: FilmTask, progress: Progress) -> FilmDetections:
             fresh = FilmDetections([], [], ())
         progress(mark.frame + 1 - task.first, of)
     fresh = FilmDetections(fresh.seen, fresh.marks, (*fresh.bad_frames, *limited.bad()))
+    ended = _early_end(task, frames)
     if folder:
         _store(folder, len(chunks), fresh)
-        (folder / _COMPLETE).touch()
-    return FilmDetections(seen + fresh.seen, marks + fresh.marks, (*bad, *fresh.bad_frames))
+        (folder / _COMPLETE).write_text("" if ended is None else str(ended))
+    return FilmDetections(seen + fresh.seen, marks + fresh.marks, (*bad, *fresh.bad_frames), ended)
+
+
+def _early_end(task: FilmTask, frames: Frames) -> int | None:
+    """Return the number of frames of a film that was read to its end, if its container states more; else None."""
+    wanted = min(frames.count, task.last or frames.count)
+    if frames.ended is None or wanted - frames.ended <= _COUNT_OFF:
+        return None
+    if 2 * (frames.ended - task.first) < wanted - task.first:
+        raise fail(
+            str(task.film.path),
+            frames.ended,
+            f"ends at frame {frames.ended}, of {frames.count} that the container states: the file is damaged or cut "
+            f"off. Copy it again, or state last_frame: {frames.ended}",
+        )
+    return frames.ended
 
 
 def detect_frame(frame: Array, kind: MarkerKind) -> Detections:

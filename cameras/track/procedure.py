@@ -106,7 +106,7 @@ def track(request: Request, report: Report = _silent) -> TrackedFilm:
             f"{most} that two cameras see: check the calibration, the unit of the markers' places, and that all "
             "cameras show the same wing",
         )
-    return _result(request, found, instants, clouds, followed, (names, reference))
+    return _result(request, films, found, instants, clouds, followed, (names, reference))
 
 
 def _detected(request: Request, report: Report) -> list[FilmDetections]:
@@ -170,6 +170,7 @@ def _check(request: Request, films: Sequence[Frames]) -> None:
 
 def _result(
     request: Request,
+    films: Sequence[Frames],
     found: Sequence[FilmDetections],
     instants: Instants,
     clouds: Sequence[Cloud],
@@ -203,7 +204,11 @@ def _result(
         pixel_error=error,
         rejected=wrong.reshape(shape).sum(0) + jumped.sum(0),
         bad_frames=tuple(of.bad_frames for of in found),
-        remarks=(*instants.remarks, *_label_remarks(request, instants, followed, markers), *_remarks(request, found)),
+        remarks=(
+            *instants.remarks,
+            *_label_remarks(request, instants, followed, markers),
+            *_remarks(request, films, found),
+        ),
     )
 
 
@@ -279,10 +284,17 @@ def _label_remarks(
     return remarks
 
 
-def _remarks(request: Request, found: Sequence[FilmDetections]) -> list[str]:
-    return [
-        f"{counted(len(of.bad_frames), 'frame')} of camera {camera.name} could not be decoded: "
-        f"{', '.join(map(str, of.bad_frames[:5]))}{', ...' if len(of.bad_frames) > 5 else ''}"
-        for camera, of in zip(request.cameras, found, strict=True)
-        if of.bad_frames
-    ]
+def _remarks(request: Request, films: Sequence[Frames], found: Sequence[FilmDetections]) -> list[str]:
+    """Return remarks about frames that could not be decoded."""
+    remarks = []
+    for camera, film, of in zip(request.cameras, films, found, strict=True):
+        if of.bad_frames:
+            listed = f"{', '.join(map(str, of.bad_frames[:5]))}{', ...' if len(of.bad_frames) > 5 else ''}"
+            count = counted(len(of.bad_frames), "frame")
+            remarks.append(f"{count} of camera {camera.name} could not be decoded: {listed}")
+        if of.ended is not None:
+            remarks.append(
+                f"the film of {camera.name} ends at frame {of.ended}, of {film.count} that its container states: the "
+                "file is damaged or cut off; copy it again"
+            )
+    return remarks

@@ -49,12 +49,22 @@ class Film:
 
 
 class Frames:
-    """Grey frames [H, W] of a film: ``size_px`` is width and height, ``count`` may be off by a few for a video."""
+    """Grey frames [H, W] of a film.
+
+    Attributes:
+        path: of the film.
+        size_px: width and height.
+        rate_hz: frames per second.
+        count: of frames; what the container of a video states, 0 if it does not.
+        ended: number of frames before the end, once the film was read to its end; less than ``count`` if a video is
+            damaged or cut off.
+    """
 
     path: Path
     size_px: tuple[int, int]
     rate_hz: float
     count: int
+    ended: int | None = None
 
     def read(self, first: int = 0) -> Iterator[tuple[int, Array | None]]:
         """Return frames with their numbers, from number ``first``; None is a frame that cannot be decoded."""
@@ -128,6 +138,7 @@ class _VideoFrames(Frames):
                     readable, image = video.retrieve()
                     yield number, _grey(image) if readable else None
                 number += 1
+            self.ended = number
         finally:
             video.release()
 

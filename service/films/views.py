@@ -26,7 +26,7 @@ def uploaded(row: FilmRow) -> dict[str, str]:
     return {name: file for name, file in named.items() if file is not None}
 
 
-def lacking(row: FilmRow, files: FilmFiles) -> list[str]:
+def absent(row: FilmRow, files: FilmFiles) -> list[str]:
     """Return the names of files of a film that are not on the disk of this server."""
     named = uploaded(row)
     wanted = (CALIBRATION, *(camera["name"] for camera in row.cameras))
@@ -35,16 +35,16 @@ def lacking(row: FilmRow, files: FilmFiles) -> list[str]:
 
 def film(row: FilmRow, files: FilmFiles) -> a.Film:
     """Return the JSON answer about the film in ``row``, whose files are looked for."""
-    named, absent = uploaded(row), lacking(row, files)
-    missing = [name for name in absent if name in named]
+    named, gone = uploaded(row), absent(row, files)
+    missing = [name for name in gone if name in named]
     cameras = [_camera(camera, camera["name"] in missing) for camera in row.cameras]
     found: a.Film = {
         "id": row.id,
         "name": row.name,
         "created_at": row.created_at,
         "cameras": cameras,
-        "calibration": CALIBRATION not in absent,
-        "ready": not absent,
+        "calibration": CALIBRATION not in gone,
+        "ready": not gone,
         "missing": missing,
         "size_bytes": row.size_bytes,
     }

@@ -34,8 +34,7 @@ from wingfit.workers.share import lower_priority
 LOG = logging.getLogger("wingfit.runs")
 LONGEST_ERROR = 1000
 MOST_DRIVEN, MOST_DRIVEN_OF_ONE = 16, 4  # jobs that drivers simulate, at the same time; those of one owner
-# Pause between attempts to write to a full disk: the first and the longest.
-RETRY_SECONDS = (0.5, 15.0)
+RETRY_SECONDS = (0.5, 15.0)  # between attempts to write to a full disk: the first and the longest pause
 
 Written = TypeVar("Written")
 
@@ -296,8 +295,7 @@ class Runner:
         # The preparation of the first step may need disk space, too.
         for step in self._patiently(job, first_step):
             points.append((earlier + time.monotonic() - began, step.progress))
-            goes_on = self._store(job, step, points)
-            if self._stopping or not goes_on:
+            if not self._store(job, step, points) or self._stopping:
                 return
 
     def _patiently(self, job: JobRef, write: Callable[[], Written]) -> Written:

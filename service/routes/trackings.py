@@ -152,9 +152,9 @@ def _film(service: Service, film_id: str) -> FilmRow:
     except ProblemError as problem:
         message = "there is no such film; GET /v1/films lists them"
         raise invalid(problem.detail, [error_item("body.film_id", film_id, message)]) from None
-    if lacking := views.lacking(row, service.films.files):
+    if gone := views.absent(row, service.films.files):
         raise conflict(
-            f"film {film_id} has not all its files on this server: {', '.join(lacking)}; upload each: "
+            f"film {film_id} has not all its files on this server: {', '.join(gone)}; upload each: "
             f"PUT /v1/films/{film_id}/files/NAME"
         )
     return row

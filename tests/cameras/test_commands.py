@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
@@ -79,6 +80,26 @@ def test_markers_without_known_places_get_names(film: Path) -> None:
     apart = np.linalg.norm(found[:, None] - wing(time)[None], axis=2)
     assert sorted(apart.argmin(1)) == list(range(12))
     assert apart.min(1).max() < 5e-4
+
+
+def test_a_film_that_was_cut_off_is_remarked(film: Path) -> None:
+    """The remark of ``wingfit track``; the right camera's images are a video that ends early."""
+    path = film.parent / "right.avi"
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), RATE, SIZE)
+    for number in range(FRAMES):
+        image = cv2.imread(str(film.parent / "right" / f"{number}.png"))
+        assert image is not None
+        writer.write(image)
+    writer.release()
+    raw = path.read_bytes()
+    path.write_bytes(raw[: int(0.75 * len(raw))])
+    other = film.parent / "cut.yaml"
+    other.write_text(FILM.replace("path: right,", "path: right.avi,"))
+    code, out, err = wingfit("track", other)
+    assert code == 0, err
+    instants = int(out.split(" instants")[0])
+    assert FRAMES // 2 < instants < FRAMES - 3
+    assert f"the film of right ends at frame {instants}, of {FRAMES} that its container states" in err
 
 
 def test_what_cannot_be_tracked_is_explained(film: Path) -> None:

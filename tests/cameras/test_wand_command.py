@@ -10,6 +10,7 @@ import pytest
 from tests.cameras.calibrate.simulated import SIZE, parameter_errors, ring, wand_tracks
 from tests.command_line import in_process
 from wingfit.cameras.calibrate.wand import Wand
+from wingfit.cameras.camera import Camera
 from wingfit.cameras.files.camera_set import CameraSet
 from wingfit.cameras.files.project import write_cameras
 from wingfit.cameras.files.read import read_cameras
@@ -55,7 +56,7 @@ def dltdv(tracks: dict[str, Array], *, upwards: bool) -> str:
     return "\n".join([",".join(head), *rows]) + "\n"
 
 
-def worst(found: tuple, true: tuple, covariance: Array | None) -> float:
+def worst(found: tuple[Camera, ...], true: tuple[Camera, ...], covariance: Array | None) -> float:
     """The largest error of a parameter that was estimated, in its standard errors."""
     assert covariance is not None
     deviation = np.sqrt(np.diag(covariance))

@@ -156,3 +156,48 @@ def test_an_image_that_is_replaced_makes_another_film(tmp_path: Path) -> None:
     before = task.key
     (folder / "1.png").write_bytes(b"another image")
     assert task.key != before
+
+
+def cut_video(folder: Path, share: float) -> Path:
+    """A video of 40 frames, of which the file ends after this share."""
+    path = folder / "film.avi"
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 25.0, SIZE)
+    image = drawn(SIZE, [(disc, np.array([30.0, 20.0]), 5.0 * np.eye(2))])
+    rng = np.random.default_rng(3)
+    for _ in range(40):
+        writer.write(cv2.cvtColor(noisy(image, 2.0, rng), cv2.COLOR_GRAY2BGR))
+    writer.release()
+    raw = path.read_bytes()
+    path.write_bytes(raw[: int(share * len(raw))])
+    return path
+
+
+def test_a_video_that_ends_early_says_where(tmp_path: Path) -> None:
+    task = FilmTask(Film(cut_video(tmp_path, 0.7)), "dot", "continuous", store=tmp_path / "store")
+    found = detect_film(task, silent)
+    assert found.ended == len(found.seen)
+    assert 24 <= found.ended <= 29
+    # What was stored says so too, also where a run was interrupted before.
+    assert detect_film(task, silent).ended == found.ended
+    (tmp_path / "store" / task.key / "complete").unlink()
+    assert detect_film(task, silent).ended == found.ended
+    # Frames beyond the end were not wanted.
+    assert detect_film(replace(task, last=found.ended), silent).ended is None
+    assert detect_film(replace(task, store=None, last=found.ended + 2), silent).ended is None
+    assert detect_film(replace(task, store=None, last=found.ended + 10), silent).ended == found.ended
+
+
+def test_a_video_of_which_less_than_half_is_read_is_refused(tmp_path: Path) -> None:
+    task = FilmTask(Film(cut_video(tmp_path, 0.4)), "dot", "continuous", store=tmp_path / "store")
+    frames = sum(1 for _ in task.film.opened().read())
+    assert 5 < frames < 20
+    words = f"ends at frame {frames}, of 40 that the container states: .*Copy it again, or state last_frame: {frames}$"
+    for _ in range(2):
+        with pytest.raises(DatasetError, match=words):
+            detect_film(task, silent)
+    assert detect_film(replace(task, last=frames), silent).ended is None
+
+
+def test_a_whole_video_and_images_end_where_they_say(steady: Path, tmp_path: Path) -> None:
+    assert detect_film(FilmTask(Film(cut_video(tmp_path, 1.0)), "dot", "continuous"), silent).ended is None
+    assert detect_film(FilmTask(Film(steady, 100.0), "dot", "continuous"), silent).ended is None

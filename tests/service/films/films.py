@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,6 @@ import httpx
 
 from tests.cameras.films import FRAMES, NAMES, PLACES, RATE, write_film
 from tests.service.conftest import FINAL, Api, Json
-from wingfit.records.array_types import Array
 
 CAMERAS = ("left", "right")
 MARKERS = [
@@ -32,7 +32,7 @@ def write_videos(folder: Path, frames: int = FRAMES) -> Path:
     return folder
 
 
-def write_video(path: Path, images: list[Array], codec: str = "MJPG") -> None:
+def write_video(path: Path, images: Sequence[Any], codec: str = "MJPG") -> None:
     height, width = images[0].shape[:2]
     video = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*codec), RATE, (width, height))
     for image in images:

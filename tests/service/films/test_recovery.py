@@ -116,7 +116,7 @@ def test_the_client_tracks_a_film(client: Client, folder: Path, tmp_path: Path) 
         client.cancel_tracking(tracking["id"])
     client.delete_tracking(tracking["id"])
     client.delete_film(film["id"])
-    assert client.films() == client.trackings() == []
+    assert (client.films(), client.trackings()) == ([], [])
 
 
 def test_the_client_refuses_what_is_no_file(client: Client, tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import shutil
 import socket
 import time
 from collections.abc import Iterator
@@ -154,6 +155,16 @@ def test_names_of_files_are_those_of_the_cameras(served: Api, data: Path) -> Non
     assert stored(data, film) == []
 
 
+def test_no_id_leads_out_of_the_folder(served: Api, data: Path) -> None:
+    for name in ("..", "..%2F..%2Felsewhere", "fl_" + "0" * 5000, "%00", "deleted-x"):
+        for path in (f"/v1/films/{name}", f"/v1/films/{name}/frames/left/0", f"/v1/trackings/{name}/tracks.csv"):
+            for method in ("GET", "DELETE"):
+                answer = served.client.request(method, path)
+                assert answer.status_code in (404, 405), (method, path, answer.text)
+    assert not (data.parent / "elsewhere").exists()
+    assert data.exists()
+
+
 def test_cameras_must_have_those_of_the_film(served: Api, folder: Path, tmp_path: Path) -> None:
     film = new_film(served)["id"]
     write_cameras(tmp_path / "one.yaml", CameraSet(cameras()[:1]))
@@ -234,9 +245,9 @@ def test_the_database_keeps_room_on_the_disk(
     served: Api, data: Path, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     film, video = new_film(served)["id"], (folder / "left.avi").read_bytes()
-    usage = film_files.shutil.disk_usage(data)
+    usage = shutil.disk_usage(data)
     left = film_files.RESERVED_MIB * 2**20 + len(video) // 2
-    monkeypatch.setattr(film_files.shutil, "disk_usage", lambda _: usage._replace(free=left))
+    monkeypatch.setattr("shutil.disk_usage", lambda _: usage._replace(free=left))
     answer = put(served.client, film, "left", video)
     assert (answer.status_code, answer.json()["type"]) == (507, "urn:wingfit:problem:disk-full")
     assert "has no room for the file" in answer.json()["detail"]
