@@ -23,7 +23,7 @@ from wingfit.service.app import create_app
 from wingfit.service.settings import Settings
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser
+    from playwright.sync_api import Browser, FilePayload
 
 CAMERAS = ("left", "right")
 NOTE = "document.querySelectorAll('#look-views .note')[{}].textContent"
@@ -47,7 +47,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
         codec = cv2.VideoWriter.fourcc(*"MJPG")
         writer = cv2.VideoWriter(str(folder / f"clip-{name}.avi"), codec, RATE, SIZE, isColor=False)
         for number in range(FRAMES):
-            writer.write(cv2.imread(str(folder / name / f"{number}.png"), cv2.IMREAD_GRAYSCALE))
+            writer.write(np.asarray(cv2.imread(str(folder / name / f"{number}.png"), cv2.IMREAD_GRAYSCALE)))
         writer.release()
     return folder
 
@@ -146,8 +146,9 @@ def test_faults_are_shown_at_the_file_concerned(seen: Seen, api: Api, files: Pat
     film = api.client.post("/v1/films", json={"name": "faulty", "cameras": list(CAMERAS)}).json()["id"]
     seen.show(f"film={film}")
     seen.wait("document.querySelectorAll('#film-files li').length === 3")
-    text = {"name": "notes left.txt", "mimeType": "text/plain", "buffer": b"no video"}
-    seen.page.set_input_files("#film-picked", [{"name": "clip 7.avi", "mimeType": "video/avi", "buffer": b"x"}, text])
+    other: FilePayload = {"name": "clip 7.avi", "mimeType": "video/avi", "buffer": b"x"}
+    text: FilePayload = {"name": "notes left.txt", "mimeType": "text/plain", "buffer": b"no video"}
+    seen.page.set_input_files("#film-picked", [other, text])
     assert "clip 7.avi: the name contains none of the cameras' (left, right)" in seen.page.inner_text("#film-unmatched")
     seen.page.wait_for_selector("#film-files li:nth-child(2) .error")
     assert "video" in seen.page.inner_text("#film-files li:nth-child(2) .error")
@@ -209,7 +210,7 @@ def test_markers_are_labelled_by_clicks_and_keys(seen: Seen, film: str) -> None:
     seen.page.fill("#track-form [name=last_frame]", "12")
     with seen.page.expect_request("**/v1/trackings") as sent:
         seen.page.click("#track-form [type=submit]")
-    labels = sent.value.post_data_json["labels"]
+    labels = json.loads(sent.value.post_data or "")["labels"]
     assert {(one["camera"], one["frame"]) for one in labels} == {("left", 0), ("right", 0)}
     assert sorted(one["marker"] for one in labels) == [f"m0{k // 2 + 1}" for k in range(12)]
     seen.wait(TRACKED, 60)
