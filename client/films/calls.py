@@ -42,7 +42,8 @@ class FilmCalls(Watching):
         def send() -> httpx.Response:
             with CountedFile(source, on_bytes) as stream:
                 length = {"Content-Length": str(source.stat().st_size)}
-                return self._http.put(url, content=iter(lambda: stream.read(_PIECE), b""), headers=length)
+                pieces = iter(lambda: stream.read(_PIECE), b"")
+                return self._http.put(url, content=pieces, headers=length, timeout=self.simulating)
 
         return cast(Film, self._repeat(send).json())
 

@@ -134,16 +134,19 @@ class FilmFiles:
     def set_aside(self, film_id: str) -> None:
         """Rename the folder of a film that is being deleted, which :meth:`remove` finishes."""
         if self.folder(film_id).exists():
-            self.folder(film_id).replace(self._root / f"{DELETED}{film_id}")
+            self.folder(film_id).replace(self._aside(film_id))
 
     def put_back(self, film_id: str) -> None:
         """Undo :meth:`set_aside`, because the deletion was not stored."""
-        if (aside := self._root / f"{DELETED}{film_id}").exists():
-            aside.replace(self.folder(film_id))
+        if self._aside(film_id).exists():
+            self._aside(film_id).replace(self.folder(film_id))
 
     def remove(self, film_id: str) -> None:
         """Remove the folder that was set aside."""
-        shutil.rmtree(self._root / f"{DELETED}{film_id}", ignore_errors=True)
+        shutil.rmtree(self._aside(film_id), ignore_errors=True)
+
+    def _aside(self, film_id: str) -> Path:
+        return self._root / f"{DELETED}{_name(FILM, film_id)}"
 
     def forget_tracked(self, tracking_id: str) -> None:
         """Remove the tracks of a tracking that was deleted."""
@@ -158,7 +161,8 @@ class FilmFiles:
         films = set(known)
         for folder in self._root.glob(f"{DELETED}*"):
             film_id = folder.name.removeprefix(DELETED)
-            (self.put_back if film_id in films else self.remove)(film_id)
+            if FILM.fullmatch(film_id):
+                (self.put_back if film_id in films else self.remove)(film_id)
         for part in self._root.glob(f"*/videos/*{PART}"):
             part.unlink(missing_ok=True)
         return sorted(one.name for one in self._root.iterdir() if one.is_dir() and one.name not in films)

@@ -185,6 +185,7 @@ class Films:
 
     def delete(self, film_id: str) -> None:
         """Delete a film with its files; a 409 while trackings refer to it."""
+        renamed = False
         try:
             with self._database.write() as session:
                 row = store.one(session, FilmRow, film_id)
@@ -194,8 +195,10 @@ class Films:
                 session.delete(row)
                 session.flush()
                 self.files.set_aside(film_id)
+                renamed = True
         except BaseException:
-            self.files.put_back(film_id)
+            if renamed:
+                self.files.put_back(film_id)
             raise
         self.videos.forget(self.files.folder(film_id))
         self.files.remove(film_id)

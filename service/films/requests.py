@@ -18,9 +18,8 @@ MOST_FRAMES = 10**9 - 1
 
 
 def _different(cameras: list[str]) -> list[str]:
-    twice = next((name for name in cameras if cameras.count(name) > 1), None)
-    if twice is not None:
-        raise PydanticCustomError("repeated", "'{name}' is there twice; name each camera once", {"name": twice})
+    if len(set(cameras)) < len(cameras):
+        raise PydanticCustomError("repeated", "two cameras have the same name; name each once")
     if CALIBRATION in cameras:
         raise PydanticCustomError(
             "reserved", "no camera can be called '{name}', as the file of calibrated cameras is", {"name": CALIBRATION}

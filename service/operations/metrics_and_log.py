@@ -27,7 +27,7 @@ SECONDS = (0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 10
 REQUEST_ID = "X-Request-ID"
 METRICS = "metrics"  # name of the metrics in the state that the lifespan yields
 VALID_ID = re.compile(r"[A-Za-z0-9._-]{1,64}")
-METHODS = ("GET", "HEAD", "POST", "DELETE")
+METHODS = ("GET", "HEAD", "POST", "PUT", "DELETE")
 
 # The id of the request being answered; None outside requests.
 REQUEST: ContextVar[str | None] = ContextVar("request", default=None)

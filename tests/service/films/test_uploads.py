@@ -155,6 +155,16 @@ def test_names_of_files_are_those_of_the_cameras(served: Api, data: Path) -> Non
     assert stored(data, film) == []
 
 
+def test_no_id_leads_out_of_the_folder(served: Api, data: Path) -> None:
+    for name in ("..", "..%2F..%2Felsewhere", "fl_" + "0" * 5000, "%00", "deleted-x"):
+        for path in (f"/v1/films/{name}", f"/v1/films/{name}/frames/left/0", f"/v1/trackings/{name}/tracks.csv"):
+            for method in ("GET", "DELETE"):
+                answer = served.client.request(method, path)
+                assert answer.status_code in (404, 405), (method, path, answer.text)
+    assert not (data.parent / "elsewhere").exists()
+    assert data.exists()
+
+
 def test_cameras_must_have_those_of_the_film(served: Api, folder: Path, tmp_path: Path) -> None:
     film = new_film(served)["id"]
     write_cameras(tmp_path / "one.yaml", CameraSet(cameras()[:1]))
