@@ -21,14 +21,16 @@ from wingfit.diagnosis.search_state import CountingEvaluator, SearchState
 from wingfit.diagnosis.spec import DiagnosisSpec, Progress
 from wingfit.diagnosis.subject import Subject, select_suspects
 from wingfit.diagnosis.verdict.build_finding import build_finding
+from wingfit.diagnosis.verdict.frame import frame_refuted
 from wingfit.inference.noise.series_fit import SeriesReduction
-from wingfit.records import AnyRecording, Dataset, Series, SeriesDataset
+from wingfit.records import AnyRecording, Dataset, FrameError, Series, SeriesDataset
 from wingfit.records.blas_threads import one_blas_thread
 from wingfit.rigs.rig import Rig
 from wingfit.rigs.rig_model import RigModel
 
 MOST_IN_PAIRS = 20  # suspects of which every pair can be fitted
 SEARCH_FRACTION = 0.7  # of the work; the rest locates the missing physics and validates the hypothesis
+STATED_FRAME = 0.9  # of the search: with the stated errors of the frame; the rest is for where they are refuted
 
 
 @one_blas_thread
@@ -58,8 +60,9 @@ def diagnose(dataset: Dataset, spec: DiagnosisSpec, evaluator: Evaluator) -> Ite
     """Diagnose ``dataset``; yields progress, with the finding last. ValueError where ``spec`` does not fit."""
     subject, fitted, held_out, free = _prepare(dataset, spec)
     _check_search(subject, spec)
+    axes, frame = _axes(dataset, spec), dataset.frame_error
     yield from diagnose_subject(
-        subject, dataset.name, fitted, held_out, spec, evaluator, free=free, axes=_axes(dataset, spec)
+        subject, dataset.name, fitted, held_out, spec, evaluator, free=free, axes=axes, frame=frame
     )
 
 
@@ -98,20 +101,29 @@ def diagnose_subject(
     free: tuple[str, ...] = (),
     axes: tuple[str, ...] = (),
     series: SeriesReduction | None = None,
+    frame: FrameError | None = None,
 ) -> Iterator[Progress]:
     """Diagnose any rig that implements :class:`Subject`; yields progress, the finding with the last report.
 
     ``name``: of the dataset; ``fitted``, ``held_out``: recordings to fit and to validate with; ``free``: nominal genes
     to fit (empty: all that a calibration searches); ``axes``: force axes to fit (empty: the default); ``series``: how
-    recordings without a beat are reduced.
+    recordings without a beat are reduced; ``frame``: errors of the frame of tracks.
     """
     began = time.monotonic()
     yield Progress(0.0, "reading the recordings", 0)
     held_out, copies = _without_copies(fitted, held_out)
     counted = CountingEvaluator(evaluator)
-    state = SearchState(FitContext(subject, WhitenedData.of(fitted, axes, spec.policy, series), counted), spec)
-    for fraction, stage in run_search(state, free or tuple(subject.model.searched)):
-        yield Progress(SEARCH_FRACTION * fraction, stage, counted.evaluations)
+    context = FitContext(subject, WhitenedData.of(fitted, axes, spec.policy, series), counted)
+    genes, refuted, done = free or tuple(subject.model.searched), tuple[str, ...](), 0.0
+    for tried in (frame, None) if frame else (None,):
+        state = SearchState(context, spec, frame_error=tried)
+        until = STATED_FRAME if tried else 1.0
+        for fraction, stage in run_search(state, genes):
+            yield Progress(SEARCH_FRACTION * (done + (until - done) * fraction), stage, counted.evaluations)
+        done, beyond = until, frame_refuted(state)
+        if beyond is None:
+            break
+        refuted = (beyond,)
     finding: Finding | None = None
     for fraction, stage, found in build_finding(state, name, held_out):
         finding = found
@@ -119,7 +131,7 @@ def diagnose_subject(
     if finding is None:
         raise ValueError("the diagnosis ended without a finding")
     spent, evaluations = time.monotonic() - began, counted.evaluations
-    remarks = (*finding.remarks, *copies, *_repeated(fitted, held_out))
+    remarks = (*refuted, *finding.remarks, *copies, *_repeated(fitted, held_out))
     finding = replace(finding, remarks=remarks, seconds=spent, evaluations=evaluations, versions=_versions())
     yield Progress(1.0, "done", evaluations, finding)
 

@@ -49,8 +49,8 @@ def run_search(state: SearchState, free: tuple[str, ...]) -> Steps:
         state.initial_fit = state.initial_fit or (state.context, fit)
         yield 0.25 * (1.0 - 0.85 ** (k + 1)), "fitting the nominal model"
     state.judge_noise(fit)
-    if state.allow_for_marker_errors(fit):
-        yield 0.24, "fitting the nominal model, allowing for errors of the markers' rest positions"
+    if state.allow_for_position_errors(fit):
+        yield 0.24, "fitting the nominal model, allowing for errors of positions"
         fit = state.fitted_again(fit)
     yield 0.25, "comparing with a finer discretisation"
     suspects = state.suspects

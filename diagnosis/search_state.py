@@ -11,8 +11,8 @@ from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.problem import Evaluation, Problem
 from wingfit.diagnosis.evidence.context import FitContext
 from wingfit.diagnosis.evidence.fit import COST_TOLERANCE, FIT_ERRORS, Fit, gauss_newton_fit
-from wingfit.diagnosis.evidence.marker_errors import MarkerErrors, find_marker_errors
 from wingfit.diagnosis.evidence.nominal import NOMINAL_STEPS, Nominal
+from wingfit.diagnosis.evidence.position_errors import PositionErrors, find_position_errors
 from wingfit.diagnosis.evidence.refit import Refit, is_in_position
 from wingfit.diagnosis.evidence.screen import Trial
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
@@ -20,6 +20,7 @@ from wingfit.diagnosis.spec import DiagnosisSpec
 from wingfit.diagnosis.subject import Subject, beat_subject, select_suspects
 from wingfit.diagnosis.verdict.noise_doubt import judged_noise
 from wingfit.diagnosis.verdict.weigh_hypotheses import HypothesisWeights, tolerated_excess
+from wingfit.records import FrameError
 from wingfit.records.array_types import ArrayLike
 from wingfit.rigs.suspect import Suspect
 
@@ -34,7 +35,9 @@ class SearchState:
         trials: score tests, a list for each suspect, best first.
         refits: fits with suspects added.
         weights: evidence and probability of each fit; None until the search ends.
-        marker_errors: of the described rest positions, integrated out of ``data``; None where they do not matter.
+        position_errors: of the described rest positions and of the frame, integrated out of ``data``; None where they
+            do not matter.
+        frame_error: stated with the dataset.
         initial_fit: the nominal model at the estimates of its genes, before any step of a fit, and the context used for
             it.
     """
@@ -45,7 +48,8 @@ class SearchState:
     trials: list[list[Trial]] = field(default_factory=list)
     refits: list[Refit] = field(default_factory=list)
     weights: HypothesisWeights | None = None
-    marker_errors: MarkerErrors | None = None
+    position_errors: PositionErrors | None = None
+    frame_error: FrameError | None = None
     initial_fit: tuple[FitContext, Fit] | None = None
 
     @property
@@ -96,16 +100,19 @@ class SearchState:
 
         The other part is of errors of the markers' rest positions, although these are integrated out.
         """
-        return float(np.hypot(discretisation, self.marker_errors.shared if self.marker_errors else 0.0))
+        return float(np.hypot(discretisation, self.position_errors.shared if self.position_errors else 0.0))
 
-    def allow_for_marker_errors(self, nominal: Fit) -> bool:
-        """Measure errors of rest positions at the fit ``nominal``, and allow for them; return whether they matter."""
+    def allow_for_position_errors(self, nominal: Fit) -> bool:
+        """Measure errors of rest positions at the fit ``nominal``; allow for these and those of the frame.
+
+        Returns whether any matter.
+        """
         if self.data.kind != "tracks":
             return False
-        found = find_marker_errors(beat_subject(self.subject), self.data, nominal)
+        found = find_position_errors(beat_subject(self.subject), self.data, nominal, self.frame_error)
         if found is None:
             return False
-        self.marker_errors, data = found
+        self.position_errors, data = found
         self.context = replace(self.context, data=data)
         if self.initial_fit:
             context, fit = self.initial_fit

@@ -5,7 +5,16 @@ Axes (docs/notation.md) of a wing: x aft along the chord, y outboard along the s
 of a vehicle: x forward to the nose, z down.
 """
 
-from wingfit.records.dataset import AnyDataset, AnyRecording, Condition, Dataset, LowPass, Recording, wing_or_vehicle
+from wingfit.records.dataset import (
+    AnyDataset,
+    AnyRecording,
+    Condition,
+    Dataset,
+    FrameError,
+    LowPass,
+    Recording,
+    wing_or_vehicle,
+)
 from wingfit.records.drive import Drive, FourBarDrive, FourierDrive
 from wingfit.records.errors import DatasetError, Fault
 from wingfit.records.files.storage import load_archive, load_dataset, save_dataset
@@ -25,9 +34,42 @@ from wingfit.records.vehicle import (
 from wingfit.records.wing import Hinge, Marker, Materials, Rod, Station, Wing
 
 __all__ = [
-    "AnyDataset", "AnyRecording", "Channel", "ChordStation", "Condition", "Dataset", "DatasetError", "Drive",
-    "EstimateError", "Fault", "Flap", "FourBarDrive", "FourierDrive", "FourierFlap", "FourierPitch", "Gene",
-    "Genome", "Hinge", "LowPass", "Marker", "Materials", "PassivePitch", "Pitch", "Quantity", "Recording", "Rod",
-    "Series", "SeriesDataset", "SplitCycleFlap", "Station", "Vehicle", "Wing", "WingMotion", "load_archive",
-    "load_dataset", "save_dataset", "wing_or_vehicle",
+    "AnyDataset",
+    "AnyRecording",
+    "Channel",
+    "ChordStation",
+    "Condition",
+    "Dataset",
+    "DatasetError",
+    "Drive",
+    "EstimateError",
+    "Fault",
+    "Flap",
+    "FourBarDrive",
+    "FourierDrive",
+    "FourierFlap",
+    "FourierPitch",
+    "FrameError",
+    "Gene",
+    "Genome",
+    "Hinge",
+    "LowPass",
+    "Marker",
+    "Materials",
+    "PassivePitch",
+    "Pitch",
+    "Quantity",
+    "Recording",
+    "Rod",
+    "Series",
+    "SeriesDataset",
+    "SplitCycleFlap",
+    "Station",
+    "Vehicle",
+    "Wing",
+    "WingMotion",
+    "load_archive",
+    "load_dataset",
+    "save_dataset",
+    "wing_or_vehicle",
 ]  # fmt: skip

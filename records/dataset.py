@@ -107,10 +107,24 @@ class Recording:
 
 
 @dataclass(frozen=True)
+class FrameError:
+    """Standard errors of the frame in which all recordings of a wing are stated, as an alignment gives them.
+
+    Attributes:
+        rotation: of small rotations about x, y and z of the wing, rad.
+        origin: of the origin along x, y and z, m.
+    """
+
+    rotation: tuple[float, float, float]
+    origin: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
 class Dataset(Recorded[Recording]):
     """A wing with recordings of tracks, or a vehicle with recordings of forces; ``rig`` describes the wing or vehicle.
 
-    Recordings named in ``held_out`` are used for validation only, never for fitting.
+    Recordings named in ``held_out`` are used for validation only, never for fitting. ``frame_error``: of the frame of
+    the tracks, which all recordings share; None if unknown, and for a vehicle.
     """
 
     name: str
@@ -118,6 +132,7 @@ class Dataset(Recorded[Recording]):
     recordings: tuple[Recording, ...]
     held_out: tuple[str, ...] = ()
     description: str = ""
+    frame_error: FrameError | None = None
 
     def __post_init__(self) -> None:
         refuse_text(self, "held_out")

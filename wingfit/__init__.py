@@ -6,7 +6,8 @@ The names below are public and documented; everything else in the package may ch
 - :func:`load_dataset` reads recordings from a folder, a zip file of a folder, or NetCDF. If they are not valid, it
 raises :class:`DatasetError`, which lists what is wrong.
 - :func:`import_tracks` reads marker tracks from the files of motion-capture systems and digitisers, and returns
-:class:`ImportedTracks`; :func:`align_tracks` brings them to the frame of a described wing, :class:`AlignedTracks`.
+:class:`ImportedTracks`; :func:`align_tracks` brings them to the frame of a described wing, :class:`AlignedTracks`;
+:func:`align_recordings` those of several recordings to one frame.
 - :func:`import_forces` reads forces from the files of balances, and returns :class:`ImportedForces`.
 - :func:`wing_template` describes a wing by an outline of its planform, and returns :class:`WingTemplate`;
 :func:`wing_drawing` draws a described wing as SVG.
@@ -25,7 +26,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from wingfit._align import align_tracks
+    from wingfit._align import align_recordings, align_tracks
     from wingfit._drive import drive
     from wingfit._film import track_film
     from wingfit._local import calibrate, diagnose
@@ -98,6 +99,7 @@ __all__ = [
     "TrackedFilm",
     "WingTemplate",
     "WingfitError",
+    "align_recordings",
     "align_tracks",
     "calibrate",
     "check_dataset",
@@ -117,7 +119,7 @@ __all__ = [
 ]
 
 _MODULES = {
-    "wingfit._align": ("align_tracks",),
+    "wingfit._align": ("align_recordings", "align_tracks"),
     "wingfit._drive": ("drive",),
     "wingfit._film": ("track_film",),
     "wingfit._local": ("calibrate", "diagnose"),

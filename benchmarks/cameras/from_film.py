@@ -12,12 +12,14 @@ from benchmarks.cameras.render import write
 from benchmarks.cameras.renderer.presets import BEAT, thesis_strobe
 from benchmarks.cameras.renderer.simulated import simulated_scene
 from benchmarks.cameras.tracked import calibrated
+from wingfit.cameras.calibrate.result import Calibration
 from wingfit.cameras.track.procedure import Request, track
 from wingfit.cameras.track.result import TrackedFilm
 from wingfit.cameras.video.source import Film
-from wingfit.records import Condition, Dataset, Recording, Wing
+from wingfit.records import Condition, Dataset, FrameError, Recording, Wing
+from wingfit.records.array_types import Array
 from wingfit.sim.virtual_rigs.campaign import robird_wing
-from wingfit.tracking.alignment import Known, Tracks, align
+from wingfit.tracking.alignment import AlignedTracks, Known, Tracks, align, in_common_frame
 
 CONDITIONS = ((1e3, 0.0), (1e4, 0.0524), (1e5, 0.0), (1e5, 0.1222), (1e4, 0.1222))
 HELD_OUT = 4
@@ -29,24 +31,28 @@ Report = Callable[[str], object]
 def dataset_from_films(folder: Path, genes: Mapping[str, float], report: Report, flashes: int = FLASHES) -> Dataset:
     """Film a simulated wing with ``genes`` under all conditions, and return what a user would get from the films."""
     wing = robird_wing()
-    recordings = []
+    films, calibration = list[TrackedFilm](), None
     for number, (pressure, lag) in enumerate(CONDITIONS):
         condition = Condition(BEAT, lag, pressure, KELVIN)
-        name = f"film{number}"
-        report(f"{name}: rendering")
-        place = folder / name
+        place = folder / f"film{number}"
+        report(f"{place.name}: rendering")
         if not (place / "done").exists():
             made = thesis_strobe(flashes=flashes, seed=number + 1, scene=simulated_scene(condition, genes))
             write(replace(made, wand=replace(made.wand, until=0.1)), place)
             (place / "done").touch()
-        report(f"{name}: tracking")
-        recordings.append(_recording(name, wing, condition, _tracked(place, wing)))
-    held_out = (recordings[HELD_OUT].name,)
-    return Dataset("films of a wing", wing, tuple(recordings), held_out)
+        calibration = calibration or calibrated(place, ["left", "right"])  # the cameras stay where they are
+        report(f"{place.name}: tracking")
+        films.append(_tracked(place, wing, calibration))
+    report("aligning")
+    known = Known(side="right", flap_frequency_hz=BEAT)
+    tracks = [Tracks(f"film{k}", one.times, one.names, one.positions) for k, one in enumerate(films)]
+    every = in_common_frame([align(one, wing, known) for one in tracks])
+    recordings = tuple(_recording(one, condition) for one, condition in zip(every, CONDITIONS, strict=True))
+    frame = FrameError(_triple(every[0].rotation_error), _triple(every[0].origin_error))
+    return Dataset("films of a wing", wing, recordings, (recordings[HELD_OUT].name,), frame_error=frame)
 
 
-def _tracked(place: Path, wing: Wing) -> TrackedFilm:
-    calibration = calibrated(place, ["left", "right"])
+def _tracked(place: Path, wing: Wing, calibration: Calibration) -> TrackedFilm:
     request = Request(
         cameras=calibration.cameras,
         films=tuple(Film(place / f"wing-{camera.name}.avi") for camera in calibration.cameras),
@@ -60,7 +66,13 @@ def _tracked(place: Path, wing: Wing) -> TrackedFilm:
     return track(request)
 
 
-def _recording(name: str, wing: Wing, condition: Condition, found: TrackedFilm) -> Recording:
-    aligned = align(Tracks(name, found.times, found.names, found.positions), wing, Known(side="right"), lambda _: None)
-    values = aligned.positions.reshape(len(found.times), -1)
-    return Recording(name, "vacuum_chamber", condition, aligned.times, aligned.markers, values)
+def _recording(aligned: AlignedTracks, condition: tuple[float, float]) -> Recording:
+    pressure, lag = condition
+    values = aligned.positions.reshape(len(aligned.times), -1)
+    known = Condition(aligned.flap_frequency, lag, pressure, KELVIN)
+    return Recording(aligned.file, "vacuum_chamber", known, aligned.times, aligned.markers, values)
+
+
+def _triple(values: Array) -> tuple[float, float, float]:
+    x, y, z = values.tolist()
+    return x, y, z

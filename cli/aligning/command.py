@@ -7,16 +7,28 @@ from typing import Annotated, Literal
 
 import typer
 
-from wingfit.cli.base.files import new_file, write_text
+from wingfit.cli.base.files import check_file, write_text
 from wingfit.cli.base.output import late_progress, note, print_json
 from wingfit.client.transport import WingfitError
 
 
 def align(
-    tracks: Annotated[Path, typer.Argument(metavar="TRACKS", help="Tracks: what wingfit import writes, or reads.")],
+    tracks: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="TRACKS...",
+            help="Tracks: what wingfit import or track writes, or import reads. Several are recordings by cameras that "
+            "stayed where they were: they get one common frame.",
+        ),
+    ],
     wing: Annotated[Path, typer.Option(help="Description of the wing: dataset.yaml, or the keys of a wing alone.")],
     output: Annotated[
-        Path | None, new_file("Write the tracks in the wing's frame: FILE.csv.", "--output", "-o")
+        Path | None,
+        typer.Option(
+            "--output",
+            "-o",
+            help="Write the tracks in the wing's frame: FILE.csv; of several recordings, a folder.",
+        ),
     ] = None,
     axes: Annotated[
         Literal["wing", "body"],
@@ -37,6 +49,10 @@ def align(
     mean_flap_deg: Annotated[
         float | None, typer.Option(help="Mean flap angle over the beat; default: that of the described drive.")
     ] = None,
+    flap_frequency_hz: Annotated[
+        float | None,
+        typer.Option(help="As set on the rig, to 2 %: the true one on the cameras' clock is found; a strobe needs it."),
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Find the frame of a wing in tracks of any camera axes, name its markers, and write the tracks in that frame.
@@ -46,14 +62,14 @@ def align(
 
     Example: wingfit align trial.csv --wing dataset.yaml -o aligned.csv
     """
-    from wingfit._align import align_tracks  # imported late: other commands start faster
+    from wingfit._align import align_recordings  # imported late: other commands start faster
     from wingfit.cli.aligning import results
     from wingfit.records.errors import DatasetError
 
-    _check_output(output, tracks, force=force)
+    targets = _targets(output, tracks, force=force)
     try:
         with late_progress("aligning") as report:
-            found = align_tracks(
+            every = align_recordings(
                 tracks,
                 wing,
                 side=side,
@@ -62,26 +78,54 @@ def align(
                 ignore_names=ignore_names,
                 body=tuple(name.strip() for name in body.split(",") if name.strip()),
                 mean_flap_deg=mean_flap_deg,
+                flap_frequency_hz=flap_frequency_hz,
                 report=report,
             )
     except DatasetError as error:
         count = f"{error.count} error{'s' if error.count > 1 else ''}"
         raise WingfitError("the tracks were not aligned", count, errors=[vars(one) for one in error.errors]) from error
-    if output:
-        write_text(output, found.csv(axes), f"aligned tracks of {found.file}")
+    for target, found in zip(targets, every, strict=False):
+        write_text(target, found.csv(axes), f"aligned tracks of {found.file}")
     if as_json:
-        print_json(found.as_json() | {"written": None if output is None else str(output)})
+        written: list[str | None] = [str(one) for one in targets] if targets else [None] * len(every)
+        answers = [found.as_json() | {"written": one} for found, one in zip(every, written, strict=True)]
+        print_json(answers[0] if len(answers) == 1 else {"recordings": answers})
         return
-    results.show(found)
-    if not output:
+    for found in every:
+        results.show(found, is_true=flap_frequency_hz is not None)
+    if not targets:
         note("nothing was written; to write the tracks, add: --output FILE.csv")
 
 
-def _check_output(output: Path | None, tracks: Path, *, force: bool) -> None:
-    if output is None or not output.exists():
+def _targets(output: Path | None, tracks: list[Path], *, force: bool) -> list[Path]:
+    """Return the files to write for ``tracks``, none without ``output``; a usage error if one cannot be written."""
+    if output is None:
+        return []
+    if len(tracks) == 1:
+        check_file(output, "--output", (".csv",))
+        targets = [output]
+    else:
+        if output.exists() and not output.is_dir():
+            raise typer.BadParameter(f"{output} is a file; name a folder for several", param_hint="--output")
+        targets = [output / f"{one.stem}.csv" for one in tracks]
+        twice = [one.name for one in targets if targets.count(one) > 1]
+        if twice:
+            raise typer.BadParameter(f"two recordings would be written to {twice[0]}; rename one", param_hint="TRACKS")
+    for target in targets:
+        _check_output(target, tracks, force=force)
+    if len(tracks) > 1:
+        try:
+            output.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise WingfitError(f"cannot make the folder {output}", error.strerror or str(error)) from error
+    return targets
+
+
+def _check_output(output: Path, tracks: list[Path], *, force: bool) -> None:
+    if not output.exists():
         return
-    if tracks.exists() and output.samefile(tracks):
-        raise typer.BadParameter(f"{output} is the file that is read; name another", param_hint="--output")
+    if any(one.exists() and output.samefile(one) for one in tracks):
+        raise typer.BadParameter(f"{output} is a file that is read; name another", param_hint="--output")
     if not force:
         raise typer.BadParameter(f"{output} exists; name another, or overwrite it with --force", param_hint="--output")
 

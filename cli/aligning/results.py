@@ -9,8 +9,11 @@ from wingfit.tracking.alignment import AlignedTracks
 from wingfit.tracking.alignment.result import MarkerResult
 
 
-def show(found: AlignedTracks) -> None:
-    """Print the frame, the labels, the residuals and the rest positions."""
+def show(found: AlignedTracks, *, is_true: bool) -> None:
+    """Print the frame, the labels, the residuals and the rest positions.
+
+    ``is_true``: the flap frequency is not that of an alias.
+    """
     frames = f"{len(found.times)} frames, {len(found.markers)} markers"
     say(f"{found.file}: {found.side} wing, {frames}, residual {mm(1e3 * found.noise)} mm")
     turned = np.degrees(found.rotation_error)
@@ -22,8 +25,11 @@ def show(found: AlignedTracks) -> None:
     origin = ", ".join(f"{1e3 * value:.2f}" for value in found.origin)
     errors = ", ".join(f"{1e3 * value:.2f}" for value in found.origin_error)
     say(f"origin in the tracks: {origin} mm; standard errors along wing x, y, z: {errors} mm")
+    turns, moves = (", ".join(f"{value:.3g}" for value in one) for one in (turned, found.origin_error))
+    say(f"for the dataset: frame_error: {{rotation_deg: [{turns}], origin_m: [{moves}]}}")
     say(f"side: {found.side}, {_evidence(found.side_evidence)}")
-    period = f"{number(found.flap_frequency)} Hz as it appears in the frames"
+    where = "on the clock of the cameras" if is_true else "as it appears in the frames"
+    period = f"{number(found.flap_frequency, 7)} Hz {where}"
     angles = f"mean {np.degrees(found.mean_flap):.2f} deg, half range {np.degrees(found.flap_amplitude):.1f} deg"
     say(f"flapping: {angles}, {period}")
     scatter = f"{mm(1e3 * found.rest_scatter)} mm"

@@ -64,8 +64,8 @@ def build_finding(state: SearchState, name: str, held_out: Sequence[AnyRecording
     yield 0.0, "computing the intervals of the genes", None
     best = replace(best, fit=with_measured_jacobian(state.context, best.fit))
     yield 0.05, "predicting the held-out recordings", None
-    validation, failed = predict_held_out(held_out, state.context, state.marker_errors, nominal.fit, best.fit)
-    own = fitted_residuals(state.context, state.marker_errors, nominal.fit, best.fit)
+    validation, failed = predict_held_out(held_out, state.context, state.position_errors, nominal.fit, best.fit)
+    own = fitted_residuals(state.context, state.position_errors, nominal.fit, best.fit)
     refuted = (
         decision.verdict == "adequate"
         and validation is not None
@@ -190,7 +190,7 @@ def _finding(
             *state.fitted_nominal.remarks,
             *_refinement_remarks(state.fitted_nominal),
             *_noise_remarks(data, nominal, unit, decision),
-            *marker_remarks(data, state.marker_errors, best.fit),
+            *marker_remarks(data, state.position_errors, best.fit),
             *_unidentified_sizes(genes, best),
             *_worsened(rows, best, unit),
         ),

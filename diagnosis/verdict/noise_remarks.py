@@ -5,13 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from wingfit.diagnosis.evidence.fit import Fit
-from wingfit.diagnosis.evidence.marker_errors import MarkerErrors, too_many
+from wingfit.diagnosis.evidence.position_errors import PositionErrors, too_many
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.finding import amount
 from wingfit.diagnosis.verdict.noise_doubt import UNEVEN, faint, noisier, quiet_noise
 from wingfit.diagnosis.verdict.weigh_hypotheses import drifts
 from wingfit.inference.noise.drift import Drift
 from wingfit.inference.noise.harmonic import still_markers
+from wingfit.records import FrameError
+from wingfit.records.array_types import Array, Float
 
 
 def noise_remarks(data: WhitenedData, unit: str) -> tuple[str, ...]:
@@ -100,22 +102,39 @@ def _faint_remarks(data: WhitenedData) -> tuple[str, ...]:
     return (remark,) if faint(data) else ()
 
 
-def marker_remarks(data: WhitenedData, errors: MarkerErrors | None, best: Fit) -> tuple[str, ...]:
+def marker_remarks(data: WhitenedData, errors: PositionErrors | None, best: Fit) -> tuple[str, ...]:
     """Return a remark on ``errors`` of rest positions, estimated at the fit ``best``; empty if they are negligible."""
     if errors is None:
         remark = (
             "errors of the markers' rest positions are not estimated with so many markers and recordings: fit fewer"
         )
         return (remark,) if data.kind == "tracks" and too_many(data) else ()
-    sizes = np.linalg.norm(errors.estimates(data, best), axis=1)
+    estimated, remarks = errors.estimates(data, best), list[str]()
+    if errors.frame:
+        remarks.append(_frame_remark(errors.frame, estimated.frame))
+    if not errors.sd:
+        return tuple(remarks)
+    sizes = np.linalg.norm(estimated.rest, axis=1)
     worst = int(np.argmax(sizes))
-    remark = (
+    remarks.append(
         f"the described rest positions of the markers are wrong by about {amount(errors.sd, data.unit)} along each "
         f"axis ({errors.markers[worst]} by {amount(float(sizes[worst]), data.unit)}): so much do neighbouring markers "
         "differ in every recording. These errors are estimated with every hypothesis, and are not part of any misfit; "
         "measure the positions again to see smaller effects"
     )
-    return (remark,)
+    return tuple(remarks)
+
+
+def _frame_remark(stated: FrameError, found: Float[Array, " 6"]) -> str:
+    turned = ", ".join(
+        f"{np.degrees(value):.2f} ({np.degrees(sd):.2f})" for value, sd in zip(found[:3], stated.rotation, strict=True)
+    )
+    moved = ", ".join(f"{1e3 * value:.2f} ({1e3 * sd:.2f})" for value, sd in zip(found[3:], stated.origin, strict=True))
+    return (
+        f"the frame of the tracks is turned by {turned} deg about x, y and z, and shifted by {moved} mm along them, as "
+        "the best explanation shows it (in brackets: the stated standard errors); every hypothesis allows for it, and "
+        "it is not part of any misfit"
+    )
 
 
 def drift_sentence(data: WhitenedData, *, explained: bool) -> str:

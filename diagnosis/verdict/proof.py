@@ -13,7 +13,7 @@ from wingfit.calibration.series.beginnings import from_beginnings
 from wingfit.diagnosis.evidence.context import FitContext
 from wingfit.diagnosis.evidence.fit import FIT_ERRORS, Fit, gauss_newton_fit
 from wingfit.diagnosis.evidence.intervals import CONFIDENCE
-from wingfit.diagnosis.evidence.marker_errors import MarkerErrors
+from wingfit.diagnosis.evidence.position_errors import PositionErrors
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.finding import Interval, Proof, RecordingMisfit, amount
 from wingfit.diagnosis.subject import beat_subject
@@ -50,14 +50,14 @@ class ResidualPair:
             yield np.stack([np.where(fit.used, one / scale, np.nan) ** 2 for one in residuals])
 
 
-def fitted_residuals(context: FitContext, errors: MarkerErrors | None, before: Fit, after: Fit) -> ResidualPair:
+def fitted_residuals(context: FitContext, errors: PositionErrors | None, before: Fit, after: Fit) -> ResidualPair:
     """Return the residuals of the fitted recordings at two fits; arguments as of :func:`predict_held_out`."""
     first, then = (_corrected(context.data, context, errors, fit, fit.residuals) for fit in (before, after))
     return ResidualPair(context.data, first, then)
 
 
 def predict_held_out(
-    recordings: Sequence[AnyRecording], context: FitContext, errors: MarkerErrors | None, before: Fit, after: Fit
+    recordings: Sequence[AnyRecording], context: FitContext, errors: PositionErrors | None, before: Fit, after: Fit
 ) -> tuple[ResidualPair | None, tuple[str, ...]]:
     """Return residuals of recordings that neither model was fitted to, and remarks on those that cannot be simulated.
 
@@ -101,7 +101,7 @@ def _predicted(one: WhitenedData, context: FitContext, fit: Fit) -> tuple[Array,
 
 
 def _corrected(
-    data: WhitenedData, context: FitContext, errors: MarkerErrors | None, fit: Fit, residuals: tuple[Array, ...]
+    data: WhitenedData, context: FitContext, errors: PositionErrors | None, fit: Fit, residuals: tuple[Array, ...]
 ) -> tuple[Array, ...]:
     """Return ``residuals`` without what ``errors``, estimated at ``fit``, contribute to the recordings of ``data``."""
     if errors is None:

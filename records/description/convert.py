@@ -17,11 +17,11 @@ import numpy as np
 from pydantic import BaseModel
 
 from wingfit.records.array_types import Array, Float
-from wingfit.records.dataset import Condition, Recording
+from wingfit.records.dataset import Condition, FrameError, Recording
 from wingfit.records.description.dataset_file import VehicleDatasetFile, WingDatasetFile
 from wingfit.records.description.fields import models_in, tag_of
 from wingfit.records.description.vehicle_file import VehicleFile, VehicleRecordingFile
-from wingfit.records.description.wing_file import WingFile, WingRecordingFile
+from wingfit.records.description.wing_file import FrameErrorFile, WingFile, WingRecordingFile
 from wingfit.records.description.yaml_text import Document, Path
 from wingfit.records.errors import Faults, nearest
 from wingfit.records.files.table import Samples
@@ -41,6 +41,17 @@ def to_rig(dataset: WingDatasetFile | VehicleDatasetFile) -> Wing | Vehicle:
     if isinstance(dataset, VehicleDatasetFile):
         return to_dataclass(Vehicle, dataset.vehicle)
     return to_dataclass(Wing, dataset.wing)
+
+
+def to_frame_error(dataset: WingDatasetFile | VehicleDatasetFile) -> FrameError | None:
+    """Convert the errors of the frame in a checked description to SI units; None if they are not stated."""
+    stated = dataset.frame_error if isinstance(dataset, WingDatasetFile) else None
+    return to_dataclass(FrameError, stated) if stated else None
+
+
+def describe_frame_error(error: FrameError) -> dict[str, object]:
+    """Convert the errors of a frame to the plain data that ``dataset.yaml`` has under its key ``frame_error``."""
+    return to_data(error, FrameErrorFile)
 
 
 def to_recording(entry: RecordingFile, samples: Samples, document: Document, path: Path, faults: Faults) -> Recording:

@@ -15,7 +15,7 @@ from pydantic import BeforeValidator, Field
 from wingfit.records.description.fields import Name, Prose, Strict, Title, whole
 from wingfit.records.description.series_file import ChannelFile, QuantityFile, SeriesRecordingFile
 from wingfit.records.description.vehicle_file import VehicleFile, VehicleRecordingFile
-from wingfit.records.description.wing_file import WingFile, WingRecordingFile
+from wingfit.records.description.wing_file import FrameErrorFile, WingFile, WingRecordingFile
 from wingfit.records.limits import MAX_QUANTITIES, MAX_RECORDINGS
 
 
@@ -30,6 +30,11 @@ class WingDatasetFile(_DatasetFile):
     """A dataset of a wing: its description, and recordings of the positions of its markers."""
 
     wing: WingFile
+    frame_error: FrameErrorFile | None = Field(
+        None,
+        description="standard errors of the frame of all tracks, about and along x, y and z of the wing; leave out if "
+        "unknown",
+    )
     recordings: list[WingRecordingFile] = Field(min_length=1, max_length=MAX_RECORDINGS)
 
 

@@ -142,3 +142,14 @@ class WingRecordingFile(fields.WindowFile):
     standard_deviation_m: Noise | None = Field(
         None, description="known noise: one number, or [x, y, z] for every marker recorded; leave out if unknown"
     )
+
+
+_Turn = Annotated[Decimal, limits("[0, 20] deg", "standard error of a small rotation", "give degrees: 0.2")]
+_Shift = Annotated[Decimal, limits("[0, 0.1] m", "standard error of the origin", fields.METRES)]
+
+
+class FrameErrorFile(fields.Strict):
+    """Standard errors of the frame that all recordings of a wing share, along its x, y and z."""
+
+    rotation_deg: Annotated[list[_Turn], Field(min_length=3, max_length=3)]
+    origin_m: Annotated[list[_Shift], Field(min_length=3, max_length=3)]

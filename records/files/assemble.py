@@ -13,7 +13,15 @@ from typing import TypeVar
 import numpy as np
 
 from wingfit.records.dataset import AnyDataset, Dataset, Recording
-from wingfit.records.description.convert import RecordingFile, describe_recording, describe_rig, to_recording, to_rig
+from wingfit.records.description.convert import (
+    RecordingFile,
+    describe_frame_error,
+    describe_recording,
+    describe_rig,
+    to_frame_error,
+    to_recording,
+    to_rig,
+)
 from wingfit.records.description.dataset_file import SeriesDatasetFile
 from wingfit.records.description.explain import check_description
 from wingfit.records.description.series_file import SeriesRecordingFile
@@ -73,7 +81,8 @@ def assemble(
         check_numbers(recording, rig, where(entry.name), place, faults, plausible=plausible)
         recordings.append(recording)
     faults.raise_any()
-    return Dataset(checked.name, rig, tuple(recordings), tuple(checked.held_out), checked.description)
+    frame = to_frame_error(checked)
+    return Dataset(checked.name, rig, tuple(recordings), tuple(checked.held_out), checked.description, frame)
 
 
 def _read_all(
@@ -141,6 +150,7 @@ def describe(dataset: Dataset) -> dict[str, object]:
         "name": dataset.name,
         **({"description": dataset.description} if dataset.description else {}),
         "vehicle" if isinstance(dataset.rig, Vehicle) else "wing": describe_rig(dataset.rig),
+        **({"frame_error": describe_frame_error(dataset.frame_error)} if dataset.frame_error else {}),
         "recordings": [describe_recording(recording) for recording in dataset.recordings],
         **({"held_out": list(dataset.held_out)} if dataset.held_out else {}),
     }

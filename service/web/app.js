@@ -6,6 +6,7 @@ import { redrawComparison, setUpCompare, showComparison } from "./pages/compare.
 import { redrawDataset, selectDataset, setUpDataset, simulate } from "./pages/dataset.js";
 import { diagnose, selectDiagnosis, setUpDiagnosis } from "./pages/diagnosis.js";
 import { showEffects } from "./pages/effects.js";
+import { FILM_PAGES, redrawFilms, setUpFilms, showFilms } from "./films/page.js";
 import { $, plural, toast } from "./base/format.js";
 import { setUpImport, showImport } from "./importing/page.js";
 import { isSeries } from "./base/labels.js";
@@ -19,8 +20,10 @@ const POLL_MS = 2500;
 const SHOWN = 50;
 const AGAIN_MS = 3000;
 const LISTINGS = ["runs", "diagnoses", "datasets"];
-const PAGES = ["run", "diagnosis", "dataset", "compare", "effects", "import", ...LISTINGS];
-const SECTIONS = { run: "runs", compare: "runs", diagnosis: "diagnoses", dataset: "datasets", import: "datasets" }; // menu entry of each page
+const LISTS = ["effects", "import", "films", ...LISTINGS]; // pages that need no id
+const PAGES = ["run", "diagnosis", "dataset", "compare", "film", "tracking", ...LISTS];
+const SECTIONS = { run: "runs", compare: "runs", diagnosis: "diagnoses", dataset: "datasets", import: "datasets", film: "films", tracking: "films" }; // menu entry of each page
+const BROAD = ["compare", "import", ...FILM_PAGES, ...LISTINGS]; // without the lists of the sidebar
 
 let lists = { runs: [], diagnoses: [], datasets: [] };
 let polling = null;
@@ -50,7 +53,7 @@ function setAway(away) {
 
 function showHealth(health) {
   const state = { starting: health.detail ?? "evaluator starting", degraded: `degraded: ${health.detail ?? "evaluator not available"}` }[health.status];
-  const count = health.runs_active + health.diagnoses_active;
+  const count = health.runs_active + health.diagnoses_active + health.trackings_active;
   const active = count ? `${plural(count, "job")} active` : "idle";
   $("health").textContent = [state ?? active, health.workers ? plural(health.workers, "worker") : null, `version ${health.version}`]
     .filter(Boolean).join(" · ");
@@ -79,11 +82,11 @@ async function route() {
   drawLists();
   const params = parameters();
   // Pages of one job or dataset need its id.
-  const page = PAGES.find((name) => params.get(name) || (params.has(name) && (name === "effects" || name === "import" || LISTINGS.includes(name)))) ?? null;
+  const page = PAGES.find((name) => params.get(name) || (params.has(name) && LISTS.includes(name))) ?? null;
   const value = (name) => (page === name ? params.get(name) : null);
   $("empty").hidden = page !== null;
   document.body.classList.toggle("home", page === null);
-  document.body.classList.toggle("broad", page === "compare" || page === "import" || LISTINGS.includes(page)); // these pages have the lists of the sidebar themselves
+  document.body.classList.toggle("broad", BROAD.includes(page));
   if (!page) nothing("Nothing selected");
   for (const link of document.querySelectorAll(".menu a")) {
     if (link.hash === `#${SECTIONS[page] ?? page}`) link.setAttribute("aria-current", "page");
@@ -92,6 +95,7 @@ async function route() {
   await Promise.all([
     selectRun(value("run")), selectDiagnosis(value("diagnosis")), selectDataset(value("dataset")), showEffects(value("effects")),
     showComparison(value("compare"), { onMissing }), showListing(LISTINGS.includes(page) ? page : null, params), showImport(page === "import"),
+    showFilms(FILM_PAGES.includes(page) ? page : null, params.get(page)),
   ]);
 }
 
@@ -102,7 +106,7 @@ function nothing(why) {
 
 // The job or dataset shown may have been deleted by another user; the lists do not cover older ones.
 async function missed() {
-  const page = Object.keys(SECTIONS).find((name) => !["compare", "import"].includes(name) && current(name));
+  const page = Object.keys(SECTIONS).find((name) => lists[SECTIONS[name]] && !["compare", "import"].includes(name) && current(name));
   if (!page || lists[SECTIONS[page]].some((one) => one.id === current(page))) return;
   await get(`${SECTIONS[page]}/${encodeURIComponent(current(page))}`).catch((error) => error.status === 404 && $("empty").hidden && route());
 }
@@ -141,6 +145,7 @@ function redrawAll() {
   redraw();
   redrawDataset();
   redrawComparison();
+  redrawFilms();
 }
 
 const common = (page) => ({ currentId: () => current(page), onAway: setAway, onDeleted, onMissing });
@@ -160,6 +165,7 @@ setUpImport({
     poll();
   },
 });
+setUpFilms({ onAway: setAway, onMissing });
 setUpListing();
 setUpCompare();
 setUpSubmit({

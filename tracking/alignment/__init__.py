@@ -5,8 +5,9 @@ that says what is not certain and what would settle it. See ``docs/alignment.md`
 ``docs/decisions/0025-alignment.md``.
 """
 
+from wingfit.tracking.alignment.common_frame import in_common_frame
 from wingfit.tracking.alignment.procedure import align
 from wingfit.tracking.alignment.request import Known, Tracks
 from wingfit.tracking.alignment.result import AlignedTracks
 
-__all__ = ["AlignedTracks", "Known", "Tracks", "align"]
+__all__ = ["AlignedTracks", "Known", "Tracks", "align", "in_common_frame"]

@@ -19,6 +19,8 @@ _STEP = 0.04  # of the frequencies that are tried, periods per recording
 _REFINED = 6
 _AS_GOOD = 2.0  # ratio of the variances that two periods leave
 _TURN = 720
+_MOST_REFINED = 1500  # frames from which the frequency is refined
+_NEAR_SET = 0.02  # of the frequency that the user set: how far the true one may be from it
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +74,50 @@ def flapping_of(times: Array, angle: Array, trend: int = 0, known: float | None 
     c = inverse @ (X.T @ y)
     harmonics = np.array([c[0], *(c[1 + 2 * k] - 1j * c[2 + 2 * k] for k in range(_HARMONICS))])
     return Flapping(best, 1 - _left(t, y, powers, best) / max(float(y.var()), 1e-300), weights, harmonics)
+
+
+def refined(times: Array, positions: Array, frequency: float) -> float:
+    """Return the ``frequency`` (Hz) again, from all markers: that whose Fourier series leave least of their motion.
+
+    ``positions`` [T, N, 3] (m; NaN: not seen) at ``times`` [T], s. The flap angle of a frame has an error that all
+    frames of a pose share with the rest positions; the markers themselves repeat to the noise of the cameras.
+    """
+    some = np.unique(np.linspace(0, len(times) - 1, _MOST_REFINED).astype(int)) if len(times) > _MOST_REFINED else ...
+    t, places = times[some] - times[0], positions[some]
+    seen = np.isfinite(places[..., 0])
+    parts = [
+        (t[mask], places[mask, n] - places[mask, n].mean(axis=0))
+        for n, mask in enumerate(seen.T)
+        if mask.sum() > 2 * (1 + 2 * _HARMONICS)
+    ]
+    if not parts:
+        return frequency
+
+    def left(tried: float) -> float:
+        total = 0.0
+        for at, own in parts:
+            columns, _ = np.linalg.qr(basis(at, tried))
+            total += float(np.sum((own - columns @ (columns.T @ own)) ** 2))
+        return total
+
+    width = 0.06 / float(t[-1])
+    ends = (frequency - width, frequency + width)
+    return float(minimize_scalar(left, bounds=ends, method="bounded", options={"xatol": 1e-6 * width}).x)
+
+
+def true_frequency(apparent: float, step: float, set_hz: float) -> float | None:
+    """Return the flap frequency (Hz) near ``set_hz`` that appears as ``apparent`` (Hz) in frames a ``step`` (s) apart.
+
+    None if none is near: the frames would show another motion, or two frequencies are equally near.
+    """
+    rate = 1 / step
+    beats = np.round(set_hz / rate) + np.arange(-1, 2)
+    tried = np.sort(np.unique(np.abs(np.concatenate([beats * rate + apparent, beats * rate - apparent]))))
+    best, *others = sorted(tried.tolist(), key=lambda one: abs(one - set_hz))
+    apart = abs(best - set_hz)
+    if apart > _NEAR_SET * set_hz or any(abs(one - set_hz) < 2 * apart for one in others):
+        return None
+    return float(best)
 
 
 def strongest(times: Array, angle: Array) -> float:

@@ -13,7 +13,7 @@ from wingfit.records.wing import Wing
 from wingfit.tracking.alignment.arrangements import DISTINCT, LEAST_MARKERS, Arrangement, Search, ranked
 from wingfit.tracking.alignment.candidates import gate_of, layout_of, with_all
 from wingfit.tracking.alignment.fit import Fit, fit, shaken, states_of
-from wingfit.tracking.alignment.flapping import Flapping, drive_series, half_range
+from wingfit.tracking.alignment.flapping import Flapping, drive_series, half_range, refined, true_frequency
 from wingfit.tracking.alignment.identity import exchanges, frame_by_frame, gathered
 from wingfit.tracking.alignment.preparation import Prepared, described_of, prepared
 from wingfit.tracking.alignment.report import Frame, aligned
@@ -203,6 +203,7 @@ def _finished(
     if known.body or found.slow.size:
         mine = _steadied(mine, strip, final, found)
     flapping = found.flapping_by(final.states[:, 0], found.flapping.frequency)
+    frequency = _frequency(tracks, refined(tracks.times, mine, flapping.frequency), known)
     zero = _zero(tracks.file, wing, flapping, known)
     names = tuple(one.name for one in wing.markers)
     changed = exchanges(shown, best.marker, tracks.times, tracks.names, names)
@@ -211,8 +212,23 @@ def _finished(
     named, _ = _given(found, wing, known)
     remarks += _relabelled(tracks, wing, named, best.marker)
     turned = Rotation.from_rotvec([flapping.harmonics[0].real - zero, 0.0, 0.0]).as_matrix().T @ final.turn
-    frame = Frame(turned, final.hinge, flapping, zero, evidence)
+    frame = Frame(turned, final.hinge, flapping, frequency, zero, evidence)
     return aligned(tracks, wing, final, frame, used, shown, mine, changed, dropped, lost, remarks)
+
+
+def _frequency(tracks: Tracks, apparent: float, known: Known) -> float:
+    """Return the ``apparent`` frequency (Hz), or the true one if the user said what it is about."""
+    if known.flap_frequency_hz is None:
+        return apparent
+    step = float(np.median(np.diff(tracks.times)))
+    found = true_frequency(apparent, step, known.flap_frequency_hz)
+    if found is None:
+        message = (
+            f"the frames show {apparent:.5g} Hz at {1 / step:.5g} frames per second, which no frequency within 2 % of "
+            f"{known.flap_frequency_hz:g} Hz explains, or two do: check the frequency, and the times of the frames"
+        )
+        raise fail("--flap-frequency-hz", known.flap_frequency_hz, message)
+    return found
 
 
 def _steadied(mine: Array, strip: Strip, final: Fit, found: Prepared) -> Array:

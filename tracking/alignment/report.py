@@ -23,11 +23,12 @@ SHIFT_ERROR = 3e-4  # standard error of the origin due to the model, spans
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """The wing's axes ``turn`` [3, 3], its hinge [3] (m), the flapping, its mean angle (rad), evidence for the side."""
+    """The wing's axes ``turn`` [3, 3], its hinge [3] (m), flapping, flap frequency (Hz), mean angle (rad), evidence."""
 
     turn: Array
     hinge: Array
     flapping: Flapping
+    frequency: float
     zero: float
     evidence: float | None
 
@@ -80,7 +81,7 @@ def aligned(
         origin=origin,
         rotation_error=rotation_error,
         origin_error=np.hypot(pose[2:5], np.hypot(SHIFT_ERROR * span, _by_rotation(final.rest))),
-        flap_frequency=frame.flapping.frequency,
+        flap_frequency=frame.frequency,
         flap_amplitude=half_range(frame.flapping.harmonics),
         mean_flap=frame.zero,
         noise=final.noise,

@@ -45,6 +45,7 @@ class Known:
         ignore_names: names of tracks say nothing about markers.
         body: names of tracks on the body that carries the hinge.
         mean_flap_deg: mean flap angle over the beat, degrees; by default that of the described drive.
+        flap_frequency_hz: flap frequency as set on the rig, Hz; needed for frames of a strobe.
     """
 
     side: Side | None = None
@@ -53,6 +54,7 @@ class Known:
     ignore_names: bool = False
     body: tuple[str, ...] = ()
     mean_flap_deg: float | None = None
+    flap_frequency_hz: float | None = None
 
     def check(self, tracks: Tracks, wing: Wing) -> None:
         """Raise DatasetError that lists statements which name unknown tracks, markers or directions."""
@@ -72,6 +74,9 @@ class Known:
             faults.add(
                 "--mean-flap-deg", self.mean_flap_deg, f"is {self.mean_flap_deg:g} deg; it must be within +-90 deg"
             )
+        if self.flap_frequency_hz is not None and not 0.01 <= self.flap_frequency_hz <= 1000:
+            value = f"{self.flap_frequency_hz:g}"
+            faults.add("--flap-frequency-hz", value, f"is {value} Hz; it must be from 0.01 to 1000 Hz")
         faults.raise_any()
 
     def _check_names(self, tracks: Tracks, wing: Wing, faults: Faults) -> None:

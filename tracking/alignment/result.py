@@ -60,7 +60,8 @@ class AlignedTracks:
             those of its mean pose. ``positions`` = (track - origin) @ rotation.T.
         rotation_error: [3] standard errors of small rotations about x, y, z of the wing, rad.
         origin_error: [3] standard errors of the origin along x, y, z of the wing, m.
-        flap_frequency: as it appears in the frames, Hz; with a strobe it is an alias.
+        flap_frequency: on the clock of the cameras, Hz. With a strobe it is the true one if the user said what it is
+            about, and else as it appears in the frames.
         flap_amplitude, mean_flap: half the range of the flap angle, and its mean over the beat, rad.
         noise: standard deviation of a coordinate of a sample against the modelled motion, m.
         rest_scatter: standard deviation of the described rest positions, m.

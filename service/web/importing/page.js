@@ -16,9 +16,16 @@ let file = null;
 let tracks = null;
 let request = 0;
 let hooks = {};
+let given = null; // a file of another page, which is read when this one is shown
 
-export function setUpImport(given) {
-  hooks = given;
+export function setUpImport(theirs) {
+  hooks = theirs;
+}
+
+// Open this page with ``chosen``, a file that another page has.
+export function importFile(chosen) {
+  given = chosen;
+  location.hash = "import";
 }
 
 export async function showImport(shown) {
@@ -32,7 +39,10 @@ export async function showImport(shown) {
   } catch (error) {
     ready = null;
     toast(error.message);
+    return;
   }
+  if (given) choose([given]);
+  given = null;
 }
 
 async function build() {

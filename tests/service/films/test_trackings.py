@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.cameras.films import cameras, wing
+from tests.cameras.films import PLACES, cameras, wing
 from tests.command_line import in_process
 from tests.service import toy
 from tests.service.conftest import Api, toy_service
@@ -181,7 +181,8 @@ def test_labels_name_markers(served: Api, film: str, folder: Path, tmp_path: Pat
 def test_the_markers_of_a_wing_are_those_of_its_dataset(
     served: Api, film: str, done: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    markers = tuple(Marker(one["marker"], (one["x_m"], one["y_m"], one["z_m"]), 1e-5) for one in MARKERS)
+    places = [(float(x), float(y), float(z)) for x, y, z in PLACES.round(6)]
+    markers = tuple(Marker(name, place, 1e-5) for name, place in zip(NAMES, places, strict=True))
     with monkeypatch.context() as patch:
         described = toy._wing()
         patch.setattr(toy, "_wing", lambda: replace(described, markers=markers))

@@ -13,7 +13,7 @@ from wingfit.calibration.spec import CalibrationSpec
 from wingfit.diagnosis import DiagnosisSpec, Finding, diagnose
 from wingfit.diagnosis.evidence.context import FitContext
 from wingfit.diagnosis.evidence.fit import gauss_newton_fit
-from wingfit.diagnosis.evidence.marker_errors import _own, axes_at_markers, find_marker_errors
+from wingfit.diagnosis.evidence.position_errors import _own, axes_at_markers, find_position_errors
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.rigs import subject_of
 from wingfit.records import Dataset, Recording, Wing
@@ -84,7 +84,7 @@ def measured(dataset: Dataset) -> float | None:
     context = FitContext(subject, WhitenedData.of(fitted), InProcessEvaluator())
     problem = context.problem(subject.model, tuple(subject.model.searched), base_genome(subject.model, {}))
     *_, nominal = gauss_newton_fit(context, problem, np.full(len(problem.free), 0.5), 4)
-    found = find_marker_errors(subject, context.data, nominal)
+    found = find_position_errors(subject, context.data, nominal)
     return found[0].sd if found else None
 
 

@@ -1,4 +1,4 @@
-"""Errors of the described rest positions of markers, integrated out of the coefficients of every residual.
+"""Errors of the described rest positions of markers and of the frame, integrated out of every residual's coefficients.
 
 No one measures by hand where a marker lies on a wing as well as cameras see it. Such errors are nuisances with a normal
 prior. The coefficients v of a residual then have the covariance D^2 + A A^T: D^2 is the variance of the noise, and a
@@ -6,24 +6,26 @@ column of A the change by an error of one standard deviation, a vector that turn
 D^-1)^-1/2 D^-1 v has the covariance D^2 of the noise alone; wherever a diagnosis speaks of the coefficients of a
 residual, it means these (Rasmussen and Williams 2006, Sec. 2.7: explicit basis functions with a normal prior).
 
-The standard deviation is measured: missing physics displaces neighbours alike, errors of single markers do not.
+That of a frame is stated with the dataset. That of rest positions is measured: missing physics displaces neighbours
+alike, errors of single markers do not.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
 
 from wingfit.diagnosis.evidence.fit import Fit
+from wingfit.diagnosis.evidence.frame_error import changes_by_frame, deviations, moved_by_frame
 from wingfit.diagnosis.evidence.screen import Nuisance
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.subject import BeatSubject
 from wingfit.inference.marginal import Marginal
 from wingfit.inference.noise.harmonic import HarmonicFit
-from wingfit.records import Recording
+from wingfit.records import FrameError, Recording
 from wingfit.records.array_types import Array, Bool, Float, Mask
 from wingfit.sim.effects.ports.markers import tangents
 
@@ -41,42 +43,58 @@ NORMAL_MAD = 1.4826  # standard deviation divided by median absolute deviation, 
 
 
 @dataclass(frozen=True)
-class MarkerErrors:
-    """Errors of the rest positions of ``markers``, with the standard deviation ``sd`` (m) along each axis.
+class PositionErrors:
+    """Errors of rest positions of ``markers``, with the standard deviation ``sd`` (m) along each axis, and of a frame.
 
-    ``usual`` [M]: False for markers with a far larger error, which is not estimated.
+    ``usual`` [M]: False for markers with a far larger error, which is not estimated. ``sd`` is zero where errors of
+    rest positions are negligible; ``frame`` is None where none is stated.
     """
 
     markers: tuple[str, ...]
     sd: float
     usual: Bool[Mask, " M"]
+    frame: FrameError | None = None
 
     @property
     def shared(self) -> float:
-        """Root mean square (m) along an axis of what a rigid motion of the wing shares with the errors."""
+        """Root mean square (m) along an axis of what a rigid motion of the wing shares with the errors of markers."""
         return self.sd * float(np.sqrt(RIGID_TERMS / self.usual.sum()))
 
-    def estimates(self, data: WhitenedData, fit: Fit) -> Float[Array, "M 3"]:
-        """Return the described minus the true rest position (m, axes of the wing) of each marker, estimated at ``fit``.
-
-        ``data``: with these errors integrated out.
-        """
-        if data.errors is None:
-            return np.zeros((len(self.markers), 3))
-        return self.sd * data.errors.estimates(fit.coefficients / data.scale).reshape(-1, 3)
+    def estimates(self, data: WhitenedData, fit: Fit) -> Estimates:
+        """Return the errors that are estimated at ``fit``; ``data``: with these errors integrated out."""
+        found = np.zeros(0) if data.errors is None else data.errors.estimates(fit.coefficients / data.scale)
+        own = found[: 3 * len(self.markers)] if self.sd and len(found) else np.zeros(3 * len(self.markers))
+        turned = deviations(self.frame) * found[-6:] if self.frame and len(found) else np.zeros(6)
+        return Estimates(self.sd * own.reshape(-1, 3), turned)
 
     def corrected(
-        self, subject: BeatSubject, data: WhitenedData, residuals: Sequence[Array], errors: Float[Array, "M 3"]
+        self, subject: BeatSubject, data: WhitenedData, residuals: Sequence[Array], errors: Estimates
     ) -> tuple[Array, ...]:
-        """Return ``residuals`` [T, C] of the recordings of ``data`` without what ``errors`` (m) contribute to them."""
+        """Return ``residuals`` [T, C] of the recordings of ``data`` without what ``errors`` contribute to them."""
         places, found = {name: k for k, name in enumerate(self.markers)}, []
         for recording, beat_fit, residual in zip(data.beat_recordings, data.beat_fits, residuals, strict=True):
-            turning = axes_at_markers(subject, recording, beat_fit, residual)
-            own = np.array([errors[places[name]] if name in places else np.zeros(3) for name in recording.markers])
-            series = np.einsum("ma,makp->mkp", own, turning).reshape(-1, turning.shape[-1])
             psi = 2 * np.pi * recording.condition.flap_frequency * recording.times
-            found.append(residual - beat_fit.waves(psi) @ series.T)
+            moved = moved_by_frame(beat_fit, psi, errors.frame)
+            if self.sd:
+                turning = axes_at_markers(subject, recording, beat_fit, residual)
+                own = np.array([errors.rest[places[m]] if m in places else np.zeros(3) for m in recording.markers])
+                series = np.einsum("ma,makp->mkp", own, turning).reshape(-1, turning.shape[-1])
+                moved = moved + beat_fit.waves(psi) @ series.T
+            found.append(residual - moved)
         return tuple(found)
+
+
+@dataclass(frozen=True)
+class Estimates:
+    """Estimated errors.
+
+    Attributes:
+        rest: [M, 3] described minus true rest positions of the markers (m, axes of the wing).
+        frame: [6] rotations about x, y, z (rad) and shifts along them (m), by which simulated positions are too far.
+    """
+
+    rest: Float[Array, "M 3"]
+    frame: Float[Array, " 6"]
 
 
 def axes_at_markers(
@@ -120,28 +138,31 @@ def changes_by_errors(
     return np.concatenate(rows)
 
 
-def find_marker_errors(
-    subject: BeatSubject, data: WhitenedData, nominal: Fit
-) -> tuple[MarkerErrors, WhitenedData] | None:
+def find_position_errors(
+    subject: BeatSubject, data: WhitenedData, nominal: Fit, frame: FrameError | None = None
+) -> tuple[PositionErrors, WhitenedData] | None:
     """Measure the errors of rest positions at the fit ``nominal``, and integrate them out of the coefficients.
 
-    A marker with a far larger error than others is excepted: it slipped, or was confused with another. None where the
-    errors are negligible compared with the noise of a sample, where few markers show nothing, or where there are too
-    many for the memory.
+    Those of the ``frame`` are integrated out too, as stated. A marker with a far larger error than others is excepted:
+    it slipped, or was confused with another. Errors of rest positions are zero where they are negligible compared with
+    the noise of a sample, where few markers show nothing, or where there are too many for the memory. None where there
+    are no errors at all.
     """
     markers = tuple(dict.fromkeys(name for one in data.beat_recordings for name in one.markers))
+    found, columns = PositionErrors(markers, 0.0, np.ones(len(markers), bool), frame), list[Array]()
+    if frame is not None:
+        columns.append(changes_by_frame(data) * deviations(frame))
     places = {p.name: (p.x, p.y) for one in data.beat_recordings for p in subject.channel_locations(one)}
     rest = np.array([places[name] for name in markers], float)
-    if len(markers) < LEAST_MARKERS or not np.ptp(rest, axis=0).max() > 0.0:
+    if len(markers) >= LEAST_MARKERS and np.ptp(rest, axis=0).max() > 0.0 and not too_many(data):
+        changes = changes_by_errors(subject, data, nominal.residuals, markers)
+        sd, usual = _standard_deviation(data, nominal, changes, rest)
+        if sd >= data.policy.negligible * data.noise:
+            found = replace(found, sd=sd, usual=usual)
+            columns.insert(0, _own(changes, rest, usual) * sd)
+    if not columns:
         return None
-    if too_many(data):
-        return None
-    changes = changes_by_errors(subject, data, nominal.residuals, markers)
-    sd, usual = _standard_deviation(data, nominal, changes, rest)
-    if sd < data.policy.negligible * data.noise:
-        return None
-    own = _own(changes, rest, usual)
-    return MarkerErrors(markers, sd, usual), data.allowing(Marginal.of(own * (sd / data.scale[:, None])))
+    return found, data.allowing(Marginal.of(np.hstack(columns) / data.scale[:, None]))
 
 
 def too_many(data: WhitenedData) -> bool:
