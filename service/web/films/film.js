@@ -65,6 +65,10 @@ function show(film) {
 async function listTrackings() {
   clearTimeout(timer);
   const mine = id;
+  if (document.hidden) {
+    timer = setTimeout(listTrackings, POLL_MS);
+    return;
+  }
   try {
     const { items } = await get(`trackings?film_id=${part(mine)}&limit=${LISTED}`);
     if (id !== mine) return;
@@ -75,5 +79,5 @@ async function listTrackings() {
   } catch (error) {
     if (!error.away) toast(error.message);
   }
-  if (id === mine && !document.hidden) timer = setTimeout(listTrackings, POLL_MS);
+  if (id === mine) timer = setTimeout(listTrackings, POLL_MS);
 }

@@ -42,13 +42,14 @@ export async function showList(next) {
 async function load() {
   clearTimeout(timer);
   try {
-    for (const kind of Object.keys(KINDS)) await page(kind);
+    for (const kind of Object.keys(KINDS)) if (!document.hidden) await page(kind);
     $("films-problem").hidden = true;
   } catch (error) {
     $("films-problem").textContent = error.message;
     $("films-problem").hidden = false;
   }
-  if (shown && !document.hidden) timer = setTimeout(load, POLL_MS);
+  clearTimeout(timer);
+  if (shown) timer = setTimeout(load, POLL_MS);
 }
 
 // The newest items; those that "Show more" added stay.

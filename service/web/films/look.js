@@ -9,6 +9,7 @@ const SNAP_PX = 18; // on the screen, from a click to a detection
 const LIT = 40; // of 255: a frame of a strobe film with brighter pixels shows a flash
 const SMALL_PX = 160; // width of the pictures in which a flash is sought
 const MOST_DARK = 500; // frames between flashes
+const SLOW_MS = 400;
 const SETTLED_MS = 200;
 const KEPT = 60; // detections of frames that are remembered
 const DIRECTIONS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
@@ -98,12 +99,15 @@ async function fetchPicture(one) {
   const { frame } = one;
   const width = one.view.pictureWidth();
   if (one.shown?.frame === frame && one.shown.width >= width) return;
+  const slow = setTimeout(() => { one.note.textContent = `Loading frame ${frame}…`; }, SLOW_MS); // videos are decoded from their start
   try {
     const picture = await createImageBitmap(await call("GET", `${pathOf(one)}?width_px=${width}`, { as: "blob" }));
     one.shown = { frame, width };
     one.view.show(picture);
   } catch (error) {
     if (one.frame === frame) one.note.textContent = error.message;
+  } finally {
+    clearTimeout(slow);
   }
 }
 
@@ -154,7 +158,9 @@ async function brightest(path) {
   const picture = await createImageBitmap(await call("GET", `${path}?width_px=${SMALL_PX}`, { as: "blob" }));
   const pen = new OffscreenCanvas(picture.width, picture.height).getContext("2d");
   pen.drawImage(picture, 0, 0);
-  return pen.getImageData(0, 0, picture.width, picture.height).data.reduce((most, value, k) => (k % 4 === 0 && value > most ? value : most), 0);
+  const { data } = pen.getImageData(0, 0, picture.width, picture.height);
+  picture.close();
+  return data.reduce((most, value, k) => (k % 4 === 0 && value > most ? value : most), 0);
 }
 
 const kindOf = () => $("track-form").kind.value;

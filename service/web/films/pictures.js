@@ -86,7 +86,7 @@ async function fetchPicture(one) {
     const fetched = async (number) => createImageBitmap(await call("GET", `films/${part(film.id)}/frames/${part(one.camera)}/${number}?width_px=${width}`, { as: "blob" }));
     const picture = await fetched(frame);
     // The last rows of a frame and the first of the next one see the same flash.
-    const whole = strobe ? await fetched(frame + 1).then((next) => added(picture, next), () => picture) : picture;
+    const whole = strobe ? await fetched(frame + 1).catch(() => null).then((next) => (next ? added(picture, next) : picture)) : picture;
     one.picture = { frame, width };
     one.view.show(whole);
   } catch (error) {
@@ -117,5 +117,6 @@ function added(one, other) {
   pen.drawImage(one, 0, 0);
   pen.globalCompositeOperation = "lighter";
   pen.drawImage(other, 0, 0);
+  for (const picture of [one, other]) picture.close();
   return sum.transferToImageBitmap();
 }

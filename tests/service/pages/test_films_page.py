@@ -23,7 +23,7 @@ from wingfit.service.app import create_app
 from wingfit.service.settings import Settings
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser
+    from playwright.sync_api import Browser, FilePayload
 
 CAMERAS = ("left", "right")
 NOTE = "document.querySelectorAll('#look-views .note')[{}].textContent"
@@ -47,7 +47,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
         codec = cv2.VideoWriter.fourcc(*"MJPG")
         writer = cv2.VideoWriter(str(folder / f"clip-{name}.avi"), codec, RATE, SIZE, isColor=False)
         for number in range(FRAMES):
-            writer.write(cv2.imread(str(folder / name / f"{number}.png"), cv2.IMREAD_GRAYSCALE))
+            writer.write(np.asarray(cv2.imread(str(folder / name / f"{number}.png"), cv2.IMREAD_GRAYSCALE)))
         writer.release()
     return folder
 
@@ -65,14 +65,21 @@ def seen(browser: Browser, api: Api) -> Iterator[Seen]:
     seen.page.context.close()
 
 
-def made(api: Api, files: Path, name: str) -> str:
-    """The id of a film with all files, made through the API."""
-    answer = api.client.post("/v1/films", json={"name": name, "cameras": list(CAMERAS)})
-    film = str(answer.json()["id"])
+@pytest.fixture(scope="module")
+def film(api: Api, files: Path) -> str:
+    """The id of a film with all files."""
+    answer = api.client.post("/v1/films", json={"name": "whole", "cameras": list(CAMERAS)})
+    made = str(answer.json()["id"])
     for slot, file in (("cameras", "cameras.yaml"), *((one, f"clip-{one}.avi") for one in CAMERAS)):
-        answer = api.client.put(f"/v1/films/{film}/files/{slot}", content=(files / file).read_bytes())
+        answer = api.client.put(f"/v1/films/{made}/files/{slot}", content=(files / file).read_bytes())
         assert answer.status_code == 200, answer.text
-    return film
+    return made
+
+
+@pytest.fixture(scope="module")
+def tracking(api: Api, film: str) -> str:
+    body = {"film_id": film, "kind": "dot", "light": "continuous", "last_frame": 12}
+    return str(api.client.post("/v1/trackings", json=body).json()["id"])
 
 
 def look(seen: Seen, film: str) -> None:
@@ -139,8 +146,9 @@ def test_faults_are_shown_at_the_file_concerned(seen: Seen, api: Api, files: Pat
     film = api.client.post("/v1/films", json={"name": "faulty", "cameras": list(CAMERAS)}).json()["id"]
     seen.show(f"film={film}")
     seen.wait("document.querySelectorAll('#film-files li').length === 3")
-    text = {"name": "notes left.txt", "mimeType": "text/plain", "buffer": b"no video"}
-    seen.page.set_input_files("#film-picked", [{"name": "clip 7.avi", "mimeType": "video/avi", "buffer": b"x"}, text])
+    other: FilePayload = {"name": "clip 7.avi", "mimeType": "video/avi", "buffer": b"x"}
+    text: FilePayload = {"name": "notes left.txt", "mimeType": "text/plain", "buffer": b"no video"}
+    seen.page.set_input_files("#film-picked", [other, text])
     assert "clip 7.avi: the name contains none of the cameras' (left, right)" in seen.page.inner_text("#film-unmatched")
     seen.page.wait_for_selector("#film-files li:nth-child(2) .error")
     assert "video" in seen.page.inner_text("#film-files li:nth-child(2) .error")
@@ -167,8 +175,7 @@ def click(seen: Seen, camera: int, pixel: Array, beside: float = 4.0) -> None:
     canvas.click(position={"x": float(x) + beside, "y": float(y)})
 
 
-def test_markers_are_labelled_by_clicks_and_keys(seen: Seen, api: Api, files: Path) -> None:
-    film = made(api, files, "labelled")
+def test_markers_are_labelled_by_clicks_and_keys(seen: Seen, film: str) -> None:
     look(seen, film)
     pixels = [camera.project(wing(0.0)) for camera in cameras()]
     seen.page.click("#label-summary")
@@ -199,19 +206,23 @@ def test_markers_are_labelled_by_clicks_and_keys(seen: Seen, api: Api, files: Pa
         seen.wait(f"{NOTE.format(camera)} === '{FOUND.format(1)}'")
     click(seen, 0, cameras()[0].project(wing(1 / RATE))[6])
     assert "The labels of camera left are in frame 0" in seen.page.inner_text("#label-state")
+    seen.page.select_option("#track-form [name=light]", "continuous")
+    seen.page.fill("#track-form [name=last_frame]", "12")
     with seen.page.expect_request("**/v1/trackings") as sent:
         seen.page.click("#track-form [type=submit]")
-    labels = sent.value.post_data_json["labels"]
+    labels = json.loads(sent.value.post_data or "")["labels"]
     assert {(one["camera"], one["frame"]) for one in labels} == {("left", 0), ("right", 0)}
     assert sorted(one["marker"] for one in labels) == [f"m0{k // 2 + 1}" for k in range(12)]
+    seen.wait(TRACKED, 60)
+    assert "labelled by hand" in seen.page.inner_text("#tracking-about")
+    names = [row[0] for row in seen.rows("tracked-markers")]
+    assert {*names} >= {f"m0{k + 1}" for k in range(6)}
+    assert len(names) == len(NAMES)
 
 
 @pytest.mark.parametrize(("scheme", "width"), [("light", 1280), ("dark", 390)])
-def test_nothing_is_in_the_way(browser: Browser, api: Api, files: Path, scheme: Any, width: int) -> None:
+def test_nothing_is_in_the_way(browser: Browser, api: Api, film: str, tracking: str, scheme: Any, width: int) -> None:
     axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="pip install -e '.[dev]'")
-    film = made(api, files, "seen")
-    body = {"film_id": film, "kind": "dot", "light": "continuous", "last_frame": 12}
-    tracking = api.client.post("/v1/trackings", json=body).json()["id"]
     seen = opened(browser, api, viewport={"width": width, "height": 800}, color_scheme=scheme)
     look(seen, film)
     seen.page.click("#label-summary")
@@ -234,3 +245,20 @@ def violations(seen: Seen, axe: Any) -> list[Any]:
     found = axe.Axe().run(seen.page).response["violations"]
     wide = seen.page.evaluate("document.documentElement.scrollWidth > innerWidth")
     return [(one["id"], [node["target"] for node in one["nodes"]][:3]) for one in found] + ["wide"] * wide
+
+
+def test_a_tracking_is_cancelled_and_deleted(seen: Seen, api: Api, film: str) -> None:
+    body = {"film_id": film, "kind": "dot", "light": "continuous", "last_frame": 10}
+    ids = [api.client.post("/v1/trackings", json=body | {"name": f"turn {k}"}).json()["id"] for k in range(4)]
+    seen.show(f"tracking={ids[-1]}")  # waits for its turn
+    seen.page.click("#tracking-actions [data-action=cancel]")
+    seen.wait("document.getElementById('tracking-name').textContent === 'turn 3 cancelled'")
+    for other in ids[:-1]:
+        api.client.post(f"/v1/trackings/{other}/cancel")
+    seen.page.click("#tracking-film")
+    seen.wait("document.getElementById('film-trackings')?.textContent.includes('turn 3 cancelled')")
+    seen.page.click("#film-trackings a:text('turn 3')")
+    seen.page.once("dialog", lambda dialog: dialog.accept())
+    seen.page.click("#tracking-actions [data-action=delete]")
+    seen.wait("location.hash === '#films' && document.querySelectorAll('#trackings-table tbody tr').length > 0")
+    assert api.client.get(f"/v1/trackings/{ids[-1]}").status_code == 404
