@@ -214,6 +214,9 @@ def test_a_tracking_that_fails_says_why(served: Api, film: str) -> None:
     tracking = ended(served, submitted(served, film, kind="chequer", last_frame=4)["id"])
     assert tracking["state"] == "FAILED"
     assert "at least 6 are needed: check kind" in tracking["error"]
+    dark = ended(served, submitted(served, film, light="strobe")["id"])
+    assert dark["state"] == "FAILED"
+    assert dark["error"].startswith(("video of camera left: ", "video of camera right: ")), dark["error"]
     for what in ("result", "tracks.csv", "covariance.npz", "report.html"):
         answer = served.client.get(f"/v1/trackings/{tracking['id']}/{what}")
         assert (answer.status_code, answer.json()["state"]) == (409, "FAILED")
@@ -266,6 +269,19 @@ def test_what_is_deleted_leaves_no_files(tmp_path: Path, folder: Path) -> None:
         assert api.client.delete(f"/v1/films/{film}").status_code == 204
         assert list((tmp_path / "data" / "films").iterdir()) == []
         assert api.client.get(f"/v1/films/{film}").status_code == 404
+
+
+def test_a_waiting_tracking_whose_files_are_gone_says_so(tmp_path: Path, folder: Path) -> None:
+    with toy_service(tmp_path / "data") as (service, api):
+        film = uploaded(api, folder)["id"]
+        evaluator, service.runner._evaluator = service.runner._evaluator, None  # so that it waits
+        tracking = submitted(api, film)["id"]
+        (left,) = (tmp_path / "data" / "films" / film / "videos").glob("left.*")
+        left.unlink()
+        assert evaluator is not None
+        service.runner.attach(evaluator)
+        failed = ended(api, tracking)
+        assert (failed["state"], "not on this server: left; upload them" in failed["error"]) == ("FAILED", True), failed
 
 
 def test_files_that_are_gone_are_named(tmp_path: Path, folder: Path) -> None:
