@@ -23,7 +23,7 @@ from wingfit.client import private_files
 from wingfit.service.http.problems import ProblemError
 from wingfit.service.storage.disk_space import FULL
 
-ROOT = "films"
+ROOT, VIDEOS = "films", "videos"
 PART, DELETED = ".part", "deleted-"
 PIECE = 2**20
 MIB = 2**20
@@ -54,7 +54,7 @@ class FilmFiles:
 
     def video(self, film_id: str, file: str) -> Path:
         """Return the path of an uploaded file of a film."""
-        return self.folder(film_id) / "videos" / _name(UPLOADED, file)
+        return self.folder(film_id) / VIDEOS / _name(UPLOADED, file)
 
     def detected(self, film_id: str) -> Path:
         """Return the folder of what was detected in a film."""
@@ -76,7 +76,7 @@ class FilmFiles:
         ``name``: of the camera, or "cameras"; ``size``: stated length in bytes, if any. Raises a 413 above ``most``
         bytes, a 507 if the disk has no room, a 408 if the client sends nothing; then nothing is kept.
         """
-        folder = await run_in_threadpool(self.new_folder, self.folder(film_id) / "videos")
+        folder = await run_in_threadpool(self.new_folder, self.folder(film_id) / VIDEOS)
         part = folder / f"{name}.{secrets.token_hex(4)}{PART}"
         self._check_room(size or 0)
         try:
@@ -126,7 +126,7 @@ class FilmFiles:
 
     def keep_only(self, film_id: str, name: str, kept: str | None) -> None:
         """Remove the uploaded files of ``name`` but ``kept``, and what was detected in them."""
-        for path in (self.folder(film_id) / "videos").glob(f"{name}.*"):
+        for path in (self.folder(film_id) / VIDEOS).glob(f"{name}.*"):
             if path.name != kept and path.suffix != PART:
                 path.unlink(missing_ok=True)
         shutil.rmtree(self.detected(film_id), ignore_errors=True)
@@ -163,7 +163,7 @@ class FilmFiles:
             film_id = folder.name.removeprefix(DELETED)
             if FILM.fullmatch(film_id):
                 (self.put_back if film_id in films else self.remove)(film_id)
-        for part in self._root.glob(f"*/videos/*{PART}"):
+        for part in self._root.glob(f"*/{VIDEOS}/*{PART}"):
             part.unlink(missing_ok=True)
         return sorted(one.name for one in self._root.iterdir() if one.is_dir() and one.name not in films)
 

@@ -27,7 +27,7 @@ def _different(cameras: list[str]) -> list[str]:
     return cameras
 
 
-CameraName = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]{1,40}$")]
+CameraName = Annotated[str, Field(max_length=40, pattern=r"^[A-Za-z0-9_-]+$")]
 Frame = Annotated[Whole, Field(ge=0, le=MOST_FRAMES)]
 Rate = Annotated[Number, Field(ge=1e-3, le=1e6)]
 

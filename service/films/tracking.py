@@ -56,6 +56,11 @@ class TrackingFilms(JobKind):
         """Yield a step at each new stage, within a stage at most every STORE_SECONDS, and one with the result."""
         with self._database.read() as session:
             film = store.one(session, FilmRow, row.film_id)
+        if gone := views.absent(film, self._files):
+            names = ", ".join(gone)
+            raise ValueError(
+                f"files of film {film.id} are not on this server: {names}; upload them, and submit it again"
+            )
         folder = self._files.new_folder(self._files.tracked(film.id, row.id))
         try:
             description = write_description(folder, film, row.spec, self._files)

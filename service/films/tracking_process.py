@@ -14,16 +14,18 @@ import sys
 import threading
 import time
 from pathlib import Path
+from typing import NoReturn
 
 from wingfit.cameras.project import read_film
 from wingfit.cameras.track.procedure import track
 from wingfit.cameras.track.progress import whole
 from wingfit.cameras.track.report import film_report
 from wingfit.cameras.track.result import TrackedFilm
-from wingfit.records.errors import DatasetError
+from wingfit.records.errors import DatasetError, fail
 from wingfit.service.films.child import FAULTS, listed
-from wingfit.service.films.files import COVARIANCE, REPORT, RESULT, TRACKS
+from wingfit.service.films.files import COVARIANCE, REPORT, RESULT, TRACKS, VIDEOS
 from wingfit.service.films.summary import summary
+from wingfit.service.storage.disk_space import FULL
 
 REPORT_SECONDS = 0.2  # between two lines about one stage
 
@@ -33,14 +35,36 @@ def main(arguments: list[str]) -> None:
     film, store, folder = (Path(one) for one in arguments)
     threading.Thread(target=_end_with_server, daemon=True).start()
     try:
-        found = _tracked(film, store)
+        _write(_tracked(film, store), folder)
     except DatasetError as error:
-        print(json.dumps({"faults": listed(error)}), flush=True)
-        sys.exit(FAULTS)
+        _refuse(error)
+    except OSError as error:
+        if error.errno not in FULL:
+            raise
+        message = "is full: free some space, and submit the tracking again; what was detected is kept"
+        _refuse(fail("the disk of the server", None, message))
+
+
+def _refuse(error: DatasetError) -> NoReturn:
+    print(json.dumps({"faults": [[_place(where), *rest] for where, *rest in listed(error)]}), flush=True)
+    sys.exit(FAULTS)
+
+
+def _place(where: str | None) -> str:
+    """Return ``where`` something is wrong in the user's words: the folders of the server mean nothing to them."""
+    path = Path(where or "")
+    return f"video of camera {path.stem}" if path.parent.name == VIDEOS else str(where)
+
+
+def _write(found: TrackedFilm, folder: Path) -> None:
+    """Write the files of the tracks; they are on the disk when this returns."""
     (folder / TRACKS).write_bytes(found.csv().encode())
     found.write_covariance(folder / COVARIANCE)
     (folder / REPORT).write_text(film_report(found), encoding="utf-8")
     (folder / RESULT).write_text(json.dumps(summary(found), allow_nan=False), encoding="utf-8")
+    for name in (TRACKS, COVARIANCE, REPORT, RESULT):
+        with (folder / name).open("rb") as file:
+            os.fsync(file.fileno())
 
 
 def _tracked(film: Path, store: Path) -> TrackedFilm:

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import errno
 import io
+import json
+import os
 import re
 import shutil
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from tests.cameras.films import cameras, wing
+from tests.cameras.films import PLACES, cameras, wing
 from tests.command_line import in_process
+from tests.service import toy
 from tests.service.conftest import Api, toy_service
 from tests.service.films.films import (
     FRAMES,
@@ -31,6 +36,9 @@ from tests.service.shapes import valid
 from wingfit.cli.main import app
 from wingfit.client.films.answers import Film, Tracking, TrackingResult, TrackingStep
 from wingfit.client.transport import parse_events
+from wingfit.records import Marker
+from wingfit.service.films import tracking_process
+from wingfit.service.films.child import FAULTS, error_of
 
 wingfit = in_process(app)
 LABEL = {"camera": "left", "frame": 0, "marker": "m00", "x_px": 100.0, "y_px": 100.0}
@@ -170,8 +178,25 @@ def test_labels_name_markers(served: Api, film: str, folder: Path, tmp_path: Pat
     assert tracks.text.startswith("time_s,tip0_x_m,")
 
 
-def test_the_markers_of_a_wing_are_those_of_its_dataset(served: Api, film: str) -> None:
-    """That of the toys has two, which is too few."""
+def test_the_markers_of_a_wing_are_those_of_its_dataset(
+    served: Api, film: str, done: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    places = [(float(x), float(y), float(z)) for x, y, z in PLACES.round(6)]
+    markers = tuple(Marker(name, place, 1e-5) for name, place in zip(NAMES, places, strict=True))
+    with monkeypatch.context() as patch:
+        described = toy._wing()
+        patch.setattr(toy, "_wing", lambda: replace(described, markers=markers))
+        dataset = served.upload()["id"]
+    tracking = submitted(served, film, places=[], dataset_id=dataset)
+    assert tracking["dataset_id"] == dataset
+    assert tracking["spec"]["places"] == MARKERS
+    assert served.client.delete(f"/v1/datasets/{dataset}").status_code == 204  # the places were copied
+    assert ended(served, tracking["id"])["state"] == "SUCCEEDED"
+    tracks = [served.client.get(f"/v1/trackings/{one}/tracks.csv").content for one in (done, tracking["id"])]
+    assert tracks[0] == tracks[1]
+
+
+def test_a_wing_with_few_markers_is_refused(served: Api, film: str) -> None:
     body = {"film_id": film, "kind": "dot", "light": "continuous", "dataset_id": served.upload()["id"]}
     answer = served.client.post("/v1/trackings", json=body)
     assert (answer.status_code, "2 markers; at least 6" in answer.text) == (422, True), answer.text
@@ -189,9 +214,28 @@ def test_a_tracking_that_fails_says_why(served: Api, film: str) -> None:
     tracking = ended(served, submitted(served, film, kind="chequer", last_frame=4)["id"])
     assert tracking["state"] == "FAILED"
     assert "at least 6 are needed: check kind" in tracking["error"]
+    dark = ended(served, submitted(served, film, light="strobe")["id"])
+    assert dark["state"] == "FAILED"
+    assert dark["error"].startswith(("video of camera left: ", "video of camera right: ")), dark["error"]
     for what in ("result", "tracks.csv", "covariance.npz", "report.html"):
         answer = served.client.get(f"/v1/trackings/{tracking['id']}/{what}")
         assert (answer.status_code, answer.json()["state"]) == (409, "FAILED")
+
+
+def test_a_full_disk_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(tracking_process, "_tracked", full)
+    monkeypatch.setattr(tracking_process, "_end_with_server", lambda: None)
+    with pytest.raises(SystemExit) as ended:
+        tracking_process.main([str(tmp_path)] * 3)
+    assert ended.value.code == FAULTS
+    assert "the disk of the server: is full: free some space" in str(
+        error_of(json.loads(capsys.readouterr().out)["faults"])
+    )
 
 
 def test_a_cancelled_tracking_ends_with_its_process(tmp_path: Path, long_film: Path) -> None:
@@ -225,6 +269,19 @@ def test_what_is_deleted_leaves_no_files(tmp_path: Path, folder: Path) -> None:
         assert api.client.delete(f"/v1/films/{film}").status_code == 204
         assert list((tmp_path / "data" / "films").iterdir()) == []
         assert api.client.get(f"/v1/films/{film}").status_code == 404
+
+
+def test_a_waiting_tracking_whose_files_are_gone_says_so(tmp_path: Path, folder: Path) -> None:
+    with toy_service(tmp_path / "data") as (service, api):
+        film = uploaded(api, folder)["id"]
+        evaluator, service.runner._evaluator = service.runner._evaluator, None  # so that it waits
+        tracking = submitted(api, film)["id"]
+        (left,) = (tmp_path / "data" / "films" / film / "videos").glob("left.*")
+        left.unlink()
+        assert evaluator is not None
+        service.runner.attach(evaluator)
+        failed = ended(api, tracking)
+        assert (failed["state"], "not on this server: left; upload them" in failed["error"]) == ("FAILED", True), failed
 
 
 def test_files_that_are_gone_are_named(tmp_path: Path, folder: Path) -> None:

@@ -26,6 +26,8 @@ from wingfit.records.files import confined
 from wingfit.service import settings
 from wingfit.service.app import create_app
 from wingfit.service.diagnoses import requests as diagnosis_requests
+from wingfit.service.films import files as film_files
+from wingfit.service.films import video_process, videos
 from wingfit.service.http import concurrency_limit, events, header_limits, request_limits, responses
 from wingfit.service.runs import requests, views
 from wingfit.service.settings import Settings
@@ -99,7 +101,7 @@ def test_nothing_answers_that_is_not_described(client: httpx.Client) -> None:
     ):
         assert path not in described
         assert client.get(path).status_code == 404, path
-    assert linked <= {"icon.svg", "style.css", "importing/style.css", "app.js", "docs"}
+    assert linked <= {"icon.svg", "style.css", "importing/style.css", "films/style.css", "app.js", "docs"}
     assert all(path.startswith("/v1/") for path in described)
 
 
@@ -285,6 +287,14 @@ def test_the_documented_limits_are_those_of_the_code() -> None:
         "unfinished jobs of an owner": settings.Settings.max_active,
         "concurrently computed jobs": settings.Settings.max_runs,
         "MB of archives of an owner": settings.Settings.max_stored_mb,
+        "MiB of a video": settings.Settings.max_film_mib,
+        "MiB of all videos of an owner": settings.Settings.max_films_mib,
+        "free disk beside films": film_files.RESERVED_MIB,
+        "concurrently received files of films": concurrency_limit.FILM_UPLOADS,
+        "silence of a client that uploads one": int(film_files.SILENT_SECONDS),
+        "concurrently read frames": concurrency_limit.FRAMES,
+        "time to read a frame": int(videos.SECONDS),
+        "memory of the process that reads frames": video_process.MEMORY_MIB // 2**10,
     }
     assert {name: int(value.replace(",", "")) for name, value in rows.items()} == in_force
     assert f"KiB/s over {header_limits.SLOW_SECONDS:g} s" in PAGE
