@@ -13,6 +13,7 @@ from wingfit.records import (
     Dataset,
     FourBarDrive,
     FourierDrive,
+    FrameError,
     Hinge,
     Marker,
     Materials,
@@ -104,4 +105,5 @@ def falcon_dataset(frames: int = 60) -> Dataset:
         falcon_recording(name, condition, wing, frames, seed)
         for seed, (name, condition) in enumerate(conditions.items())
     )
-    return Dataset("falcon", wing, recordings, ("vacuum-3hz", "tunnel-4hz-8"), "A stiff wing, for tests.")
+    frame = FrameError((math.radians(0.26), math.radians(0.06), 0.0), (5.6e-4, 1.7e-4, 2e-4))
+    return Dataset("falcon", wing, recordings, ("vacuum-3hz", "tunnel-4hz-8"), "A stiff wing, for tests.", frame)
