@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,3 +37,11 @@ class Detections:
 def no_detections() -> Detections:
     """Return an image in which nothing is detected."""
     return Detections(np.empty((0, 2)), np.empty((0, 2, 2)), np.empty(0), np.empty(0))
+
+
+def joined(parts: Sequence[Detections]) -> Detections:
+    """Return the detections of all ``parts``, one after the other."""
+    if not parts:
+        return no_detections()
+    names = ("pixels", "covariance", "size_px", "contrast")
+    return Detections(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))

@@ -9,33 +9,72 @@ from __future__ import annotations
 import numpy as np
 from scipy.special import erf
 
-from wingfit.cameras.markers.detections import Detections, no_detections
+from wingfit.cameras.markers.detections import Detections, joined, no_detections
 from wingfit.cameras.markers.patch_fit import cut_patches, fit_patches, inside, offsets
 from wingfit.cameras.opencv import opencv
 from wingfit.records.array_types import Array, Float
 
 _NOISES = 6.0  # contrast above that of noise
+_SHARE = 0.25  # of the contrast of other spots
+_COMPARED = 6  # the brightest spot but five, so that reflections and lamps do not count; fewer markers are not tracked
+_COARSE = 4  # pixels: a step of images of the surroundings
 _LEAST_PX, _LARGEST_PX = 3, 40.0  # area; radius
 _EXPLAINED = 0.8
 _LEAST_SEEN = 0.7  # share of a patch within the image
 _FLOOR_PX = 0.01  # as for chequers
+_MUCH_LARGER = 3.0
 _MOST_SLANT = 6.0  # ratio of the axes of an ellipse
 
 
 def detect_dots(image: Array, dark: float, noise: float) -> Detections:
-    """Return the dots in ``image`` [H, W], brighter than the level ``dark`` by many times ``noise`` (grey levels)."""
+    """Return the dots in ``image`` [H, W], brighter than the level ``dark`` by many times ``noise`` (grey levels).
+
+    What is within 65 pixels of a dot decides how bright it must be, and the sixth brightest spot of all: a lamp hides
+    its own surroundings.
+    """
     cv2 = opencv()
-    smooth = cv2.GaussianBlur(image.astype(np.float32), (0, 0), 0.8)
-    bright = smooth - dark > max(_NOISES * noise, 0.25 * float(smooth.max() - dark))
-    _, _, boxes, centres = cv2.connectedComponentsWithStats(bright.astype(np.uint8), connectivity=8)
+    contrast = _contrast(image, dark)
+    bright = contrast > np.maximum(_NOISES * noise, _SHARE * _largest_near(contrast))
+    _, labels, boxes, centres = cv2.connectedComponentsWithStats(bright.astype(np.uint8), connectivity=8)
     area = boxes[1:, cv2.CC_STAT_AREA].astype(float)
     sides = boxes[1:, [cv2.CC_STAT_WIDTH, cv2.CC_STAT_HEIGHT]].astype(float)
-    starts = centres[1:]
     usable = (area >= _LEAST_PX) & (sides.max(1) < 2 * _LARGEST_PX) & (sides.max(1) < _MOST_SLANT * sides.min(1) + 2)
-    starts, area, sides = starts[usable], area[usable], sides[usable]
-    if not len(starts):
+    spots = np.flatnonzero(usable)
+    if not len(spots):
         return no_detections()
-    return _fitted(image, starts, sides / 2, noise)
+    highest = np.zeros(len(boxes))
+    np.maximum.at(highest, labels[bright], contrast[bright])
+    peaks = highest[spots + 1]
+    level = np.sort(peaks)[-min(_COMPARED, len(peaks))]
+    spots = spots[peaks >= _SHARE * level]
+    starts, radii = centres[1:][spots], sides[spots] / 2
+    # Patches are as large as the largest spot: one much larger than the others, such as a lamp, is fitted alone.
+    large = radii.max(1) > _MUCH_LARGER * np.median(radii.max(1))
+    found = [_fitted(image, starts[one], radii[one], noise) for one in (~large, large) if one.any()]
+    return joined(found)
+
+
+def _contrast(image: Array, dark: float) -> Float[Array, "H W"]:
+    """Return the brightness above that of what is larger than a dot, such as the light around a lamp, or ``dark``."""
+    cv2 = opencv()
+    smooth = cv2.GaussianBlur(image.astype(np.float32), (0, 0), 0.8)
+    height, width = smooth.shape
+    small = cv2.resize(smooth, (-(-width // _COARSE), -(-height // _COARSE)), interpolation=cv2.INTER_AREA)
+    around = cv2.morphologyEx(small, cv2.MORPH_OPEN, _window())
+    return np.asarray(smooth - np.maximum(cv2.resize(around, (width, height)), dark))
+
+
+def _largest_near(contrast: Float[Array, "H W"]) -> Float[Array, "H W"]:
+    """Return the largest contrast within about the radius of the largest dot."""
+    cv2 = opencv()
+    height, width = contrast.shape
+    coarse = cv2.dilate(contrast, np.ones((_COARSE + 1, _COARSE + 1), np.uint8))[::_COARSE, ::_COARSE]
+    return np.asarray(cv2.resize(cv2.dilate(coarse, _window()), (width, height), interpolation=cv2.INTER_NEAREST))
+
+
+def _window() -> Array:
+    side = int(2 * _LARGEST_PX / _COARSE) + 3
+    return np.ones((side, side), np.uint8)
 
 
 def _fitted(image: Array, starts: Array, radii: Array, noise: float) -> Detections:

@@ -140,21 +140,23 @@ def _result(shape: Shape, parameters: Array, patches: Array, weights: Array, at:
     inverse = np.linalg.inv(_normal(changes, weights))
     # Errors of neighbouring pixels resemble each other (compression, light): the covariance is not that of white noise.
     weighted = weights[:, :, None] * changes
-    correlated = np.einsum(
-        "nqp,qr,nrs->nps", weighted, _correlation(residuals, weights, variance, at), weighted, optimize=True
-    )
+    spread = _spread(weighted, _correlation(residuals, weights, variance, at))
+    correlated = np.einsum("nqp,nqs->nps", weighted, spread, optimize=True)
     covariance = (inverse @ correlated @ inverse)[:, :2, :2] * variance[:, None, None]
     mean = (weights * patches).sum(1) / weights.sum(1)
     total = (weights * (patches - mean[:, None]) ** 2).sum(1)
     return PatchFit(parameters, contrast, background, covariance, 1 - cost / np.maximum(total, 1e-12))
 
 
-def _correlation(residuals: Array, weights: Array, variance: Array, at: Float[Array, "Q 2"]) -> Float[Array, "Q Q"]:
-    """Return the correlation of the errors of two pixels, as the residuals of all patches together show it."""
+def _correlation(residuals: Array, weights: Array, variance: Array, at: Float[Array, "Q 2"]) -> Float[Array, "L L"]:
+    """Return the correlation of the errors of two pixels by their distance in rows and columns, from -6 to 6.
+
+    It is that which the residuals of all patches together show.
+    """
     side = round(np.sqrt(len(at)))
     scaled = (weights * residuals / np.sqrt(np.maximum(variance, 1e-12))[:, None]).reshape(-1, side, side)
     total = (scaled**2).sum()
-    size = 2 * side
+    size = 2 * max(side, _CORRELATED_PX + 1)
     power = (np.abs(np.fft.rfft2(scaled, (size, size))) ** 2).sum(0)
     by_lag = np.fft.irfft2(power, (size, size)) / max(float(total), 1e-12)
     used = (np.abs(np.fft.rfft2(weights.reshape(-1, side, side), (size, size))) ** 2).sum(0)
@@ -162,6 +164,18 @@ def _correlation(residuals: Array, weights: Array, variance: Array, at: Float[Ar
     by_lag *= overlap[0, 0] / np.maximum(overlap, 1e-3 * overlap[0, 0])
     # A fit with many parameters for its pixels leaves residuals that alternate, although the errors do not.
     by_lag = np.maximum(by_lag, 0)
-    lag = np.rint(at[:, None] - at[None]).astype(int)
-    near = np.clip(1 - np.hypot(lag[..., 0], lag[..., 1]) / (_CORRELATED_PX + 1), 0, 1)
-    return np.asarray(by_lag[lag[..., 1], lag[..., 0]] * near)
+    lags = np.arange(-_CORRELATED_PX, _CORRELATED_PX + 1)
+    near = np.clip(1 - np.hypot(lags[:, None], lags) / (_CORRELATED_PX + 1), 0, 1)
+    return np.asarray(by_lag[np.ix_(lags, lags)] * near)
+
+
+def _spread(weighted: Float[Array, "N Q P"], correlation: Float[Array, "L L"]) -> Float[Array, "N Q P"]:
+    """Return the sum over all pixels of ``weighted`` times the ``correlation`` with each pixel, by a convolution."""
+    count, pixels, parameters = weighted.shape
+    side = round(np.sqrt(pixels))
+    size = side + 2 * _CORRELATED_PX
+    grid = weighted.reshape(count, side, side, parameters)
+    product = np.fft.rfft2(grid, (size, size), axes=(1, 2)) * np.fft.rfft2(correlation, (size, size))[None, :, :, None]
+    whole = np.fft.irfft2(product, (size, size), axes=(1, 2))
+    inner = slice(_CORRELATED_PX, _CORRELATED_PX + side)
+    return np.asarray(whole[:, inner, inner].reshape(count, pixels, parameters))

@@ -12,7 +12,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.spatial import cKDTree
 
-from wingfit.cameras.markers.detections import Detections, no_detections
+from wingfit.cameras.markers.detections import Detections, joined
 from wingfit.cameras.track.registration import spacing
 from wingfit.records.array_types import Array, Float, Index
 
@@ -49,18 +49,11 @@ def join(frames: Sequence[Detections], frame_times: Float[Array, " F"], row_s: f
         for at in range(start, last, direction):
             names = _step(frames, labels, velocity, (at, at + direction), names)
     owner = np.concatenate(labels).astype(int)
-    whole = _joined(frames)
+    whole = joined(frames)
     number = np.concatenate([np.full(len(frame), k) for k, frame in enumerate(frames)]).astype(int)
     times = frame_times[number] + whole.pixels[:, 1] * row_s
     order = np.lexsort((times, owner))
     return Tracklets(owner[order], times[order], whole.only(order))
-
-
-def _joined(frames: Sequence[Detections]) -> Detections:
-    if not frames:
-        return no_detections()
-    names = ("pixels", "covariance", "size_px", "contrast")
-    return Detections(*(np.concatenate([getattr(frame, name) for frame in frames]) for name in names))
 
 
 def _calmest(frames: Sequence[Detections]) -> int:
@@ -132,7 +125,7 @@ def owned_at_time(tracklets: Tracklets, time: float, longest: float) -> tuple[De
     covariance += ((0.1 * np.linalg.norm(pixels - straight, axis=1)) ** 2)[:, None, None] * np.eye(2)
     nearest = before + (share > 0.5)
     between = Detections(pixels, covariance, seen.size_px[nearest], seen.contrast[nearest])
-    return _joined((between, alone)), np.concatenate([owner[before], owner[exact]])
+    return joined((between, alone)), np.concatenate([owner[before], owner[exact]])
 
 
 def _lagrange(times: Float[Array, "N 4"], time: float, use: Array) -> Float[Array, "N 4"]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from tests.cameras.markers.drawing import Inside, affine, chequer, disc, drawn, lattice, noisy
+from tests.cameras.markers.drawing import Inside, Mark, affine, chequer, disc, drawn, lattice, noisy
 from wingfit.cameras.markers.chequer import detect_chequers
 from wingfit.cameras.markers.detections import Detections, no_detections
 from wingfit.cameras.markers.dot import detect_dots
@@ -151,6 +151,23 @@ def test_markers_on_uneven_ground_are_found(kind: str) -> None:
     errors, good, _ = matched(KINDS[kind].detect(uneven, DARK, 1.0), places)
     assert len(good) == 25
     assert np.sqrt((errors**2).mean()) < 0.06
+
+
+@both
+@pytest.mark.parametrize(("radius", "halo"), [(4.0, 0.7), (70.0, 0.7), (60.0, 15.0)], ids=["point", "disc", "glow"])
+def test_a_lamp_in_the_picture_hides_only_what_is_beside_it(kind: str, radius: float, halo: float) -> None:
+    """Markers 35 grey levels above the ground, and a lamp that saturates: all that are 70 px from it are found."""
+    rng = np.random.default_rng(8)
+    size, places = lattice(rng, 64, 55.0)
+    lamp = np.array([150.0, 260.0])
+    marks: list[Mark] = [(KINDS[kind].inside, at, 6.0 * np.eye(2)) for at in places]
+    image = drawn(size, marks, levels=(12.0, 47.0))
+    image += drawn(size, [(disc, lamp, radius * np.eye(2))], blur=halo, levels=(0.0, 900.0))
+    found = KINDS[kind].detect(noisy(image, 1.0, rng), 12.0, 1.0)
+    away = np.linalg.norm(places - lamp, axis=1) > radius + 3 * halo + 70
+    assert away.sum() > 20
+    apart = np.linalg.norm(places[away][:, None] - found.pixels[None], axis=2).min(1)
+    assert apart.max() < 0.2
 
 
 def test_detections_are_selected_together() -> None:
