@@ -14,6 +14,7 @@ from wingfit.cameras.calibrate.result import Calibration, summarise
 from wingfit.cameras.calibrate.starts import TILT, Start, start_boards, start_camera
 from wingfit.cameras.camera import COEFFICIENTS, POSE, Camera, LensModel
 from wingfit.records.array_types import Index, Mask
+from wingfit.records.blas_threads import one_blas_thread
 from wingfit.records.errors import fail, nearest
 
 LEAST_VIEWS = 5
@@ -21,6 +22,7 @@ LEAST_POINTS = 6  # corners of a board in one image
 MOST_CAMERAS = 8
 
 
+@one_blas_thread
 def calibrate_boards(
     seen: Sightings,
     *,

@@ -17,6 +17,7 @@ from wingfit.cameras.camera import COEFFICIENTS, FOCAL_AND_CENTRE, POSE, Camera
 from wingfit.cameras.opencv import opencv
 from wingfit.cameras.triangulation import LEAST_CAMERAS, nearest_points, triangulate
 from wingfit.records.array_types import Array, Float, Mask
+from wingfit.records.blas_threads import one_blas_thread
 from wingfit.records.errors import fail, nearest
 
 LEAST_FRAMES = 20
@@ -86,6 +87,7 @@ class Wand:
         return self.markers == 2 or total - 2 * longest <= STRAIGHT * longest
 
 
+@one_blas_thread
 def calibrate_wand(
     tracks: Mapping[str, Float[Array, "T M 2"]],
     cameras: Sequence[Camera],

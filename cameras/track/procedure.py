@@ -23,6 +23,7 @@ from wingfit.cameras.track.result import TrackedFilm
 from wingfit.cameras.triangulation import Points, error_from_cameras, triangulate
 from wingfit.cameras.video.source import Film, Frames
 from wingfit.records.array_types import Array, Float
+from wingfit.records.blas_threads import one_blas_thread
 from wingfit.records.errors import counted, fail
 
 Report = Callable[[str, float], object]
@@ -73,6 +74,7 @@ class Request:
     labels: tuple[Label, ...] = ()
 
 
+@one_blas_thread
 def track(request: Request, report: Report = _silent) -> TrackedFilm:
     """Track the markers of a wing; ``report`` is called with what is being done, and how much of it is done (0 to 1).
 
