@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from types import SimpleNamespace
 
 import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
@@ -18,14 +19,14 @@ class StoppedError(Exception):
 @pytest.mark.parametrize(
     ("module", "step", "run"),
     [
-        (procedure, "_detected", lambda: procedure.track(None)),  # type: ignore[arg-type]
+        (procedure, "_check", lambda: procedure.track(SimpleNamespace(films=()))),  # type: ignore[arg-type]
         (from_boards, "_check", lambda: from_boards.calibrate_boards(None)),  # type: ignore[arg-type]
     ],
 )
 def test_linear_algebra_has_one_thread(
     monkeypatch: pytest.MonkeyPatch, module: object, step: str, run: Callable[[], object]
 ) -> None:
-    seen = []
+    seen = list[int]()
 
     def first(*_: object, **__: object) -> None:
         seen.extend(one["num_threads"] for one in threadpool_info() if one["user_api"] == "blas")
