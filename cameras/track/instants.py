@@ -61,7 +61,7 @@ def flash_instants(
         flash_times(one.marks, frames, camera.row_s or None)
         for camera, frames, one in zip(cameras, films, found, strict=True)
     ]
-    remarks = _clock_remarks(cameras, timed)
+    remarks = _clock_remarks(cameras, films, found, timed)
     shifts = [0]
     for other in range(1, len(cameras)):
         shifts.append(_best_shift(cameras, found, timed, other, tolerance_px))
@@ -90,15 +90,29 @@ def flash_instants(
     )
 
 
-def _clock_remarks(cameras: Sequence[Camera], timed: Sequence[FlashTimes]) -> list[str]:
-    rows = ", ".join(f"{1e6 * one.row_s:.2f} us in {camera.name}" for camera, one in zip(cameras, timed, strict=True))
-    remarks = [f"the strobe flashes every {1e3 * timed[0].period:.3f} ms; from row to row {rows}"]
-    for camera, one in zip(cameras[1:], timed[1:], strict=True):
-        apart = one.period / timed[0].period - 1
-        if abs(apart) > 1e-3:
+def _clock_remarks(
+    cameras: Sequence[Camera],
+    films: Sequence[Frames],
+    found: Sequence[FilmDetections],
+    timed: Sequence[FlashTimes],
+) -> list[str]:
+    known = [(camera.name, one.row_s) for camera, one in zip(cameras, timed, strict=True) if one.row_s > 0]
+    rows = ", ".join(f"{1e6 * row_s:.2f} us in {name}" for name, row_s in known)
+    remarks = [
+        f"the strobe flashes every {1e3 * timed[0].period:.3f} ms" + (f"; from row to row {rows}" if rows else "")
+    ]
+    for camera, film, seen, one in zip(cameras, films, found, timed, strict=True):
+        if one.row_s == 0 and any(np.isfinite(mark.between).all() for mark in seen.marks):
             remarks.append(
-                f"the strobe's period is {apart * 100:+.2f} % longer in the film of {camera.name} than in that of "
-                f"{cameras[0].name}: check rate_hz of both"
+                f"the flashes do not show the time from row to row in the film of {camera.name}, as too few of them "
+                f"divide at different rows: their times are exact to a frame, {1e3 / film.rate_hz:.3g} ms; track more"
+            )
+        apart = one.period / timed[0].period - 1
+        frame = 1 / film.rate_hz / (one.numbers[-1] * one.period)  # of the length: what rows may hide
+        if abs(apart) > max(1e-3, frame):
+            remarks.append(
+                f"the strobe's period in the film of {camera.name} differs by {apart * 100:+.2f} % from that in the "
+                f"film of {cameras[0].name}: check rate_hz of both"
             )
     return remarks
 
