@@ -47,9 +47,6 @@ def boards(
     from wingfit.cameras.calibrate.board import Board  # imported late: other commands start faster
     from wingfit.cameras.calibrate.boards import find_boards
     from wingfit.cameras.calibrate.from_boards import calibrate_boards
-    from wingfit.cameras.calibrate.report import calibration_report
-    from wingfit.cameras.files.camera_set import CameraSet
-    from wingfit.cameras.files.project import write_cameras
     from wingfit.records.errors import DatasetError
 
     columns, rows = _board(board)
@@ -58,14 +55,9 @@ def boards(
         with late_progress("finding the chessboard") as shown:
             seen = find_boards(files, Board(columns, rows, square_mm / 1000), report=shown)
         found = calibrate_boards(seen, lens=lens, world=world)
-        write_cameras(output, CameraSet(found.cameras, found.covariance))
     except DatasetError as error:
         raise _refused(error) from error
-    _show(found)
-    note(f"cameras written to {output}")
-    if report:
-        write_text(report, calibration_report(found), "report of the calibration")
-    note("next: describe the films in film.yaml (docs/cameras.md), then: wingfit track film.yaml -o tracks.csv")
+    _finish(found, output, report)
 
 
 @app.command()
@@ -106,10 +98,7 @@ def wand(
 
     Example: wingfit cameras wand wand.csv --length-mm 240 --size-px 1280x1024 --focal-px 1900 -o cameras.yaml
     """
-    from wingfit.cameras.calibrate.report import calibration_report  # imported late: other commands start faster
     from wingfit.cameras.calibrate.wand import Wand, calibrate_wand
-    from wingfit.cameras.files.camera_set import CameraSet
-    from wingfit.cameras.files.project import write_cameras
     from wingfit.cameras.files.wand_cameras import known_cameras, rough_cameras
     from wingfit.cameras.files.wand_points import camera_names, read_wand_points
     from wingfit.records.errors import DatasetError
@@ -124,6 +113,19 @@ def wand(
         stick = Wand(tuple(one / 1000 for one in length_mm))
         tracks = read_wand_points(raw, points.name, stick.markers, [one.size_px for one in start], origin)
         found = calibrate_wand(tracks, start, stick, free=free or (() if lenses else ("f_x", "f_y")))
+    except DatasetError as error:
+        raise _refused(error) from error
+    _finish(found, output, report)
+
+
+def _finish(found: Calibration, output: Path, report: Path | None) -> None:
+    """Write the calibrated cameras to ``output`` and the ``report``, and print what was found."""
+    from wingfit.cameras.calibrate.report import calibration_report
+    from wingfit.cameras.files.camera_set import CameraSet
+    from wingfit.cameras.files.project import write_cameras
+    from wingfit.records.errors import DatasetError
+
+    try:
         write_cameras(output, CameraSet(found.cameras, found.covariance))
     except DatasetError as error:
         raise _refused(error) from error

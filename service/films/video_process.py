@@ -110,14 +110,15 @@ def main(arguments: list[str]) -> None:
         if not line:
             return
         try:
-            video, (told, body) = _respond(video, json.loads(line), path, rate_hz)
+            video, (answer, body) = _respond(video, json.loads(line), path, rate_hz)
         except DatasetError as error:
-            told, body = {"faults": listed(error)}, b""
+            answer, body = {"faults": listed(error)}, b""
         except IndexError as error:
-            told, body = {"count": error.args[0]}, b""
+            answer, body = {"count": error.args[0]}, b""
         except MemoryError:
-            told, body = {"faults": [[path.name, None, f"takes more than {MEMORY_MIB} MiB; film smaller images"]]}, b""
-        head = json.dumps(told).encode()
+            message = f"takes more than {MEMORY_MIB} MiB; film smaller images"
+            answer, body = {"faults": [[path.name, None, message]]}, b""
+        head = json.dumps(answer).encode()
         sys.stdout.buffer.write(LENGTHS.pack(len(head), len(body)) + head + body)
         sys.stdout.buffer.flush()
 

@@ -98,7 +98,7 @@ class _Process:
 
 
 class Videos:
-    """Answers questions about videos; of those asked about last, a process each stays for the next question."""
+    """Answers questions about videos; a process each of the latest videos stays for the next question."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()

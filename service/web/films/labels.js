@@ -96,7 +96,7 @@ const cameras = () => film.cameras.map((one) => one.name);
 const seenBy = (marker) => cameras().filter((camera) => labels.some((one) => one.camera === camera && one.marker === marker));
 const chosen = () => $("label-marker").value.trim();
 
-// The marker after the chosen one that a camera still lacks; a first one if none is chosen.
+// The marker after the chosen one that is still missing in a camera; a first one if none is chosen.
 function following() {
   const listed = names.length ? names : numbered();
   const from = listed.indexOf(chosen()) + 1;

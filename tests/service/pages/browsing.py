@@ -14,6 +14,8 @@ import pytest
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, ConsoleMessage, Page
 
+    from tests.service.conftest import Api
+
 NAMES = ("chromium-headless-shell", "chromium", "chromium-browser", "google-chrome")
 ARGUMENTS = (
     "--no-sandbox",
@@ -98,3 +100,9 @@ class Seen:
         while not self._holds(condition):
             assert time.monotonic() < deadline, f"not within {seconds:g} s: {condition}; errors: {self.errors}"
             self.page.wait_for_timeout(50)
+
+
+def opened(browser: Browser, api: Api, **options: Any) -> Seen:
+    """Return a watched page of the server behind ``api``, in a context with ``options``."""
+    context = browser.new_context(**({"viewport": {"width": 1280, "height": 900}} | options))
+    return Seen.watched(context.new_page(), str(api.client.base_url).rstrip("/"))

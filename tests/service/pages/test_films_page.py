@@ -17,7 +17,7 @@ import numpy as np
 from tests.cameras.films import FRAMES, NAMES, RATE, SIZE, cameras, wing, write_film
 from tests.service import toy
 from tests.service.conftest import Api, serving
-from tests.service.pages.browsing import DRAWN, Seen
+from tests.service.pages.browsing import DRAWN, Seen, opened
 from wingfit.records.array_types import Array
 from wingfit.service.app import create_app
 from wingfit.service.settings import Settings
@@ -50,11 +50,6 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
             writer.write(np.asarray(cv2.imread(str(folder / name / f"{number}.png"), cv2.IMREAD_GRAYSCALE)))
         writer.release()
     return folder
-
-
-def opened(browser: Browser, api: Api, **options: Any) -> Seen:
-    context = browser.new_context(**({"viewport": {"width": 1280, "height": 900}} | options))
-    return Seen.watched(context.new_page(), str(api.client.base_url).rstrip("/"))
 
 
 @pytest.fixture

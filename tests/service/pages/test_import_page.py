@@ -13,7 +13,7 @@ from tests.importers.start.test_start import wing_table
 from tests.oracles.track_files import flapping, text_writers
 from tests.service import toy
 from tests.service.conftest import Api, serving
-from tests.service.pages.browsing import Seen
+from tests.service.pages.browsing import Seen, opened
 from wingfit.service.app import WEB, create_app
 from wingfit.service.settings import Settings
 
@@ -42,11 +42,6 @@ def api(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Api]:
     settings = Settings(data=tmp_path_factory.mktemp("import") / "data")
     with serving(create_app(settings, make_evaluator=toy.NoEvaluator)) as client:
         yield Api(client)
-
-
-def opened(browser: Browser, api: Api, **options: Any) -> Seen:
-    context = browser.new_context(**({"viewport": {"width": 1280, "height": 900}} | options))
-    return Seen.watched(context.new_page(), str(api.client.base_url).rstrip("/"))
 
 
 @pytest.fixture
