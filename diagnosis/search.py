@@ -255,12 +255,12 @@ def _choices(data: WhitenedData, initial: Fit, found: Sequence[list[Trial]]) -> 
     starts = []
 
     def left(trial: Trial) -> float:
-        return float(np.linalg.norm((initial.coefficients + trial.changes) / data.scale, axis=-1).min())
+        return float(np.linalg.norm(data.whiten(initial.coefficients + trial.changes), axis=-1).min())
 
     for trials in found:
         if trials and trials[0].suspect.positions:
             best = min(trials, key=left)
-            if left(best) < float(np.linalg.norm(initial.coefficients / data.scale)):
+            if left(best) < float(np.linalg.norm(data.whiten(initial.coefficients))):
                 starts += [StartPoint((best,), units_at_position(best, *one)) for one in positions_of(best.suspect)]
     return starts
 

@@ -67,7 +67,8 @@ class Recording:
 
     ``values`` [T, C] are C channels at the T increasing ``times`` (s): three per marker in the order x, y, z (m, wing
     frame), or one per axis in ``forces`` (N, body axes, force of the wings on the body). ``markers`` names the markers,
-    none for forces. ``standard_deviation`` [C] is that of the noise, None if unknown. Times of forces count from the
+    none for forces. ``standard_deviation`` [C] is that of the noise, None if unknown; ``noise_correlation`` [M, 3] is
+    that of each marker's noise along x and y, x and z, y and z, None if not stated. Times of forces count from the
     start of a beat. ``low_pass`` is the filter that was applied to the values; a model applies the same filter.
     ``motion`` of the wings and ``mass`` (kg), if given, replace those of the vehicle's description in this recording.
     """
@@ -83,6 +84,7 @@ class Recording:
     low_pass: LowPass | None = None
     motion: WingMotion | None = None
     mass: float | None = None
+    noise_correlation: Float[Array, "M 3"] | None = None
 
     @cached_property
     def valid(self) -> Bool[Mask, "T C"]:

@@ -7,7 +7,8 @@ The names below are public and documented; everything else in the package may ch
 raises :class:`DatasetError`, which lists what is wrong.
 - :func:`import_tracks` reads marker tracks from the files of motion-capture systems and digitisers, and returns
 :class:`ImportedTracks`; :func:`align_tracks` brings them to the frame of a described wing, :class:`AlignedTracks`;
-:func:`align_recordings` those of several recordings to one frame.
+:func:`align_recordings` those of several recordings to one frame; :func:`marker_noise` reads their covariances,
+:class:`MarkerNoise`.
 - :func:`import_forces` reads forces from the files of balances, and returns :class:`ImportedForces`.
 - :func:`wing_template` describes a wing by an outline of its planform, and returns :class:`WingTemplate`;
 :func:`wing_drawing` draws a described wing as SVG.
@@ -64,6 +65,7 @@ if TYPE_CHECKING:
     from wingfit.rigs.run import Run, SimulationError
     from wingfit.rigs.suspect import Suspect
     from wingfit.tracking.alignment import AlignedTracks
+    from wingfit.tracking.marker_noise import MarkerNoise, marker_noise
 
 __all__ = [
     "AlignedTracks",
@@ -82,6 +84,7 @@ __all__ = [
     "Genome",
     "ImportedForces",
     "ImportedTracks",
+    "MarkerNoise",
     "Mistake",
     "Port",
     "Quantity",
@@ -112,6 +115,7 @@ __all__ = [
     "import_forces",
     "import_tracks",
     "load_dataset",
+    "marker_noise",
     "save_dataset",
     "track_film",
     "wing_drawing",
@@ -157,6 +161,7 @@ _MODULES = {
     "wingfit.rigs.run": ("Run", "SimulationError"),
     "wingfit.rigs.suspect": ("Suspect",),
     "wingfit.tracking.alignment": ("AlignedTracks",),
+    "wingfit.tracking.marker_noise": ("MarkerNoise", "marker_noise"),
 }
 _MODULE_OF = {name: module for module, names in _MODULES.items() for name in names}
 

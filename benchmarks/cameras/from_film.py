@@ -20,6 +20,7 @@ from wingfit.records import Condition, Dataset, FrameError, Recording, Wing
 from wingfit.records.array_types import Array
 from wingfit.sim.virtual_rigs.campaign import robird_wing
 from wingfit.tracking.alignment import AlignedTracks, Known, Tracks, align, in_common_frame
+from wingfit.tracking.marker_noise import MarkerNoise, noise_in_wing_axes
 
 CONDITIONS = ((1e3, 0.0), (1e4, 0.0524), (1e5, 0.0), (1e5, 0.1222), (1e4, 0.1222))
 HELD_OUT = 4
@@ -47,7 +48,10 @@ def dataset_from_films(folder: Path, genes: Mapping[str, float], report: Report,
     known = Known(side="right", flap_frequency_hz=BEAT)
     tracks = [Tracks(f"film{k}", one.times, one.names, one.positions) for k, one in enumerate(films)]
     every = in_common_frame([align(one, wing, known) for one in tracks])
-    recordings = tuple(_recording(one, condition) for one, condition in zip(every, CONDITIONS, strict=True))
+    noises = [
+        noise_in_wing_axes(one, film.names, film.covariance, one.file) for one, film in zip(every, films, strict=True)
+    ]
+    recordings = tuple(_recording(*one) for one in zip(every, noises, CONDITIONS, strict=True))
     frame = FrameError(_triple(every[0].rotation_error), _triple(every[0].origin_error))
     return Dataset("films of a wing", wing, recordings, (recordings[HELD_OUT].name,), frame_error=frame)
 
@@ -66,11 +70,20 @@ def _tracked(place: Path, wing: Wing, calibration: Calibration) -> TrackedFilm:
     return track(request)
 
 
-def _recording(aligned: AlignedTracks, condition: tuple[float, float]) -> Recording:
+def _recording(aligned: AlignedTracks, noise: MarkerNoise, condition: tuple[float, float]) -> Recording:
     pressure, lag = condition
     values = aligned.positions.reshape(len(aligned.times), -1)
     known = Condition(aligned.flap_frequency, lag, pressure, KELVIN)
-    return Recording(aligned.file, "vacuum_chamber", known, aligned.times, aligned.markers, values)
+    return Recording(
+        aligned.file,
+        "vacuum_chamber",
+        known,
+        aligned.times,
+        aligned.markers,
+        values,
+        noise.standard_deviation.ravel(),
+        noise_correlation=noise.correlation,
+    )
 
 
 def _triple(values: Array) -> tuple[float, float, float]:

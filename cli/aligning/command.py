@@ -53,6 +53,13 @@ def align(
         float | None,
         typer.Option(help="As set on the rig, to 2 %: the true one on the cameras' clock is found; a strobe needs it."),
     ] = None,
+    covariance: Annotated[
+        list[Path] | None,
+        typer.Option(
+            help="What wingfit track --covariance wrote, one for each recording: the noise of the markers in the "
+            "axes of the wing is written beside the tracks, to FILE.noise.yaml, for dataset.yaml.",
+        ),
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Find the frame of a wing in tracks of any camera axes, name its markers, and write the tracks in that frame.
@@ -65,8 +72,10 @@ def align(
     from wingfit._align import align_recordings  # imported late: other commands start faster
     from wingfit.cli.aligning import results
     from wingfit.records.errors import DatasetError
+    from wingfit.tracking.marker_noise import marker_noise
 
     targets = _targets(output, tracks, force=force)
+    _check_covariances(covariance or [], targets, len(tracks), axes, force=force)
     try:
         with late_progress("aligning") as report:
             every = align_recordings(
@@ -81,11 +90,14 @@ def align(
                 flap_frequency_hz=flap_frequency_hz,
                 report=report,
             )
+            noises = [marker_noise(*one) for one in zip(every, covariance or [], strict=False)]
     except DatasetError as error:
         count = f"{error.count} error{'s' if error.count > 1 else ''}"
         raise WingfitError("the tracks were not aligned", count, errors=[vars(one) for one in error.errors]) from error
     for target, found in zip(targets, every, strict=False):
         write_text(target, found.csv(axes), f"aligned tracks of {found.file}")
+    for target, noise in zip(targets, noises, strict=False):
+        write_text(_noise_of(target), noise.yaml(), "keys of the recording in dataset.yaml")
     if as_json:
         written: list[str | None] = [str(one) for one in targets] if targets else [None] * len(every)
         answers = [found.as_json() | {"written": one} for found, one in zip(every, written, strict=True)]
@@ -119,6 +131,27 @@ def _targets(output: Path | None, tracks: list[Path], *, force: bool) -> list[Pa
         except OSError as error:
             raise WingfitError(f"cannot make the folder {output}", error.strerror or str(error)) from error
     return targets
+
+
+def _noise_of(target: Path) -> Path:
+    return target.with_suffix(".noise.yaml")
+
+
+def _check_covariances(covariance: list[Path], targets: list[Path], count: int, axes: str, *, force: bool) -> None:
+    """Raise a usage error if files of ``covariance`` do not fit to ``count`` recordings written to ``targets``."""
+    if not covariance:
+        return
+    hint = "--covariance"
+    if len(covariance) != count:
+        raise typer.BadParameter(
+            f"{len(covariance)} are given for {count} recordings; give one for each", param_hint=hint
+        )
+    if not targets or axes != "wing":
+        raise typer.BadParameter(
+            "needs --output and the axes of the wing, in which the noise is written", param_hint=hint
+        )
+    for one in map(_noise_of, targets):
+        _check_output(one, covariance, force=force)
 
 
 def _check_output(output: Path, tracks: list[Path], *, force: bool) -> None:

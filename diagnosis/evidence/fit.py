@@ -284,17 +284,17 @@ class _DampedSteps:
     """
 
     def __init__(self, data: WhitenedData, fit: Fit) -> None:
-        white, self.slopes = fit.coefficients / data.scale, fit.jacobian / data.scale[:, None]
-        self.weight, self.unit, self.scale = data.likelihood_weight(fit.coefficients), fit.unit, data.scale
+        white, self.slopes = data.whiten(fit.coefficients), data.whitened_slopes(fit.jacobian)
+        self.weight, self.unit, self.data = data.likelihood_weight(fit.coefficients), fit.unit, data
         curvature = self.weight * self.slopes.T @ self.slopes + np.eye(len(fit.unit)) / PRIOR_SD**2
         self.quadratic = Quadratic(curvature, self.weight * self.slopes.T @ white + (fit.unit - 0.5) / PRIOR_SD**2)
         self.own = np.clip(fit.damping * DAMPING_FACTORS[0], LEAST_DAMPING, LARGEST_DAMPING)
         by_box = np.outer(DAMPING_FACTORS[1] / PRIOR_SD**2, np.ones(len(fit.unit)))
         self.dampings = np.concatenate([np.outer(self.own, np.diag(curvature)), by_box]) + SINGULAR * curvature.max()
 
-    def move(self, damping: Array, acceleration: Array | float = 0.0) -> Array:
+    def move(self, damping: Array, acceleration: Array | None = None) -> Array:
         """Return the step [F] with ``damping`` [F]; ``acceleration`` [D]: second-order change of the coefficients."""
-        accelerated = self.weight * self.slopes.T @ np.broadcast_to(acceleration / self.scale, len(self.scale))
+        accelerated = 0.0 if acceleration is None else self.weight * self.slopes.T @ self.data.whiten(acceleration)
         return self.quadratic.step(self.unit, damping, self.quadratic.slope + accelerated)
 
 

@@ -27,7 +27,7 @@ def covariance(data: WhitenedData, fit: Fit) -> Float[Array, "F F"]:
     than the tolerance; and the prior. For forces it adds the scatter of the recordings' scores, the gradients of the
     log-likelihood (a sandwich with recordings as clusters: Liang and Zeger 1986).
     """
-    white, slopes = fit.coefficients / data.scale, fit.jacobian / data.scale[:, None]
+    white, slopes = data.whiten(fit.coefficients), data.whitened_slopes(fit.jacobian)
     weight, recordings = data.likelihood_weight(fit.coefficients), len(data.recordings)
     weight = min(weight, data.max_likelihood_weight)
     prior = np.eye(len(fit.unit)) / PRIOR_SD**2

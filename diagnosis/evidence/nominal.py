@@ -151,7 +151,7 @@ def finer_change(finer: FitContext, refit: Refit) -> tuple[float, float]:
     amount = float(np.clip(-(change @ residual) / max(power, 1e-300), 0.0, data.policy.discretisation_factor))
     excess = max(float(residual @ residual) - len(residual), 1e-300)
     gain = (float(residual @ residual) - float(np.sum((residual + amount * change) ** 2))) / excess
-    return float(np.sqrt(data.weight @ (change[: len(data.scale)] * data.scale) ** 2)), gain
+    return float(np.sqrt(data.weight @ data.whitening.restore(change[: len(data.scale)]) ** 2)), gain
 
 
 def improves(data: WhitenedData, finer: Refit, coarse: Refit) -> bool:

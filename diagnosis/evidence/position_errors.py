@@ -62,7 +62,7 @@ class PositionErrors:
 
     def estimates(self, data: WhitenedData, fit: Fit) -> Estimates:
         """Return the errors that are estimated at ``fit``; ``data``: with these errors integrated out."""
-        found = np.zeros(0) if data.errors is None else data.errors.estimates(fit.coefficients / data.scale)
+        found = np.zeros(0) if data.errors is None else data.errors.estimates(data.whiten(fit.coefficients))
         own = found[: 3 * len(self.markers)] if self.sd and len(found) else np.zeros(3 * len(self.markers))
         turned = deviations(self.frame) * found[-6:] if self.frame and len(found) else np.zeros(6)
         return Estimates(self.sd * own.reshape(-1, 3), turned)
@@ -162,7 +162,7 @@ def find_position_errors(
             columns.insert(0, _own(changes, rest, usual) * sd)
     if not columns:
         return None
-    return found, data.allowing(Marginal.of(np.hstack(columns) / data.scale[:, None]))
+    return found, data.allowing(Marginal.of(data.whitened_slopes(np.hstack(columns))))
 
 
 def too_many(data: WhitenedData) -> bool:

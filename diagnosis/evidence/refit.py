@@ -94,7 +94,7 @@ def cross_validated_excess(data: WhitenedData, fit: Fit) -> float | None:
     """
     if len(data.experiments) < 2:
         return None
-    white, slopes = fit.coefficients / data.scale, fit.jacobian / data.scale[:, None]
+    white, slopes = data.whiten(fit.coefficients), data.whitened_slopes(fit.jacobian)
     grams = [slopes[part].T @ slopes[part] for part in data.recording_slices]
     scores = [slopes[part].T @ white[part] for part in data.recording_slices]
     likelihood_weight, prior = data.likelihood_weight(fit.coefficients), (fit.unit - 0.5) / PRIOR_SD**2
@@ -128,9 +128,9 @@ def _refitted_alone(data: WhitenedData, fit: Fit, r: int, coefficients: Array) -
     own = [k for k, name in enumerate(fit.problem.free) if belongs_to(name, recording.name)]
     if not own:
         return coefficients
-    slopes, scale = fit.jacobian[part][:, own], data.scale[part]
-    white = (coefficients.T / scale).T
-    move, *_ = np.linalg.lstsq(slopes / scale[:, None], white, rcond=None)
+    slopes, whitening = fit.jacobian[part][:, own], data.whitening.of_part(part)
+    white = whitening.whiten(coefficients.T).T
+    move, *_ = np.linalg.lstsq(whitening.whiten(slopes.T).T, white, rcond=None)
     return np.asarray(coefficients - slopes @ move)
 
 

@@ -65,22 +65,22 @@ class Nuisance:
 
     The prior of these F genes counts as F further samples, weighted against the likelihood at ``fit``
     (:meth:`WhitenedData.likelihood_weight`). ``residual`` [D + F]: the whitened residual without the part that the
-    genes can explain; ``scale`` [D] whitens.
+    genes can explain; ``whiten`` is that of the data.
     """
 
     def __init__(self, data: WhitenedData, fit: Fit) -> None:
         weight = 1.0 / (PRIOR_SD * np.sqrt(data.likelihood_weight(fit.coefficients)))
-        slopes = fit.jacobian / data.scale[:, None]
-        self.scale = data.scale
+        slopes = data.whitened_slopes(fit.jacobian)
+        self.whiten = data.whiten
         self.genes = score_test.Nuisance.of(np.vstack([slopes, weight * np.eye(slopes.shape[1])]))
-        self.residual = self.genes.rest(np.concatenate([fit.coefficients / data.scale, weight * (fit.unit - 0.5)]))
+        self.residual = self.genes.rest(np.concatenate([data.whiten(fit.coefficients), weight * (fit.unit - 0.5)]))
 
     def project_out(self, changes: Float[Array, "*B D"]) -> Float[Array, "*B N"]:
         """Whiten ``changes`` [..., D] of the coefficients, and subtract the part that the F genes can explain.
 
         The result [..., D + F] has an additional entry for the prior of each gene.
         """
-        return self.genes.rest(changes / self.scale)
+        return self.genes.rest(self.whiten(changes))
 
 
 def off_units(suspect: Suspect) -> Float[Array, " E"]:

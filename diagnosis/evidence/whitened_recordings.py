@@ -12,6 +12,7 @@ import numpy as np
 from wingfit.calibration.estimates.linearised import residuals_of
 from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.problem import Problem, compared
+from wingfit.diagnosis.evidence.whitening import Whitening
 from wingfit.diagnosis.policy import POLICY, Policy
 from wingfit.inference.marginal import Marginal
 from wingfit.inference.noise.harmonic import HarmonicFit, harmonic_fit, whole_markers
@@ -117,7 +118,7 @@ class WhitenedData:
         return replace(self, reduced=reduced, errors=None)
 
     def allowing(self, errors: Marginal) -> WhitenedData:
-        """Return the same data with ``errors`` of the description, relative to :attr:`scale`, integrated out."""
+        """Return the same data with ``errors`` of the description, relative to the noise, integrated out."""
         return replace(self, errors=errors)
 
     @cached_property
@@ -222,9 +223,22 @@ class WhitenedData:
 
     @cached_property
     def scale(self) -> Float[Array, " D"]:
-        """Standard deviation [D] of each coefficient by noise and tolerance together; whitening divides by it."""
+        """Standard deviation [D] of each coefficient by noise and tolerance together."""
         allowed = [self.tolerance**2 / (len(v.weight) * np.tile(v.weight, int(v.used.sum()))) for v in self.reduced]
         return np.asarray(np.sqrt(self.variance + np.concatenate(allowed)))
+
+    @cached_property
+    def whitening(self) -> Whitening:
+        """The map that gives noise and tolerance of coefficients unit covariance."""
+        return Whitening.of(self.scale, self.reduced, self.recording_slices)
+
+    def whiten(self, coefficients: Float[Array, "*B D"]) -> Float[Array, "*B D"]:
+        """Return ``coefficients`` [..., D] relative to their noise (:class:`Whitening`)."""
+        return self.whitening.whiten(coefficients)
+
+    def whitened_slopes(self, jacobian: Float[Array, "D F"]) -> Float[Array, "D F"]:
+        """Return the derivatives [D, F] of whitened coefficients, from those of the coefficients."""
+        return self.whiten(jacobian.T).T
 
     def coefficients_of(self, residuals: Sequence[Float[Array, "*B _ _"]]) -> Float[Array, "*B D"]:
         """Return the coefficients [..., D] of ``residuals``: for each recording [..., T, C], C channels at T times.
@@ -236,11 +250,13 @@ class WhitenedData:
 
     def without_errors(self, coefficients: Float[Array, "*B D"]) -> Float[Array, "*B D"]:
         """Return ``coefficients`` [..., D] without what errors of the description contribute, or could explain."""
-        return coefficients if self.errors is None else self.errors.whiten(coefficients / self.scale) * self.scale
+        if self.errors is None:
+            return coefficients
+        return self.whitening.restore(self.errors.whiten(self.whiten(coefficients)))
 
     def chi_squared(self, coefficients: Float[Array, " D"]) -> float:
-        """Return the sum of squares of ``coefficients`` [D], each divided by :attr:`scale`."""
-        return float(np.sum((coefficients / self.scale) ** 2))
+        """Return the sum of squares of the whitened ``coefficients`` [D]."""
+        return float(np.sum(self.whiten(coefficients) ** 2))
 
     @cached_property
     def experiments(self) -> tuple[tuple[int, ...], ...]:
@@ -273,7 +289,7 @@ class WhitenedData:
         attributed. Only :attr:`effective_samples` values of that error are independent, and its size is unknown, so the
         likelihood depends on the logarithm of its mean square (as in Student's t).
         """
-        whole = ((coefficients / self.scale) ** 2).sum(axis=-1)
+        whole = (self.whiten(coefficients) ** 2).sum(axis=-1)
         by_noise = np.minimum(whole, len(self.scale))
         beyond = self._chi_squared_excess(coefficients)
         return np.asarray(by_noise + self.effective_samples * np.log1p(beyond / self.effective_samples))
@@ -291,7 +307,7 @@ class WhitenedData:
         return float(1.0 / (1.0 + self.policy.tolerance**2 * len(self.scale) / self.effective_samples))
 
     def _chi_squared_excess(self, coefficients: Array) -> Array:
-        return np.asarray(np.maximum(((coefficients / self.scale) ** 2).sum(axis=-1) - len(self.scale), 0.0))
+        return np.asarray(np.maximum((self.whiten(coefficients) ** 2).sum(axis=-1) - len(self.scale), 0.0))
 
     def excess(self, coefficients: Float[Array, " D"]) -> float:
         """Return the mean square of a residual with ``coefficients`` [D] minus that of the noise (m^2, N^2)."""

@@ -106,8 +106,9 @@ def _plausible(loads: Sequence[MissingLoad], motions: Sequence[StationMotion]) -
 def _case(data: WhitenedData, nominal: Refit, r: int, probed: Probed) -> Case:
     beat_fit, part, fit = data.beat_fits[r], data.recording_slices[r], nominal.fit
     responses = beat_fit.of(np.moveaxis(np.nan_to_num(probed.responses), -1, 0))[:, beat_fit.used]
-    residual, slopes = fit.coefficients / data.scale, fit.jacobian.T / data.scale
-    rows = (residual[part], responses.reshape(len(responses), -1) / data.scale[part], slopes[:, part])
+    residual, slopes = data.whiten(fit.coefficients), data.whiten(fit.jacobian.T)
+    whitened = data.whitening.of_part(part).whiten(responses.reshape(len(responses), -1))
+    rows = (residual[part], whitened, slopes[:, part])
     if data.errors is not None:  # another recording has another load, so each is considered alone
         alone = data.errors.of_part(part)
         rows = (

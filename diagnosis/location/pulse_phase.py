@@ -35,7 +35,7 @@ def locate_pulse(context: FitContext, fit: Fit) -> Interval | None:
     The interval contains the instants at which the pulse would explain nearly as much, given the model error.
     """
     data, nuisance = context.data, Nuisance(context.data, fit)
-    residual, whitened = nuisance.residual, fit.coefficients / data.scale
+    residual, whitened = nuisance.residual, data.whiten(fit.coefficients)
     phase = np.arange(INSTANTS) / INSTANTS
     gains = np.array([explained(nuisance.project_out(_pulses(context, at)), residual) for at in phase])
     best = int(np.argmax(gains))

@@ -63,14 +63,13 @@ def _by_genes(one: WhitenedData, context: FitContext, nominal: Fit) -> float | N
     slopes = one.coefficients_of([np.moveaxis(found.slopes[0], -1, 0)]).T  # [D, F]
     of_model, of_recording = np.split(slopes, [len(nominal.unit)], axis=1)
     if own:
-        scale = one.scale[:, None]
-        absorbed, *_ = np.linalg.lstsq(of_recording / scale, of_model / scale, rcond=None)
+        absorbed, *_ = np.linalg.lstsq(one.whitened_slopes(of_recording), one.whitened_slopes(of_model), rcond=None)
         of_model = of_model - of_recording @ absorbed
     return float(one.weight @ np.einsum("df,fg,dg->d", of_model, _covariance(context.data, nominal), of_model))
 
 
 def _covariance(data: WhitenedData, fit: Fit) -> Array:
     """Return the covariance [F, F] of the genes of ``fit`` in unit coordinates."""
-    white = fit.jacobian / data.scale[:, None]
+    white = data.whitened_slopes(fit.jacobian)
     weight = data.likelihood_weight(fit.coefficients)
     return np.asarray(np.linalg.inv(weight * white.T @ white + np.eye(len(fit.unit)) / PRIOR_SD**2))

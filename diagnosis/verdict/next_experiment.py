@@ -135,7 +135,7 @@ def explained_by_genes(
     lag1 = float(np.clip(lag1, 0.0, 0.99))
     weight = data.likelihood_weight(rival.coefficients)
     counts = weight * (1.0 - lag1) / (1.0 + lag1)  # weight of a sample, less for correlated noise
-    known = rival.jacobian / data.scale[:, None]
+    known = data.whitened_slopes(rival.jacobian)
     information = weight * known.T @ known + np.eye(len(rival.unit)) / PRIOR_SD**2
     if unknown is not None:
         information = _forgotten(information, unknown)

@@ -12,6 +12,7 @@ from wingfit.diagnosis.verdict.noise_doubt import UNEVEN, faint, noisier, quiet_
 from wingfit.diagnosis.verdict.weigh_hypotheses import drifts
 from wingfit.inference.noise.drift import Drift
 from wingfit.inference.noise.harmonic import still_markers
+from wingfit.inference.noise.stated import Stated
 from wingfit.records import FrameError
 from wingfit.records.array_types import Array, Float
 
@@ -42,12 +43,23 @@ def _stated_remarks(data: WhitenedData) -> tuple[str, ...]:
         ([one for one in wrong if one[1] > 1.0], "check the unit and that it is of single samples"),
         ([one for one in wrong if one[1] <= 1.0], "something else changes from beat to beat, or it is too small"),
     )
-    return tuple(
+    unlike = [one.name for one, fit in zip(data.recordings, data.beat_fits, strict=True) if _is_unlike(fit.stated)]
+    remark = (
+        f"the stated correlations of the noise in {', '.join(unlike)} are not used: independent coordinates agree "
+        "better with what differs between beats; check that they are in the axes of the wing: x with y, x with z, "
+        "y with z"
+    )
+    sizes = (
         "the stated standard deviation of the noise is not used where it is far from the noise that is seen: "
         f"{', '.join(f'{ratio:.2g} times in {name}' for name, ratio in found)}; {cause}"
         for found, cause in kinds
         if found
     )
+    return (*sizes, *((remark,) if unlike else ()))
+
+
+def _is_unlike(stated: Stated | None) -> bool:
+    return stated is not None and stated.correlated is False
 
 
 def _drift_remarks(data: WhitenedData, unit: str) -> tuple[str, ...]:

@@ -22,7 +22,7 @@ from wingfit.inference.noise.drift import Drift, drift_of, slow_basis
 from wingfit.inference.noise.mean_beat import fourier_basis, masks_of, scatter_about
 from wingfit.inference.noise.shared_pattern import shared_part
 from wingfit.inference.noise.spectrum import density_at_harmonics, lag1_autocorrelation
-from wingfit.inference.noise.stated import Stated, stated_noise
+from wingfit.inference.noise.stated import Stated, correlation_matrices, stated_noise
 from wingfit.records import Recording
 from wingfit.records.array_types import Array, Bool, Float, Index, Int, Mask
 from wingfit.records.blas_threads import one_blas_thread
@@ -59,6 +59,7 @@ class HarmonicFit:
         drift: slow change of the beat during the recording; None for too few beats.
         shared: part of the power of the noise that is a motion that markers of tracks share (:func:`shared_part`).
         stated: the stated noise compared with what was seen; None if none is stated.
+        correlation: [M, 3, 3] of the noise of each marker's coordinates, as stated; None: it is independent.
     """
 
     order: Int[Index, " P"]
@@ -74,6 +75,7 @@ class HarmonicFit:
     drift: Drift | None = None
     shared: float = 0.0
     stated: Stated | None = None
+    correlation: Float[Array, "M 3 3"] | None = None
 
     def of(self, residuals: Float[Array, "*B T C"]) -> Float[Array, "*B C P"]:
         """Fourier coefficients [..., C, P] of ``residuals`` [..., T, C] (NaN: not recorded); zero if not used."""
@@ -113,6 +115,7 @@ def harmonic_fit(recording: Recording, compared: Mask | None = None) -> Harmonic
         scatter.drift,
         shared_part(scatter.values, valid, recording.values) if recording.kind == "tracks" else 0.0,
         scatter.stated,
+        scatter.correlation,
     )
 
 
@@ -131,7 +134,7 @@ def noise_distance(recordings: tuple[Recording, ...]) -> float | None:
 
     Noise is the part of the positions that differs from beat to beat; the part of it that the fitted mean beat absorbs
     is added again. Returns None if no recording has usable samples. The mean length of a normally distributed vector is
-    2 sqrt(2 / pi) R_G of its three variances, with Carlson's symmetric elliptic integral R_G.
+    2 sqrt(2 / pi) R_G of its three principal variances, with Carlson's symmetric elliptic integral R_G.
     """
     total, count = 0.0, 0
     for recording in recordings:
@@ -140,7 +143,7 @@ def noise_distance(recordings: tuple[Recording, ...]) -> float | None:
         except ValueError:
             continue
         number = scatter.valid.sum(axis=0)[::3]
-        lengths = 2.0 * np.sqrt(2.0 / np.pi) * elliprg(*scatter.variance.reshape(-1, 3).T)
+        lengths = 2.0 * np.sqrt(2.0 / np.pi) * elliprg(*scatter.principal_variances.T)
         total, count = total + float(lengths @ number), count + int(number.sum())
     return total / count if count else None
 
@@ -169,6 +172,7 @@ class _Scatter:
         variance: [C] of the noise of one sample.
         drift: slow change of the beat; None for too few beats.
         stated: the stated noise compared with what was seen; None if none is stated.
+        correlation: [M, 3, 3] of the noise of each marker's coordinates, as stated; None: it is independent.
     """
 
     values: Array
@@ -182,6 +186,7 @@ class _Scatter:
     variance: Array
     drift: Drift | None
     stated: Stated | None
+    correlation: Array | None
 
     @classmethod
     def of(cls, recording: Recording, compared: Mask | None) -> _Scatter:
@@ -216,11 +221,26 @@ class _Scatter:
         density *= widened
         taken = scale * density[fitted].sum()  # power of the noise that the fit of the mean beat absorbs
         variance = ((values**2).sum(axis=0) + taken) / np.maximum(valid.sum(axis=0), 1)
-        stated = stated_noise(recording, variance, used, between_beats=beats >= 2)
+        stated = stated_noise(recording, variance, used, values, between_beats=beats >= 2)
         if stated and stated.used and recording.standard_deviation is not None:
-            factor = recording.standard_deviation**2 / np.maximum(variance, np.finfo(float).tiny)
-            scale, variance = scale * factor, recording.standard_deviation**2
-        return cls(values, valid, basis, order, trend, beats, inner, (density, scale), variance, drift, stated)
+            # All channels have one spectrum; how large each of them is, is stated, and need not be estimated.
+            whole = float(np.mean(scale[used]) / np.mean(variance[used]))
+            variance = recording.standard_deviation**2
+            scale = whole * variance
+        known = recording.noise_correlation if stated and stated.correlated else None
+        correlation = None if known is None else correlation_matrices(known)
+        noise = density, scale
+        return cls(values, valid, basis, order, trend, beats, inner, noise, variance, drift, stated, correlation)
+
+    @property
+    def principal_variances(self) -> Float[Array, "M 3"]:
+        """Variances [M, 3] of the noise of each marker's sample along its principal axes, m^2."""
+        found = self.variance.reshape(-1, 3)
+        if self.correlation is None:
+            return found
+        spread = np.sqrt(found)
+        square = np.linalg.eigvalsh(spread[:, :, None] * self.correlation * spread[:, None, :])
+        return np.asarray(np.maximum(square, 0.0))
 
 
 def _check_moves(recording: Recording, seen: Mask) -> None:

@@ -69,6 +69,7 @@ def to_recording(entry: RecordingFile, samples: Samples, document: Document, pat
         forces=samples.forces,
         values=samples.values,
         standard_deviation=_to_deviations(entry, samples, document, path, faults),
+        noise_correlation=_to_correlations(entry, samples, document, path, faults),
     )
 
 
@@ -98,6 +99,7 @@ def describe_rig(rig: Wing | Vehicle) -> dict[str, object]:
 def describe_recording(recording: Recording) -> dict[str, object]:
     """Convert ``recording``, without its samples, to plain data: an entry of ``recordings`` in ``dataset.yaml``."""
     values = vars(recording.condition) | vars(recording) | {"standard_deviation": _deviations(recording)}
+    values["noise_correlation"] = _correlations(recording)
     return _data(values, VehicleRecordingFile if recording.kind == "forces" else WingRecordingFile)
 
 
@@ -178,16 +180,42 @@ def _to_deviations(
     if noise is None or isinstance(noise, Decimal):
         return None if noise is None else np.full(size * len(names), float(noise))
     known = noise if isinstance(noise, dict) else {axis: [value] for axis, value in noise if value is not None}
+    remedy = f"give {each}, or one number for all"
+    return _values_of(known, names, size, what, remedy, document, (*path, key), faults).ravel()
+
+
+def _to_correlations(
+    entry: RecordingFile, samples: Samples, document: Document, path: Path, faults: Faults
+) -> Float[Array, "M 3"] | None:
+    """Return the correlations of each marker's noise, or None if ``entry`` gives none; faults as of deviations."""
+    key = "noise_correlation"
+    known = getattr(entry, key, None)
+    if known is None:
+        return None
+    remedy = "give [xy, xz, yz] for each marker of the recording"
+    return _values_of(known, samples.markers, 3, "marker", remedy, document, (*path, key), faults)
+
+
+def _values_of(
+    known: Mapping[str, Sequence[Decimal]],
+    names: Sequence[str],
+    size: int,
+    what: str,
+    remedy: str,
+    document: Document,
+    path: Path,
+    faults: Faults,
+) -> Float[Array, "N size"]:
+    """Return the values [N, size] of N ``names``; adds a fault for a name that is not ``known``, and for any other."""
     for name in known:
         if name not in names:
-            remedy = nearest(name, names) if size == 3 else "remove it"
-            message = f"{what} {name!r} is not in the recording; {remedy}"
-            faults.add(document.where((*path, key, name)), name, message)
+            other = nearest(name, names) if what == "marker" else "remove it"
+            faults.add(document.where((*path, name)), name, f"{what} {name!r} is not in the recording; {other}")
     missing = [name for name in names if name not in known]
     if missing:
-        message = f"{what} {missing[0]!r} has no entry; give {each}, or one number for all"
-        faults.add(document.where((*path, key)), missing[0], message)
-    return np.array([float(value) for name in names for value in known.get(name, [math.nan] * size)])
+        faults.add(document.where(path), missing[0], f"{what} {missing[0]!r} has no entry; {remedy}")
+    rows = [[float(value) for value in known.get(name, [Decimal("nan")] * size)] for name in names]
+    return np.array(rows).reshape(len(names), size)
 
 
 def _deviations(recording: Recording) -> object:
@@ -200,3 +228,10 @@ def _deviations(recording: Recording) -> object:
     if values and len(set(values)) == 1 and math.isfinite(values[0]):
         return values[0]
     return {marker: values[3 * k : 3 * k + 3] for k, marker in enumerate(recording.markers)}
+
+
+def _correlations(recording: Recording) -> object:
+    """Convert the correlations of the noise to plain data by marker; None if they are unknown."""
+    if recording.noise_correlation is None:
+        return None
+    return dict(zip(recording.markers, recording.noise_correlation.tolist(), strict=True))

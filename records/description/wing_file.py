@@ -5,6 +5,7 @@ from __future__ import annotations
 from decimal import Decimal
 from typing import Annotated, Literal
 
+import numpy as np
 from pydantic import Discriminator, Field, Tag, model_validator
 
 from wingfit.records.description import fields
@@ -127,6 +128,10 @@ Noise = Annotated[
 ]
 
 
+Correlation = Annotated[Decimal, limits("[-0.9999, 0.9999]", "correlation of the noise of two coordinates")]
+LEAST_EIGENVALUE = 1e-6  # of a matrix of correlations: of less, the inverse is not accurate
+
+
 class WingRecordingFile(fields.WindowFile):
     """One recording of a wing; its tracks (positions of markers over time) are in ``recordings/<name>.csv``."""
 
@@ -142,6 +147,26 @@ class WingRecordingFile(fields.WindowFile):
     standard_deviation_m: Noise | None = Field(
         None, description="known noise: one number, or [x, y, z] for every marker recorded; leave out if unknown"
     )
+    noise_correlation: dict[fields.Name, Annotated[list[Correlation], Field(min_length=3, max_length=3)]] | None = (
+        Field(
+            None,
+            description="of the noise of every marker: [x with y, x with z, y with z]; needs standard_deviation_m",
+        )
+    )
+
+    @model_validator(mode="after")
+    def _correlations_belong_to_noise(self) -> WingRecordingFile:
+        if self.noise_correlation is None:
+            return self
+        if self.standard_deviation_m is None:
+            raise fault("noise_correlation needs standard_deviation_m: add it, or remove the correlations")
+        for name, (xy, xz, yz) in self.noise_correlation.items():
+            least = float(np.linalg.eigvalsh(np.array([[1, xy, xz], [xy, 1, yz], [xz, yz, 1]], float)).min())
+            if least < LEAST_EIGENVALUE:
+                what = f"noise_correlation of marker {name!r} is [{xy}, {xz}, {yz}], which no noise can have"
+                rule = f"its least eigenvalue is {least:.2g}, and must be {LEAST_EIGENVALUE:g} or more"
+                raise fault(f"{what}: {rule}; give the correlations of one covariance matrix, with more digits")
+        return self
 
 
 _Turn = Annotated[Decimal, limits("[0, 20] deg", "standard error of a small rotation", "give degrees: 0.2")]

@@ -167,6 +167,8 @@ def _check_kind(recording: Recording, dataset: Dataset, faults: Faults) -> None:
         if value := attrgetter(name)(recording):
             what = "a vehicle with forces" if kept else "a wing with tracks"
             faults.add(f"{where}: {name}", value, f"has no place in a dataset of {what}: remove it")
+    if kept and recording.noise_correlation is not None:
+        faults.add(f"{where}: noise_correlation", "", "has no place in a dataset of a vehicle with forces: remove it")
     orders = [AXES[:1], AXES[1:], AXES]
     if kept and recording.forces not in orders:
         message = f"forces are {recording.forces!r}; they must be one of {', '.join(map(str, orders))}"
@@ -175,7 +177,12 @@ def _check_kind(recording: Recording, dataset: Dataset, faults: Faults) -> None:
 
 def _check_shapes(recording: Recording, faults: Faults) -> None:
     where, times, channels = f"recording {recording.name!r}", len(recording.times), len(recording.channels)
-    wanted = {"times": (times,), "values": (times, channels), "standard_deviation": (channels,)}
+    wanted = {
+        "times": (times,),
+        "values": (times, channels),
+        "standard_deviation": (channels,),
+        "noise_correlation": (channels // 3, 3),
+    }
     for name, shape in wanted.items():
         array = getattr(recording, name)
         if array is None:

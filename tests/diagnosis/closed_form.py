@@ -57,11 +57,17 @@ class ClosedForm:
     def scale(self) -> Array:
         return np.full(self.residuals(np.full((1, self.size), 0.5)).shape[1], self.noise)
 
+    def whiten(self, coefficients: Array) -> Array:
+        return np.asarray(coefficients / self.scale)
+
+    def whitened_slopes(self, jacobian: Array) -> Array:
+        return self.whiten(jacobian.T).T
+
     def chi_squared(self, coefficients: Array) -> float:
         return float(self.deviance(coefficients))
 
     def deviance(self, coefficients: Array) -> Array:
-        return np.asarray(((coefficients / self.scale) ** 2).sum(axis=-1))
+        return np.asarray((self.whiten(coefficients) ** 2).sum(axis=-1))
 
     def likelihood_weight(self, coefficients: Array) -> float:  # noqa: ARG002
         return 1.0

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from wingfit.diagnosis.evidence.refit import cross_validated_excess
+from wingfit.diagnosis.evidence.whitening import Whitening
 from wingfit.diagnosis.policy import POLICY
 
 
@@ -20,7 +21,9 @@ def test_genes_beside_one_at_its_bound_stay_where_they_fit_best() -> None:
         experiments=((0,), (1,)),
         recordings=(SimpleNamespace(name="a"), SimpleNamespace(name="b")),
         recording_slices=(slice(0, 3), slice(3, 6)),
-        scale=np.ones(6),
+        whitening=Whitening(np.ones(6)),
+        whiten=lambda coefficients: coefficients,
+        whitened_slopes=lambda jacobian: jacobian,
         weight=np.full(6, 0.5),
         variance=np.ones(6),
         policy=POLICY,

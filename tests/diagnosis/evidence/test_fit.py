@@ -253,7 +253,12 @@ def test_geodesic_acceleration_follows_a_curved_valley() -> None:
     def deviance(coefficients: Array) -> Array:
         return np.asarray((coefficients**2).sum(axis=-1))
 
-    data = SimpleNamespace(scale=np.ones(2), likelihood_weight=lambda coefficients: 1.0, deviance=deviance)  # noqa: ARG005
+    data = SimpleNamespace(
+        likelihood_weight=lambda coefficients: 1.0,  # noqa: ARG005
+        deviance=deviance,
+        whiten=lambda coefficients: coefficients,
+        whitened_slopes=lambda jacobian: jacobian,
+    )
     simulator = cast(_Simulator, SimpleNamespace(context=SimpleNamespace(data=data), at=at))
     unit = np.array([0.1, 0.0])
     here = at(unit[None], unit)[0][0]

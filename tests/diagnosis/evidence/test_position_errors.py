@@ -36,13 +36,18 @@ def displaced(wing: Wing, by: Array) -> Wing:
     )
 
 
-def described(deviation: float, effect: str = "", sizes: Mapping[str, float] | None = None) -> Dataset:
+def described(
+    deviation: float,
+    effect: str = "",
+    sizes: Mapping[str, float] | None = None,
+    tracking: Tracking = Tracking(),  # noqa: B008
+) -> Dataset:
     """Recordings of a wing with ``effect`` of ``sizes``, and a description with positions off by ``deviation`` (m)."""
     model = FlexibleWing(robird_wing(), "4", numerics=REFERENCE)
     model = model.with_effects(effect) if effect else model
     truth = base_genome(model, sizes or {})
     found = [
-        replace(record(model, truth, one, Tracking(), np.random.default_rng(k)), name=f"recording-{k}")
+        replace(record(model, truth, one, tracking, np.random.default_rng(k)), name=f"recording-{k}")
         for k, one in enumerate((*CONDITIONS, HELD_OUT))
     ]
     by = deviation * np.random.default_rng(11).standard_normal((len(model.wing.markers), 3))

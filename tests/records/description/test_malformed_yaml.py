@@ -91,6 +91,30 @@ CASES = {
         ["standard_deviation_m.m1"],
         ["2 entries"],
     ),
+    "correlations without noise": (
+        FREQUENCY,
+        FREQUENCY + ", noise_correlation: {m1: [0.1, 0.1, 0.1]}",
+        ["recordings[0]"],
+        ["needs standard_deviation_m"],
+    ),
+    "correlations, one of two": (
+        FREQUENCY,
+        FREQUENCY + ", standard_deviation_m: 0.001, noise_correlation: {m1: [0.1, 0.1, 0.1]}",
+        ["recordings[0].noise_correlation"],
+        ["'m2' has no entry", "[xy, xz, yz]"],
+    ),
+    "correlation of one": (
+        FREQUENCY,
+        FREQUENCY + ", standard_deviation_m: 0.001, noise_correlation: {m1: [1.0, 0, 0], m2: [0, 0, 0]}",
+        ["recordings[0].noise_correlation.m1[0]"],
+        ["[-0.9999, 0.9999]"],
+    ),
+    "correlations that contradict each other": (
+        FREQUENCY,
+        FREQUENCY + ", standard_deviation_m: 0.001, noise_correlation: {m1: [0.9, 0.9, -0.9], m2: [0, 0, 0]}",
+        ["recordings[0]"],
+        ["'m1'", "no noise can have", "least eigenvalue"],
+    ),
     "noise, marker missing": (
         FREQUENCY,
         FREQUENCY + ", standard_deviation_m: {m1: [0.001, 0.001, 0.001]}",
