@@ -13,6 +13,7 @@ from wingfit.records.array_types import Array, Float, Index, Mask
 LEAST_CAMERAS = 2
 _STEPS = 10
 _SMALL_STEP_M = 1e-9
+_BLOCK = 16_384  # points that are computed at once; a multiple of the rows that BLAS computes at once
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,17 +43,23 @@ def triangulate(
     """
     seen = np.asarray(np.isfinite(pixels).all(2))
     count = pixels.shape[1]
-    start = nearest_points(cameras, pixels)
+    start = np.full((count, 3), np.nan)
+    for block in blocks(count):
+        start[block] = nearest_points(cameras, pixels[:, block])
     positions = np.full((count, 3), np.nan)
     spread = np.full((count, 3, 3), np.nan)
     misfit = np.full(count, np.nan)
     at = np.flatnonzero(np.isfinite(start).all(1))
     if len(at):
-        weights = _weights(covariance[:, at], seen[:, at])
-        found, matrix, cost = _refined(cameras, pixels[:, at], seen[:, at], weights, start[at])
-        positions[at], misfit[at] = found, cost
-        spread[at] = np.linalg.inv(matrix)
+        positions[at], matrix, misfit[at] = _refined(cameras, pixels, covariance, seen, at, start[at])
+        for block in blocks(len(at)):
+            spread[at[block]] = np.linalg.inv(matrix[block])
     return Points(positions, spread, misfit, 2 * seen.sum(0) - 3)
+
+
+def blocks(count: int) -> list[slice]:
+    """Return the slices of ``count`` points that are computed one after the other, so that memory is bounded."""
+    return [slice(first, min(first + _BLOCK, count)) for first in range(0, count, _BLOCK)]
 
 
 def nearest_points(cameras: Sequence[Camera], pixels: Float[Array, "C N 2"]) -> Float[Array, "N 3"]:
@@ -90,25 +97,44 @@ def _weights(covariance: Float[Array, "C N 2 2"], seen: Mask) -> Float[Array, "C
 
 
 def _refined(
-    cameras: Sequence[Camera], pixels: Array, seen: Mask, weights: Array, start: Float[Array, "N 3"]
+    cameras: Sequence[Camera], pixels: Array, covariance: Array, seen: Mask, at: Index, start: Float[Array, "N 3"]
 ) -> tuple[Float[Array, "N 3"], Float[Array, "N 3 3"], Float[Array, " N"]]:
-    """Return points, their matrices of information and the sums of weighted squares."""
-    points = start.copy()
+    """Return the points with the numbers ``at``, their matrices of information and the sums of weighted squares.
+
+    All take the same number of steps, so that the blocks do not change the result.
+    """
+    points, step = start, np.empty_like(start)
+    matrix, cost = np.empty((len(at), 3, 3)), np.empty(len(at))
+    weights = np.empty((len(cameras), len(at), 2, 2))
+    for block in blocks(len(at)):
+        weights[:, block] = _weights(covariance[:, at[block]], seen[:, at[block]])
     for _ in range(_STEPS):
-        matrix, right, cost = np.zeros((len(points), 3, 3)), np.zeros((len(points), 3)), np.zeros(len(points))
-        for camera, at, mask, weight in zip(cameras, pixels, seen, weights, strict=True):
-            where, by_point, _ = camera.project_with_changes(points[mask])
-            residual = at[mask] - where
-            weighted = np.einsum("nij,nik->njk", weight[mask], by_point)
-            matrix[mask] += np.einsum("nij,nik->njk", by_point, weighted)
-            right[mask] += np.einsum("nij,ni->nj", weighted, residual)
-            cost[mask] += np.einsum("ni,nij,nj->n", residual, weight[mask], residual)
-        step = np.linalg.solve(matrix, right[:, :, None])[:, :, 0]
+        for block in blocks(len(at)):
+            of = at[block]
+            matrix[block], right, cost[block] = _linear(
+                cameras, pixels[:, of], seen[:, of], weights[:, block], points[block]
+            )
+            step[block] = np.linalg.solve(matrix[block], right[:, :, None])[:, :, 0]
         # The information and the cost are those of the points before a step too small to change them.
         if np.abs(step).max() < _SMALL_STEP_M:
             break
         points = points + step
     return points, matrix, cost
+
+
+def _linear(
+    cameras: Sequence[Camera], pixels: Array, seen: Mask, weights: Array, points: Float[Array, "N 3"]
+) -> tuple[Float[Array, "N 3 3"], Float[Array, "N 3"], Float[Array, " N"]]:
+    """Return the normal equations at ``points``, matrix and right side, and the sums of weighted squares."""
+    matrix, right, cost = np.zeros((len(points), 3, 3)), np.zeros((len(points), 3)), np.zeros(len(points))
+    for camera, at, mask, weight in zip(cameras, pixels, seen, weights, strict=True):
+        where, by_point, _ = camera.project_with_changes(points[mask])
+        residual = at[mask] - where
+        weighted = np.einsum("nij,nik->njk", weight[mask], by_point)
+        matrix[mask] += np.einsum("nij,nik->njk", by_point, weighted)
+        right[mask] += np.einsum("nij,ni->nj", weighted, residual)
+        cost[mask] += np.einsum("ni,nij,nj->n", residual, weight[mask], residual)
+    return matrix, right, cost
 
 
 def error_from_cameras(

@@ -3,8 +3,8 @@
 Renders strobe films of 49 markers as in the thesis of van der Grinten, films in continuous light, and films of three
 cameras of which one is late; calibrates the cameras from rendered chessboards, tracks, and compares with the truth. The
 stereo pairs of OpenCV's samples are calibrated if the environment variable OPENCV_DOC_DATA names their folder. With
-``--diagnose``, a wing with a displaced hinge is filmed under five conditions, tracked, aligned and diagnosed. The last
-line is one JSON object.
+``--diagnose``, a wing with a displaced hinge is filmed under five conditions, tracked, aligned and diagnosed. With
+``--long``, memory and time are measured of films whose detections are repeated. The last line is one JSON object.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.cameras.from_film import dataset_from_films
+from benchmarks.cameras.long import long_films
 from benchmarks.cameras.peers import peers
 from benchmarks.cameras.tracked import Tracked, render_and_track
 from benchmarks.cameras.wand_lengths import wand_error_percent
@@ -31,6 +32,7 @@ from wingfit.cameras.calibrate.from_boards import calibrate_boards
 
 VARIABLE = "OPENCV_DOC_DATA"
 FLASHES, BEATS = 90, 1.0
+MINUTES = 4.0
 HINGE, DISPLACED_M = "hinge_offset.y", 0.008
 
 
@@ -42,11 +44,18 @@ def main() -> None:
     parser.add_argument("--beats", type=float, default=BEATS, help="beats filmed in continuous light")
     parser.add_argument("--seed", type=int, default=1, help="the same seed gives the same films")
     parser.add_argument("--diagnose", action="store_true", help="diagnose a wing from films alone, and nothing else")
+    parser.add_argument("--long", action="store_true", help="measure memory and time of long films, and nothing else")
+    parser.add_argument("--minutes", type=float, default=MINUTES, help="length of the longest film of --long")
     parser.add_argument("--keep", type=Path, help="store the films in this folder, and use those already there")
     chosen = parser.parse_args()
     with tempfile.TemporaryDirectory() as scratch:
         folder = chosen.keep or Path(scratch)
-        found = _diagnosed(folder) if chosen.diagnose else _run(folder, chosen.flashes, chosen.beats, chosen.seed)
+        if chosen.long:
+            found = {**long_films(folder, chosen.minutes), "commit": commit(), "machine": cpu()}
+        elif chosen.diagnose:
+            found = _diagnosed(folder)
+        else:
+            found = _run(folder, chosen.flashes, chosen.beats, chosen.seed)
     for name, value in found.items():
         print(f"{name:24} {value}")
     if chosen.json:

@@ -85,13 +85,28 @@ def render_and_track(preset: str, folder: Path, options: dict[str, Any], report:
     if not (folder / "done").exists():
         write(PRESETS[preset](**options), folder)
         (folder / "done").touch()
+    cameras = json.loads((folder / "cameras.json").read_text())
+    calibration = calibrated(folder, [camera["name"] for camera in cameras])
+    request = request_of(folder, calibration)
+    strobe = request.light == "strobe"
+    began = time.process_time()
+    found = track(request, report)
+    seconds = time.process_time() - began
+    frames = sum(film.opened().count for film in request.films)
+    truth = _truth(folder, cameras[0], found, strobe=strobe)
+    noise = _noise(cameras, found, truth)
+    return Tracked(calibration, found, truth, noise, _field(cameras[0]), frames, seconds)
+
+
+def request_of(folder: Path, calibration: Calibration | None = None) -> Request:
+    """Return what is tracked in a rendered film; its cameras are calibrated if no ``calibration`` is given."""
     scene = json.loads((folder / "scene.json").read_text())
     cameras = json.loads((folder / "cameras.json").read_text())
     names = [camera["name"] for camera in cameras]
-    calibration = calibrated(folder, names)
+    calibration = calibration or calibrated(folder, names)
     plan = Flapping(BEAT).markers()
     strobe = scene["strobe_hz"] is not None
-    request = Request(
+    return Request(
         cameras=calibration.cameras,
         films=tuple(
             Film(folder / f"wing-{name}.avi", camera["rate"]) for name, camera in zip(names, cameras, strict=True)
@@ -103,13 +118,6 @@ def render_and_track(preset: str, folder: Path, options: dict[str, Any], report:
         calibration=calibration.covariance,
         within_s=0.0 if strobe else WITHIN_S,
     )
-    began = time.process_time()
-    found = track(request, report)
-    seconds = time.process_time() - began
-    frames = sum(film.opened().count for film in request.films)
-    truth = _truth(folder, cameras[0], found, strobe=strobe)
-    noise = _noise(cameras, found, truth)
-    return Tracked(calibration, found, truth, noise, _field(cameras[0]), frames, seconds)
 
 
 def calibrated(folder: Path, names: list[str]) -> Calibration:

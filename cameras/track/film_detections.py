@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import hashlib
 import json
-import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
-from zipfile import BadZipFile
 
 import numpy as np
 
 from wingfit.cameras.markers.chequer import detect_chequers
-from wingfit.cameras.markers.detections import Detections, no_detections
+from wingfit.cameras.markers.detections import Detections
 from wingfit.cameras.markers.dot import detect_dots
+from wingfit.cameras.markers.stored import DetectionStore
 from wingfit.cameras.video.source import Film, Frames
 from wingfit.cameras.video.strobe import FlashMark, background, flashes
 from wingfit.records.array_types import Array
@@ -24,9 +23,7 @@ from wingfit.records.errors import fail
 MarkerKind = Literal["chequer", "dot"]
 Light = Literal["strobe", "continuous"]
 Progress = Callable[[int, int], object]
-_CHUNK = 50  # instants
 _VERSION = 2
-_COMPLETE = "complete"
 _COUNT_OFF = 3  # frames by which the count of a container may be wrong
 _LEAST_NOISE = 1.0  # grey levels: quantisation, and compression that removes noise
 
@@ -36,28 +33,28 @@ class FilmDetections:
     """Detections of one camera.
 
     Attributes:
-        seen: of each instant: of each flash with a strobe, else of each frame.
+        seen: of each instant: of each flash with a strobe, else of each frame; they may be read from files.
         marks: where the flashes are; without strobe ``frame`` is the number of the frame, and the rest has no meaning.
         bad_frames: numbers of frames that could not be decoded, or whose size differs.
         ended: number of frames at which the film ends, if its container states more; else None.
     """
 
-    seen: list[Detections]
-    marks: list[FlashMark]
+    seen: Sequence[Detections]
+    marks: Sequence[FlashMark]
     bad_frames: tuple[int, ...]
     ended: int | None = None
 
 
 @dataclass(frozen=True)
 class FilmTask:
-    """What is detected in one film: frames ``first`` to ``last`` (excluded), into ``store`` if given."""
+    """What is detected in one film: frames ``first`` to ``last`` (excluded), into a folder in ``store``."""
 
     film: Film
     kind: MarkerKind
     light: Light
+    store: Path
     first: int = 0
     last: int | None = None
-    store: Path | None = None
 
     @property
     def key(self) -> str:
@@ -78,36 +75,23 @@ def detect_film(task: FilmTask, progress: Progress) -> FilmDetections:
         DatasetError: the film cannot be read, or less than half of it, or a strobe's flashes cannot be separated.
     """
     frames = task.film.opened()
-    folder = task.store / task.key if task.store else None
-    chunks = _stored(folder)
-    seen = [one for chunk in chunks for one in chunk.seen]
-    marks = [one for chunk in chunks for one in chunk.marks]
-    bad = [one for chunk in chunks for one in chunk.bad_frames]
-    if folder and (folder / _COMPLETE).exists():
-        stored = (folder / _COMPLETE).read_text()
-        return FilmDetections(seen, marks, tuple(bad), int(stored) if stored else None)
-    first = task.first
-    if marks:
-        first = marks[-1].frame + (2 if task.light == "strobe" else 1)
-    fresh = FilmDetections([], [], ())
+    store = DetectionStore(task.store / task.key)
+    if not store.complete:
+        _detect(task, frames, store, progress)
+    return FilmDetections(store.seen(), store.marks(), tuple(store.bad_frames), store.ended)
+
+
+def _detect(task: FilmTask, frames: Frames, store: DetectionStore, progress: Progress) -> None:
+    """Detect the markers in the frames after those that are stored."""
+    last = store.last()
+    first = task.first if last is None else last.frame + (2 if task.light == "strobe" else 1)
     of = min(frames.count or 10**9, task.last or 10**9) - task.first
     limited = _Limited(frames, task.last)
     for mark, found, missing in _instants(task, limited, first):
-        fresh.seen.append(found)
-        fresh.marks.append(mark)
-        fresh = FilmDetections(fresh.seen, fresh.marks, (*fresh.bad_frames, *missing))
-        if len(fresh.seen) == _CHUNK and folder:
-            _store(folder, len(chunks), fresh)
-            chunks.append(fresh)
-            seen, marks, bad = seen + fresh.seen, marks + fresh.marks, [*bad, *fresh.bad_frames]
-            fresh = FilmDetections([], [], ())
+        store.add(mark, found, missing)
         progress(mark.frame + 1 - task.first, of)
-    fresh = FilmDetections(fresh.seen, fresh.marks, (*fresh.bad_frames, *limited.bad()))
-    ended = _early_end(task, frames)
-    if folder:
-        _store(folder, len(chunks), fresh)
-        (folder / _COMPLETE).write_text("" if ended is None else str(ended))
-    return FilmDetections(seen + fresh.seen, marks + fresh.marks, (*bad, *fresh.bad_frames), ended)
+    bad = limited.bad()
+    store.finish(bad, _early_end(task, frames))
 
 
 def _early_end(task: FilmTask, frames: Frames) -> int | None:
@@ -173,43 +157,3 @@ def _noise(frame: Array) -> float:
     """Return the noise of a frame from differences of neighbouring pixels, most of which show no edge."""
     change = np.diff(frame.astype(np.float32), axis=1)
     return max(float(np.median(np.abs(change)) / 0.6745 / np.sqrt(2)), _LEAST_NOISE)
-
-
-def _store(folder: Path, number: int, chunk: FilmDetections) -> None:
-    """Write one chunk; a run that is interrupted leaves whole chunks only."""
-    folder.mkdir(parents=True, exist_ok=True)
-    part, none = folder / f"{number:06d}.part", no_detections()
-    with part.open("wb") as file:
-        np.savez_compressed(
-            file,
-            counts=np.array([len(one) for one in chunk.seen], dtype=int),
-            pixels=np.concatenate([none.pixels, *(one.pixels for one in chunk.seen)]),
-            covariance=np.concatenate([none.covariance, *(one.covariance for one in chunk.seen)]),
-            size_px=np.concatenate([none.size_px, *(one.size_px for one in chunk.seen)]),
-            contrast=np.concatenate([none.contrast, *(one.contrast for one in chunk.seen)]),
-            marks=np.array([(one.frame, one.split, *one.between) for one in chunk.marks]).reshape(-1, 4),
-            bad=np.array(chunk.bad_frames, dtype=int),
-        )
-    part.replace(folder / f"{number:06d}.npz")
-
-
-def _stored(folder: Path | None) -> list[FilmDetections]:
-    """Return the chunks of an earlier run."""
-    chunks: list[FilmDetections] = []
-    while folder is not None and (file := folder / f"{len(chunks):06d}.npz").exists():
-        try:
-            with np.load(file) as of:
-                chunks.append(_chunk({name: of[name] for name in of.files}))
-        except (OSError, EOFError, ValueError, KeyError, IndexError, BadZipFile, zlib.error) as error:
-            raise fail(str(file), None, f"cannot be read ({error}); remove the folder, it is made anew") from None
-    return chunks
-
-
-def _chunk(of: dict[str, Array]) -> FilmDetections:
-    ends = np.cumsum(of["counts"])
-    seen = [
-        Detections(*(of[name][start:end] for name in ("pixels", "covariance", "size_px", "contrast")))
-        for start, end in zip(ends - of["counts"], ends, strict=True)
-    ]
-    marks = [FlashMark(int(row[0]), float(row[1]), (float(row[2]), float(row[3]))) for row in of["marks"]]
-    return FilmDetections(seen, marks, tuple(int(number) for number in of["bad"]))

@@ -28,6 +28,7 @@ class Followed:
 
     Attributes:
         chosen: [T, K], index of a point of the cloud, -1 where a marker was not found.
+        detections: [T, C, K], index of the detection in each camera, -1 where there is none.
         predicted: [T, K, 3] (m), where the smooth motion of the wing places the markers; NaN at instants that are lost.
         start: the instant at which the markers were identified first.
         again: instants at which the wing was found again, after others at which it was lost.
@@ -36,6 +37,7 @@ class Followed:
     """
 
     chosen: Index
+    detections: Index
     predicted: Float[Array, "T K 3"]
     start: int
     again: tuple[int, ...]
@@ -53,7 +55,8 @@ def follow(
 
     ``reference`` are the markers in any axes, for example at rest. ``progress`` is called with the count of instants
     done, and of all. ``known`` are instants at which they are identified, with the index [K] of the point of each
-    marker and where the markers are predicted; there the wing is not sought.
+    marker and where the markers are predicted; there the wing is not sought. The clouds are read in order, from the
+    start to the last and back from there to the first.
     """
     known = known or {}
     start = min(known) if known else None
@@ -74,20 +77,20 @@ def follow(
                 state.correct(instant, *known[instant])
             done += 1
             progress(done, len(clouds))
-    return Followed(state.chosen, state.predicted, start, tuple(sorted(state.again)), state.renamed)
+    return Followed(state.chosen, state.detections, state.predicted, start, tuple(sorted(state.again)), state.renamed)
 
 
 def _start(clouds: Sequence[Cloud], reference: Float[Array, "K 3"]) -> tuple[int, tuple[Index, Array] | None]:
     """Return the instant at which most markers are identified, of some that are tried, and the identification there."""
-    sizes = [len(cloud) for cloud in clouds]
     tried = np.unique(np.linspace(0, len(clouds) - 1, min(_STARTS, len(clouds))).astype(int))
+    sizes = {int(instant): len(clouds[instant]) for instant in tried}
     best, most, found = 0, 0, None
-    for instant in sorted(tried, key=lambda one: -min(sizes[one], len(reference))):
+    for instant in sorted(sizes, key=lambda one: -min(sizes[one], len(reference))):
         cloud = clouds[instant]
         chosen, predicted = register(reference, cloud.positions, cloud.points.covariance)
         count = int((chosen >= 0).sum())
         if count > most:
-            best, most, found = int(instant), count, (chosen, predicted)
+            best, most, found = instant, count, (chosen, predicted)
         if count >= 0.95 * len(reference):
             break
     return best, found
@@ -103,6 +106,7 @@ class _State:
         self.spacing = spacing(reference)
         self.least = _NARROWEST * self.spacing
         self.chosen = np.full((len(clouds), count), -1)
+        self.detections = np.full((len(clouds), len(clouds[0].detections), count), -1)
         self.predicted = np.full((len(clouds), count, 3), np.nan)
         self.places = np.full((len(clouds), count, 3), np.nan)
         self.known: list[int] = []
@@ -116,9 +120,10 @@ class _State:
 
     def put(self, instant: int, chosen: Index, smooth: Float[Array, "K 3"]) -> None:
         """Store the markers of one instant; those not found are where the smooth motion places them."""
-        found = chosen >= 0
+        found, cloud = chosen >= 0, self.clouds[instant]
         self.chosen[instant], self.predicted[instant] = chosen, smooth
-        self.places[instant] = np.where(found[:, None], self.clouds[instant].positions[chosen], smooth)
+        self.detections[instant] = np.where(found, cloud.detections[:, chosen], -1)
+        self.places[instant] = np.where(found[:, None], cloud.positions[chosen], smooth)
 
     def correct(self, instant: int, chosen: Index, smooth: Float[Array, "K 3"]) -> None:
         """Replace what was followed to ``instant`` by what is known there; if they differ, go on from that alone."""

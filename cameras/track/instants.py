@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wingfit.cameras.camera import Camera
+from wingfit.cameras.computed import Computed
 from wingfit.cameras.markers.detections import Detections
 from wingfit.cameras.track.cloud import possible_points
 from wingfit.cameras.track.film_detections import FilmDetections
@@ -31,14 +32,14 @@ class Instants:
 
     Attributes:
         times: [T] (s), on the clock of the first camera.
-        seen: of each instant, of each camera.
+        seen: of each instant, of each camera; computed when they are read.
         frames: [T, C], number of the first frame of each camera that shows the instant; -1 if there is none.
         remarks: what was estimated or is doubtful.
         named: of each labelled instant, of each camera: the index of the detection of each labelled marker.
     """
 
     times: Float[Array, " T"]
-    seen: list[tuple[Detections, ...]]
+    seen: Sequence[tuple[Detections, ...]]
     frames: Array
     remarks: tuple[str, ...]
     named: Mapping[int, Named]
@@ -83,11 +84,16 @@ def flash_instants(
     instant_of = [{row[camera]: instant for instant, row in enumerate(rows)} for camera in range(len(cameras))]
     return Instants(
         times=np.array([timed[0].times[row[0]] for row in rows]),
-        seen=[tuple(one.seen[k] for one, k in zip(found, row, strict=True)) for row in rows],
+        seen=Computed(len(rows), lambda instant: _flash(found, rows[instant])),
         frames=np.array([[one.marks[k].frame for one, k in zip(found, row, strict=True)] for row in rows]),
         remarks=tuple(remarks),
         named=named_flashes(labelled, instant_of),
     )
+
+
+def _flash(found: Sequence[FilmDetections], numbers: Sequence[int]) -> tuple[Detections, ...]:
+    """Return the detections of the flashes with these ``numbers``, one of each camera."""
+    return tuple(one.seen[number] for one, number in zip(found, numbers, strict=True))
 
 
 def _clock_remarks(
@@ -170,10 +176,11 @@ def frame_instants(
     instants = common_times(joined, seconds, times[0] + middle)
     if len(instants) < 3:
         raise fail("films", len(instants), "the films of all cameras have fewer than 3 frames in common")
-    seen = [
-        tuple(at_time(one, time + offset, _APART * frame_s) for one, offset in zip(joined, seconds, strict=True))
-        for time in instants
-    ]
+
+    def at_instant(number: int) -> tuple[Detections, ...]:
+        pairs = zip(joined, seconds, strict=True)
+        return tuple(at_time(one, instants[number] + offset, _APART * frame_s) for one, offset in pairs)
+
     frames = np.column_stack(
         [
             np.rint((instants + offset - middle) * of.rate_hz).astype(int)
@@ -184,7 +191,8 @@ def frame_instants(
         Clock(one, at + camera.row_s * camera.size_px[1] / 2, offset, 1 / of.rate_hz, _APART * frame_s)
         for camera, one, at, offset, of in zip(cameras, joined, times, seconds, films, strict=True)
     ]
-    named = named_frames(labelled, found, clocks, instants, within_s)
+    named = named_frames(labelled, clocks, instants, within_s)
+    seen = Computed(len(instants), at_instant)
     return Instants(instants, seen, frames, _offset_remarks(cameras, offsets, within_s), named)
 
 

@@ -167,6 +167,8 @@ def spots(
         DatasetError: there is none within the limit, two labels mean the same, or the frame has no detections.
     """
     numbers = {camera.name: number for number, camera in enumerate(cameras)}
+    if not labels:
+        return []
     frames = [{mark.frame: at for at, mark in enumerate(of.marks)} for of in found]
     result, faults = list[Spot](), Faults()
     taken: dict[tuple[int, int, int], Label] = {}

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wingfit.cameras.track.film_detections import FilmDetections
 from wingfit.cameras.track.labels import Spot
 from wingfit.cameras.track.tracklets import Tracklets, owned_at_time
 from wingfit.records.array_types import Array, Float
@@ -55,7 +54,6 @@ def named_flashes(labelled: Sequence[Spot], instant_of: Sequence[Mapping[int, in
 
 def named_frames(
     labelled: Sequence[Spot],
-    found: Sequence[FilmDetections],
     clocks: Sequence[Clock],
     instants: Float[Array, " T"],
     within_s: float,
@@ -78,8 +76,8 @@ def named_frames(
         for spot in labelled:
             if (spot.camera, spot.at) not in group:
                 continue
-            pixel = found[spot.camera].seen[spot.at].pixels[spot.detection]
-            index = np.flatnonzero(owners[spot.camera] == _owner(clocks[spot.camera], pixel, spot.at))
+            of = clocks[spot.camera].tracklets
+            index = np.flatnonzero(owners[spot.camera] == of.owner[of.starts[spot.at] + spot.detection])
             if len(index):
                 names[spot.camera][spot.label.marker] = int(index[0])
         result[instant] = names
@@ -109,10 +107,3 @@ def _groups(
                 continue
         groups.append({one})
     return groups
-
-
-def _owner(clock: Clock, pixel: Float[Array, 2], at: int) -> int:
-    """Return the number of the tracklet that has the detection at ``pixel`` of frame ``at``."""
-    same = np.flatnonzero((clock.tracklets.seen.pixels == pixel).all(1))
-    nearest = np.abs(clock.tracklets.times[same] - clock.times[at]).argmin()
-    return int(clock.tracklets.owner[same[nearest]])

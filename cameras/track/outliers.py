@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from heapq import heapify, heappop, heappush
+
 import numpy as np
 
 from wingfit.records.array_types import Array, Float, Index, Mask
@@ -36,28 +38,36 @@ class _Places:
 
     def far(self) -> Mask:
         """Return which places are far: the farthest first, as it also displaces the polynomials of its neighbours."""
-        apart, large = self._distances(np.arange(len(self.times)))
+        known = np.flatnonzero(self.known)
+        apart, large = self._distances(known, np.arange(len(self.times)))
         compared = np.isfinite(apart)
         typical = max(float(np.median(apart[compared])) / _MEDIAN, 1.0) if compared.any() else 1.0
+        limit = _DEVIATIONS * typical
         apart = np.where(large, np.nan_to_num(apart), 0.0)
         far = np.zeros(len(apart), dtype=bool)
-        while apart.max(initial=0.0) > _DEVIATIONS * typical:
-            worst = int(apart.argmax())
+        # The farthest first, then the first; what has changed since it was added is passed over.
+        queue = [(-apart[one], int(one)) for one in np.flatnonzero(apart > limit)]
+        heapify(queue)
+        while queue:
+            negative, worst = heappop(queue)
+            if far[worst] or -negative != apart[worst]:
+                continue
             far[worst], self.known[worst] = True, False
-            known = np.flatnonzero(self.known)
             place = int(np.searchsorted(known, worst))
+            known = np.delete(known, place)
             again = np.r_[worst, known[max(place - _NEIGHBOURS, 0) : place + _NEIGHBOURS]]
-            now, still = self._distances(again)
+            now, still = self._distances(known, again)
             apart[again] = np.where(still, np.nan_to_num(now), 0.0)
+            for one in again[apart[again] > limit]:
+                heappush(queue, (-apart[one], int(one)))
         return far
 
-    def _distances(self, instants: Index) -> tuple[Float[Array, " N"], Mask]:
+    def _distances(self, known: Index, instants: Index) -> tuple[Float[Array, " N"], Mask]:
         """Return the distances at ``instants`` from the polynomials, in standard deviations, and which are large.
 
-        NaN where a place is unknown, or has too few neighbours.
+        NaN where a place is unknown, or has too few neighbours among the ``known`` ones.
         """
         apart, large = np.full(len(instants), np.nan), np.zeros(len(instants), dtype=bool)
-        known = np.flatnonzero(self.known)
         for row, instant in enumerate(instants):
             place = int(np.searchsorted(known, instant))
             near = np.r_[known[max(place - _NEIGHBOURS, 0) : place], known[place + 1 : place + 1 + _NEIGHBOURS]]

@@ -6,10 +6,13 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 
 from wingfit.cameras.camera import Camera
+from wingfit.cameras.computed import Computed
+from wingfit.cameras.places import from_calibration, pixel_error, residuals
 from wingfit.cameras.track.cloud import Cloud, possible_points
 from wingfit.cameras.track.film_detections import FilmDetections, FilmTask, Light, MarkerKind, detect_film
 from wingfit.cameras.track.follow import Followed, follow
@@ -20,7 +23,7 @@ from wingfit.cameras.track.outliers import jumps
 from wingfit.cameras.track.reference import LEAST_MARKERS, reference_of
 from wingfit.cameras.track.registration import looks_alike, spacing, surface_of
 from wingfit.cameras.track.result import TrackedFilm
-from wingfit.cameras.triangulation import Points, error_from_cameras, triangulate
+from wingfit.cameras.triangulation import triangulate
 from wingfit.cameras.video.source import Film, Frames
 from wingfit.records.array_types import Array, Float
 from wingfit.records.blas_threads import one_blas_thread
@@ -55,8 +58,8 @@ class Request:
         reference: [K, 3] (m), places of the markers on the wing, in any axes.
         calibration: covariance of the cameras' parameters, if known.
         within_s: the clocks of cameras without strobe may be so far apart; zero if they are synchronised.
-        first, last: frames that are used, of each film.
-        store: folder for what is detected, so that an interrupted run can go on.
+        first, last: frames that are used, of each film; ``last`` is not among them, and None is the end.
+        store: folder for what is detected, so that an interrupted run can go on; None: one that is removed at the end.
         labels: markers that a person named, at one instant or more; there the wing is not sought.
     """
 
@@ -84,18 +87,24 @@ def track(request: Request, report: Report = _silent) -> TrackedFilm:
     """
     films = [film.opened() for film in request.films]
     _check(request, films)
-    found = _detected(request, report)
+    with TemporaryDirectory(prefix="wingfit-") as scratch:
+        return _tracked(request, films, _detected(request, request.store or Path(scratch), report), report)
+
+
+def _tracked(request: Request, films: Sequence[Frames], found: Sequence[FilmDetections], report: Report) -> TrackedFilm:
+    """Track what is ``found`` in each film; what is detected and possible is read instant by instant."""
     report("instants", 0.0)
     named = spots(request.labels, request.cameras, found, request.light)
     if request.light == "strobe":
         instants = flash_instants(request.cameras, films, found, TOLERANCE_PX, named)
     else:
         instants = frame_instants(request.cameras, films, found, TOLERANCE_PX, request.within_s, named)
-    clouds = []
-    for number, seen in enumerate(instants.seen):
-        clouds.append(possible_points(request.cameras, seen, TOLERANCE_PX, (0.0, np.inf)))
-        report("rays", (number + 1) / len(instants.seen))
-    names, reference, starts = _identified(request, instants, clouds)
+    seen = instants.seen
+    clouds = Computed(
+        len(seen), lambda number: possible_points(request.cameras, seen[number], TOLERANCE_PX, (0.0, np.inf))
+    )
+    report("rays", 0.0)
+    names, reference, starts = _identified(request, instants, clouds, report)
     if len(names) * len(clouds) > MOST_PLACES:
         raise fail("films", len(clouds), f"{len(clouds)} instants; track fewer with first_frame and last_frame")
     followed = follow(clouds, reference, surface_of(reference), lambda done, of: report("following", done / of), starts)
@@ -108,15 +117,15 @@ def track(request: Request, report: Report = _silent) -> TrackedFilm:
             f"{most} that two cameras see: check the calibration, the unit of the markers' places, and that all "
             "cameras show the same wing",
         )
-    return _result(request, films, found, instants, clouds, followed, (names, reference))
+    return _result(request, films, found, instants, followed, (names, reference))
 
 
-def _detected(request: Request, report: Report) -> list[FilmDetections]:
-    """Detect the markers in all films at once, a thread for each."""
+def _detected(request: Request, store: Path, report: Report) -> list[FilmDetections]:
+    """Detect the markers in all films at once, a thread for each; what is detected is in files in ``store``."""
     parts = [0.0] * len(request.films)
 
     def one(number: int) -> FilmDetections:
-        task = FilmTask(request.films[number], request.kind, request.light, request.first, request.last, request.store)
+        task = FilmTask(request.films[number], request.kind, request.light, store, request.first, request.last)
 
         def progress(done: int, of: int) -> None:
             parts[number] = min(done / max(of, 1), 1.0)
@@ -138,14 +147,17 @@ def _detected(request: Request, report: Report) -> list[FilmDetections]:
     return found
 
 
-def _identified(request: Request, instants: Instants, clouds: Sequence[Cloud]) -> tuple[Names, Places, Starts]:
+def _identified(
+    request: Request, instants: Instants, clouds: Sequence[Cloud], report: Report
+) -> tuple[Names, Places, Starts]:
     """Return names and places of the markers, and what they are at labelled instants.
 
     The places are the described ones, those of a labelled instant, or those of the instant that shows most of them.
     """
     if not request.labels:
-        names, places = reference_of(clouds) if request.reference is None else (request.names, request.reference)
-        return names, places, {}
+        if request.reference is not None:
+            return request.names, request.reference, {}
+        return *reference_of(clouds, lambda done, of: report("rays", done / of)), {}
     labelled = Labelled(request.cameras, instants, clouds)
     points = labelled.points()
     if request.reference is None:
@@ -175,33 +187,33 @@ def _result(
     films: Sequence[Frames],
     found: Sequence[FilmDetections],
     instants: Instants,
-    clouds: Sequence[Cloud],
     followed: Followed,
-    markers: tuple[tuple[str, ...], Float[Array, "K 3"]],
+    markers: tuple[Names, Places],
 ) -> TrackedFilm:
-    pixels, covariance = _observed(len(request.cameras), instants, clouds, followed)
-    error = _pixel_error(request.cameras, pixels, covariance)
-    covariance = covariance + error**2 * np.eye(2)
-    points = triangulate(request.cameras, *_flat(pixels, covariance))
-    shape = followed.chosen.shape
+    cameras, shape = request.cameras, followed.chosen.shape
+    pixels, covariance = _observed(instants, followed)
+    error = pixel_error(cameras, pixels, covariance)
+    covariance += error**2 * np.eye(2)
+    points = triangulate(cameras, pixels, covariance)
+    by_calibration = None
+    if request.calibration is not None:
+        by_calibration = from_calibration(cameras, points, pixels, covariance, request.calibration, shape[1])
     wrong = points.misfit > _UNLIKELY + 2.5 * (points.freedom - 1)
-    places = np.where(wrong[:, None], np.nan, points.positions).reshape(*shape, 3)
-    spread = points.covariance.reshape(*shape, 3, 3).copy()
+    points.positions[wrong] = np.nan
+    places, spread = points.positions.reshape(*shape, 3), points.covariance.reshape(*shape, 3, 3)
     jumped = jumps(instants.times, places, spread, _JUMP * spacing(markers[1]))
     places[jumped] = np.nan
     spread[~np.isfinite(places).all(2)] = np.nan
-    projected = np.stack(
-        [camera.project(places.reshape(-1, 3)).reshape(*shape, 2) for camera in request.cameras], axis=1
-    )
+    left = residuals(cameras, pixels, points.positions)
     return TrackedFilm(
         names=markers[0],
         times=instants.times,
         positions=places,
         covariance=spread,
-        by_calibration=_by_calibration(request, points, pixels, covariance),
-        pixels=pixels,
-        residuals=pixels - projected,
-        cameras=tuple(camera.name for camera in request.cameras),
+        by_calibration=by_calibration,
+        pixels=np.moveaxis(pixels.reshape(-1, *shape, 2), 0, 1),
+        residuals=np.moveaxis(left.reshape(-1, *shape, 2), 0, 1),
+        cameras=tuple(camera.name for camera in cameras),
         frames=instants.frames,
         pixel_error=error,
         rejected=wrong.reshape(shape).sum(0) + jumped.sum(0),
@@ -214,57 +226,19 @@ def _result(
     )
 
 
-def _observed(
-    cameras: int, instants: Instants, clouds: Sequence[Cloud], followed: Followed
-) -> tuple[Float[Array, "T C K 2"], Float[Array, "T C K 2 2"]]:
-    """Return the pixels of each marker in each camera, and their covariances."""
-    count, markers = followed.chosen.shape
-    pixels = np.full((count, cameras, markers, 2), np.nan)
-    covariance = np.tile(np.eye(2), (count, cameras, markers, 1, 1))
-    for instant, (cloud, seen) in enumerate(zip(clouds, instants.seen, strict=True)):
-        rows = np.flatnonzero(followed.chosen[instant] >= 0)
+def _observed(instants: Instants, followed: Followed) -> tuple[Float[Array, "C N 2"], Float[Array, "C N 2 2"]]:
+    """Return the pixels of each marker in each camera at each instant, and their covariances."""
+    count, cameras, markers = followed.detections.shape
+    pixels = np.full((cameras, count, markers, 2), np.nan)
+    covariance = np.empty((cameras, count, markers, 2, 2))
+    covariance[:] = np.eye(2)
+    for instant, seen in enumerate(instants.seen):
         for camera, one in enumerate(seen):
-            index = cloud.detections[camera, followed.chosen[instant, rows]]
+            index = followed.detections[instant, camera]
             have = index >= 0
-            pixels[instant, camera, rows[have]] = one.pixels[index[have]]
-            covariance[instant, camera, rows[have]] = one.covariance[index[have]]
-    return pixels, covariance
-
-
-def _flat(pixels: Array, covariance: Array) -> tuple[Float[Array, "C N 2"], Float[Array, "C N 2 2"]]:
-    cameras = pixels.shape[1]
-    return np.moveaxis(pixels, 1, 0).reshape(cameras, -1, 2), np.moveaxis(covariance, 1, 0).reshape(cameras, -1, 2, 2)
-
-
-def _pixel_error(cameras: Sequence[Camera], pixels: Array, covariance: Array) -> float:
-    """Return the error of each pixel, beside that of its detection, for which half of the misfits are as expected.
-
-    It holds what neighbouring pixels do not show: compression, uneven light, an imperfect calibration.
-    """
-    at, spread = _flat(pixels, covariance)
-    known = np.flatnonzero(np.isfinite(at).all(2).sum(0) >= 2)
-    used = known[np.unique(np.linspace(0, len(known) - 1, 4000).astype(int))]
-    low, high = 0.0, 3.0
-    for _ in range(14):
-        middle = (low + high) / 2
-        points = triangulate(cameras, at[:, used], spread[:, used] + middle**2 * np.eye(2))
-        expected = points.freedom * (1 - 2 / (9 * points.freedom)) ** 3
-        low, high = (middle, high) if np.median(points.misfit / expected) > 1 else (low, middle)
-    return (low + high) / 2
-
-
-def _by_calibration(request: Request, points: Points, pixels: Array, covariance: Array) -> Float[Array, "K 3 3"] | None:
-    if request.calibration is None:
-        return None
-    at, spread = _flat(pixels, covariance)
-    known = np.asarray(np.isfinite(points.positions).all(1))
-    places = Points(
-        points.positions, np.where(known[:, None, None], points.covariance, 0.0), points.misfit, points.freedom
-    )
-    changes = error_from_cameras(request.cameras, places, at, spread, request.calibration)
-    each = np.einsum("nip,pq,njq->nij", changes, request.calibration, changes, optimize=True)
-    each[~known] = np.nan
-    return np.asarray(np.nanmean(each.reshape(pixels.shape[0], -1, 3, 3), axis=0))
+            pixels[camera, instant, have] = one.pixels[index[have]]
+            covariance[camera, instant, have] = one.covariance[index[have]]
+    return pixels.reshape(cameras, -1, 2), covariance.reshape(cameras, -1, 2, 2)
 
 
 def _label_remarks(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -14,13 +14,22 @@ from wingfit.records.errors import fail
 LEAST_MARKERS = 6
 
 
-def reference_of(clouds: Sequence[Cloud]) -> tuple[tuple[str, ...], Float[Array, "K 3"]]:
+def reference_of(
+    clouds: Sequence[Cloud], progress: Callable[[int, int], object]
+) -> tuple[tuple[str, ...], Float[Array, "K 3"]]:
     """Return names t01, t02, ... and places (m) of the markers, at the instant that shows most of them.
+
+    ``progress`` is called with the count of clouds that were looked at, and of all.
 
     Raises:
         DatasetError: at no instant are there enough.
     """
-    best = max(clouds, key=lambda cloud: len(single_points(cloud)))
+    best, most = clouds[0], -1
+    for number, cloud in enumerate(clouds):
+        count = len(single_points(cloud))
+        if count > most:
+            best, most = cloud, count
+        progress(number + 1, len(clouds))
     places = best.positions[_on_surface(best, single_points(best))]
     if len(places) < LEAST_MARKERS:
         raise fail(

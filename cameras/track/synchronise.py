@@ -71,6 +71,6 @@ def common_times(
     """Return those ``times`` (s, the first camera's clock) within the films of all cameras."""
     keep = np.ones(len(times), dtype=bool)
     for one, offset in zip(tracklets, offsets, strict=True):
-        if len(one.times):
-            keep &= (times + offset >= one.times.min()) & (times + offset <= one.times.max())
+        if len(one.owner):
+            keep &= (times + offset >= one.period[0]) & (times + offset <= one.period[1])
     return np.asarray(times[keep])

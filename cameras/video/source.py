@@ -5,18 +5,22 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from wingfit.cameras.opencv import opencv
+from wingfit.cameras.video.frame_index import FrameIndex, read_index
 from wingfit.records.array_types import Array
 from wingfit.records.errors import fail
 
 IMAGES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".pgm")
 VIDEOS = (".mp4", ".m4v", ".mov", ".avi", ".mkv", ".webm", ".mts", ".wmv")
 MOST_PIXELS = 64_000_000
+NEAR = 100
+"""Frames that are decoded and passed over, rather than sought."""
 _FASTEST_HZ = 1_000_000.0
 
 
@@ -67,7 +71,10 @@ class Frames:
     ended: int | None = None
 
     def read(self, first: int = 0) -> Iterator[tuple[int, Array | None]]:
-        """Return frames with their numbers, from number ``first``; None is a frame that cannot be decoded."""
+        """Return frames with their numbers, from number ``first``; None is a frame that cannot be decoded.
+
+        A late frame is sought by the index of the container, if that is sure to be the same as counting.
+        """
         raise NotImplementedError
 
     def _check(self) -> None:
@@ -130,9 +137,8 @@ class _VideoFrames(Frames):
         return video
 
     def read(self, first: int = 0) -> Iterator[tuple[int, Array | None]]:
-        video, number = self._open(), 0
+        video, number = self._at(first)
         try:
-            # Containers seek to key frames only, so earlier frames are decoded and skipped.
             while video.grab():
                 if number >= first:
                     readable, image = video.retrieve()
@@ -141,6 +147,21 @@ class _VideoFrames(Frames):
             self.ended = number
         finally:
             video.release()
+
+    @cached_property
+    def _index(self) -> FrameIndex | None:
+        """Return where the frames are; None if that is not sure."""
+        return read_index(self._open, self.count)
+
+    def _at(self, first: int) -> tuple[Any, int]:
+        """Return the video and the number of the frame that it decodes next: ``first``, or one before it."""
+        if first >= NEAR and self._index is not None:
+            video, number = self._open(), min(first, len(self._index.times) - 1)
+            if self._index.seek(video, number):
+                return video, number
+            video.release()
+        # Earlier frames are decoded and passed over.
+        return self._open(), 0
 
 
 def _grey(image: Array | None) -> Array | None:

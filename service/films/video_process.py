@@ -19,7 +19,7 @@ from typing import Any
 
 from wingfit.cameras.opencv import opencv
 from wingfit.cameras.track.film_detections import detect_frame
-from wingfit.cameras.video.source import Film, Frames
+from wingfit.cameras.video.source import NEAR, Film, Frames
 from wingfit.records.array_types import Array
 from wingfit.records.errors import DatasetError, fail
 from wingfit.records.limits import MIB
@@ -33,27 +33,25 @@ Answer = tuple[dict[str, Any], bytes]
 
 
 class _Video:
-    """The frames of one video, read forwards."""
+    """The frames of one video, read forwards; a frame that is far away is sought."""
 
     def __init__(self, path: Path, rate_hz: float | None) -> None:
         self.frames: Frames = Film(path, rate_hz).opened()
-        self._reading: Iterator[tuple[int, Array | None]] = iter(())
-        self._last: tuple[int, Array | None] = (-1, None)
-        self._rewind()
+        self._read_from(0)
 
-    def _rewind(self) -> None:
-        self._reading, self._last = self.frames.read(), (-1, None)
+    def _read_from(self, number: int) -> None:
+        self._reading: Iterator[tuple[int, Array | None]] = self.frames.read(number)
+        self._last: tuple[int, Array | None] = (-1, None)
 
     def frame(self, number: int) -> Array:
         """Return frame ``number``; DatasetError if it cannot be decoded, IndexError if the video is shorter."""
-        if number < self._last[0]:
-            self._rewind()
+        if not self._last[0] <= number <= self._last[0] + NEAR:
+            self._read_from(number)
         while self._last[0] < number:
             found = next(self._reading, None)
             if found is None:
-                count = self._last[0] + 1
-                self._rewind()
-                raise IndexError(count)
+                self._read_from(0)
+                raise IndexError(self.frames.ended)
             self._last = found
         image = self._last[1]
         if image is None:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from tests.cameras.markers.drawing import disc, drawn, noisy
-from wingfit.cameras.track import film_detections
+from wingfit.cameras.markers import stored
 from wingfit.cameras.track.film_detections import FilmDetections, FilmTask, detect_film
 from wingfit.cameras.video.source import Film
 from wingfit.records.errors import DatasetError
@@ -24,7 +24,7 @@ class StoppedError(Exception):
 
 @pytest.fixture(autouse=True)
 def short_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(film_detections, "_CHUNK", 5)
+    monkeypatch.setattr(stored, "BLOCK", 5)
 
 
 @pytest.fixture(scope="module")
@@ -62,7 +62,7 @@ def silent(done: int, of: int) -> None:
 
 
 def assert_same(one: FilmDetections, two: FilmDetections) -> None:
-    assert one.marks == two.marks
+    assert list(one.marks) == list(two.marks)
     assert one.bad_frames == two.bad_frames
     assert len(one.seen) == len(two.seen)
     for left, right in zip(one.seen, two.seen, strict=True):
@@ -86,24 +86,23 @@ def interrupted(task: FilmTask, after: int) -> None:
         detect_film(task, stop)
 
 
-def test_all_frames_are_detected(steady: Path) -> None:
-    found = detect_film(FilmTask(Film(steady, 100.0), "dot", "continuous"), silent)
+def test_all_frames_are_detected(steady: Path, tmp_path: Path) -> None:
+    found = detect_film(FilmTask(Film(steady, 100.0), "dot", "continuous", tmp_path), silent)
     assert [mark.frame for mark in found.marks] == [number for number in range(FRAMES) if number not in TORN]
     assert found.bad_frames == TORN
     assert {len(seen) for seen in found.seen} == {2}
-    part = detect_film(FilmTask(Film(steady, 100.0), "dot", "continuous", 5, 12), silent)
+    part = detect_film(FilmTask(Film(steady, 100.0), "dot", "continuous", tmp_path, 5, 12), silent)
     assert [mark.frame for mark in part.marks] == list(range(5, 12))
     assert part.bad_frames == ()
 
 
 @pytest.mark.parametrize("after", [3, 14])
 def test_a_run_that_was_interrupted_goes_on(steady: Path, tmp_path: Path, after: int) -> None:
-    task = FilmTask(Film(steady, 100.0), "dot", "continuous")
-    stored = replace(task, store=tmp_path)
+    stored = FilmTask(Film(steady, 100.0), "dot", "continuous", tmp_path / "interrupted")
     interrupted(stored, after)
     frames: list[int] = []
     again = detect_film(stored, lambda done, _of: frames.append(done))
-    whole = detect_film(task, silent)
+    whole = detect_film(replace(stored, store=tmp_path), silent)
     assert_same(again, whole)
     # Whole chunks are not detected again.
     assert len(frames) == len(whole.seen) - after // 5 * 5
@@ -112,17 +111,17 @@ def test_a_run_that_was_interrupted_goes_on(steady: Path, tmp_path: Path, after:
 
 @pytest.mark.parametrize("after", [4, 7])
 def test_a_strobe_goes_on_after_its_last_flash(flashed: Path, tmp_path: Path, after: int) -> None:
-    task = FilmTask(Film(flashed, 60.0), "dot", "strobe")
+    task = FilmTask(Film(flashed, 60.0), "dot", "strobe", tmp_path)
     whole = detect_film(task, silent)
     assert [mark.frame for mark in whole.marks] == list(range(1, 48, 4))
     assert {len(seen) for seen in whole.seen} == {2}
-    stored = replace(task, store=tmp_path)
+    stored = replace(task, store=tmp_path / "interrupted")
     interrupted(stored, after)
     assert_same(detect_film(stored, silent), whole)
 
 
 def test_another_task_has_another_store(steady: Path, tmp_path: Path) -> None:
-    task = FilmTask(Film(steady, 100.0), "dot", "continuous", store=tmp_path)
+    task = FilmTask(Film(steady, 100.0), "dot", "continuous", tmp_path)
     others = [
         replace(task, film=Film(steady, 50.0)),
         replace(task, kind="chequer"),
@@ -135,7 +134,7 @@ def test_another_task_has_another_store(steady: Path, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("damage", ["torn", "empty", "text", "other"])
 def test_a_damaged_store_is_refused(steady: Path, tmp_path: Path, damage: str) -> None:
-    task = FilmTask(Film(steady, 100.0), "dot", "continuous", store=tmp_path)
+    task = FilmTask(Film(steady, 100.0), "dot", "continuous", tmp_path)
     detect_film(task, silent)
     chunk = tmp_path / task.key / "000001.npz"
     raw = chunk.read_bytes()
@@ -152,7 +151,7 @@ def test_an_image_that_is_replaced_makes_another_film(tmp_path: Path) -> None:
     folder.mkdir()
     for number in range(3):
         (folder / f"{number}.png").write_bytes(b"an image")
-    task = FilmTask(Film(folder, 100.0), "dot", "continuous")
+    task = FilmTask(Film(folder, 100.0), "dot", "continuous", tmp_path)
     before = task.key
     (folder / "1.png").write_bytes(b"another image")
     assert task.key != before
@@ -173,7 +172,7 @@ def cut_video(folder: Path, share: float) -> Path:
 
 
 def test_a_video_that_ends_early_says_where(tmp_path: Path) -> None:
-    task = FilmTask(Film(cut_video(tmp_path, 0.7)), "dot", "continuous", store=tmp_path / "store")
+    task = FilmTask(Film(cut_video(tmp_path, 0.7)), "dot", "continuous", tmp_path / "store")
     found = detect_film(task, silent)
     assert found.ended == len(found.seen)
     assert 24 <= found.ended <= 29
@@ -183,12 +182,12 @@ def test_a_video_that_ends_early_says_where(tmp_path: Path) -> None:
     assert detect_film(task, silent).ended == found.ended
     # Frames beyond the end were not wanted.
     assert detect_film(replace(task, last=found.ended), silent).ended is None
-    assert detect_film(replace(task, store=None, last=found.ended + 2), silent).ended is None
-    assert detect_film(replace(task, store=None, last=found.ended + 10), silent).ended == found.ended
+    assert detect_film(replace(task, last=found.ended + 2), silent).ended is None
+    assert detect_film(replace(task, last=found.ended + 10), silent).ended == found.ended
 
 
 def test_a_video_of_which_less_than_half_is_read_is_refused(tmp_path: Path) -> None:
-    task = FilmTask(Film(cut_video(tmp_path, 0.4)), "dot", "continuous", store=tmp_path / "store")
+    task = FilmTask(Film(cut_video(tmp_path, 0.4)), "dot", "continuous", tmp_path / "store")
     frames = sum(1 for _ in task.film.opened().read())
     assert 5 < frames < 20
     words = f"ends at frame {frames}, of 40 that the container states: .*Copy it again, or state last_frame: {frames}$"
@@ -199,5 +198,5 @@ def test_a_video_of_which_less_than_half_is_read_is_refused(tmp_path: Path) -> N
 
 
 def test_a_whole_video_and_images_end_where_they_say(steady: Path, tmp_path: Path) -> None:
-    assert detect_film(FilmTask(Film(cut_video(tmp_path, 1.0)), "dot", "continuous"), silent).ended is None
-    assert detect_film(FilmTask(Film(steady, 100.0), "dot", "continuous"), silent).ended is None
+    assert detect_film(FilmTask(Film(cut_video(tmp_path, 1.0)), "dot", "continuous", tmp_path), silent).ended is None
+    assert detect_film(FilmTask(Film(steady, 100.0), "dot", "continuous", tmp_path), silent).ended is None

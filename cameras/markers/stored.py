@@ -1,0 +1,140 @@
+"""What is detected in one film, in files: blocks of instants, of which a few are in memory at a time.
+
+A block is written as a whole, so that a run that is interrupted leaves whole blocks only.
+"""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Iterable
+from pathlib import Path
+from zipfile import BadZipFile
+
+import numpy as np
+
+from wingfit.cameras.computed import Computed
+from wingfit.cameras.markers.detections import Detections, joined
+from wingfit.cameras.video.strobe import FlashMark
+from wingfit.records.array_types import Array
+from wingfit.records.errors import fail
+
+BLOCK = 50  # instants
+_COMPLETE = "complete"
+_BLOCKS_KEPT = 4
+_NAMES = ("pixels", "covariance", "size_px", "contrast")
+
+
+class DetectionStore:
+    """The detections of one film in ``folder``, which is made.
+
+    Attributes:
+        bad_frames: numbers of frames that could not be decoded, or whose size differs.
+
+    Raises:
+        DatasetError: what an earlier run left in the folder cannot be read.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        folder.mkdir(parents=True, exist_ok=True)
+        self._counts: list[int] = []  # instants of each block
+        self._marks: list[Array] = []
+        self._fresh: list[tuple[FlashMark, Detections]] = []
+        self.bad_frames: list[int] = []
+        while self._file(len(self._counts)).exists():
+            of = self._arrays(len(self._counts), ("marks", "bad", "counts"))
+            self._remember(of["marks"], of["bad"])
+        self._bad_kept = len(self.bad_frames)
+
+    @property
+    def complete(self) -> bool:
+        """Return whether the film was read to its end."""
+        return (self._folder / _COMPLETE).exists()
+
+    @property
+    def ended(self) -> int | None:
+        """Return what ``finish`` was given, of a film that is complete."""
+        stated = (self._folder / _COMPLETE).read_text()
+        return int(stated) if stated else None
+
+    def last(self) -> FlashMark | None:
+        """Return where the last instant is that an earlier run wrote; None if there is none."""
+        return _mark(self._marks[-1][-1]) if self._marks and len(self._marks[-1]) else None
+
+    def add(self, mark: FlashMark, seen: Detections, bad: Iterable[int]) -> None:
+        """Add the next instant, and the numbers of the ``bad`` frames before it."""
+        self._fresh.append((mark, seen))
+        self.bad_frames.extend(bad)
+        if len(self._fresh) == BLOCK:
+            self._write()
+
+    def finish(self, bad: Iterable[int], ended: int | None) -> None:
+        """Write what is left; ``ended`` is the frame at which the film ends, if its container states more."""
+        self.bad_frames.extend(bad)
+        self._write()
+        (self._folder / _COMPLETE).write_text("" if ended is None else str(ended))
+
+    def marks(self) -> Computed[FlashMark]:
+        """Return where the instants are."""
+        rows = np.concatenate([np.empty((0, 4)), *self._marks])
+        return Computed(len(rows), lambda number: _mark(rows[number]))
+
+    def seen(self) -> Computed[Detections]:
+        """Return the detections of each instant, which are read from the files."""
+        blocks = Computed(len(self._counts), self._block, _BLOCKS_KEPT)
+        ends = np.cumsum(self._counts, dtype=int)
+
+        def one(number: int) -> Detections:
+            block = int(np.searchsorted(ends, number, side="right"))
+            return blocks[block][number - int(ends[block])]
+
+        return Computed(int(ends[-1]) if len(ends) else 0, one)
+
+    def _file(self, number: int) -> Path:
+        return self._folder / f"{number:06d}.npz"
+
+    def _remember(self, marks: Array, bad: Array) -> None:
+        self._counts.append(len(marks))
+        self._marks.append(marks)
+        self.bad_frames.extend(int(number) for number in bad)
+
+    def _write(self) -> None:
+        file = self._file(len(self._counts))
+        part = file.with_suffix(".part")
+        whole = joined([seen for _, seen in self._fresh])
+        marks = np.array([(one.frame, one.split, *one.between) for one, _ in self._fresh]).reshape(-1, 4)
+        bad = np.array(self.bad_frames[self._bad_kept :], dtype=int)
+        with part.open("wb") as to:
+            np.savez_compressed(
+                to,
+                allow_pickle=False,
+                counts=np.array([len(seen) for _, seen in self._fresh], dtype=int),
+                marks=marks,
+                bad=bad,
+                **{name: getattr(whole, name) for name in _NAMES},
+            )
+        part.replace(file)
+        self._counts.append(len(marks))
+        self._marks.append(marks)
+        self._fresh, self._bad_kept = [], len(self.bad_frames)
+
+    def _block(self, number: int) -> list[Detections]:
+        """Return the detections of the instants of one block."""
+        of = self._arrays(number, ("counts", *_NAMES))
+        ends = np.cumsum(of["counts"])
+        return [
+            Detections(*(of[name][start:end] for name in _NAMES))
+            for start, end in zip(ends - of["counts"], ends, strict=True)
+        ]
+
+    def _arrays(self, number: int, names: Iterable[str]) -> dict[str, Array]:
+        file = self._file(number)
+        try:
+            with np.load(file) as of:
+                return {name: of[name] for name in names}
+        except (OSError, EOFError, ValueError, KeyError, IndexError, BadZipFile, zlib.error) as error:
+            raise fail(str(file), None, f"cannot be read ({error}); remove the folder, it is made anew") from None
+
+
+def _mark(row: Array) -> FlashMark:
+    return FlashMark(int(row[0]), float(row[1]), (float(row[2]), float(row[3])))
