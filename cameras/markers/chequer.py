@@ -36,7 +36,8 @@ def detect_chequers(image: Array, dark: float, noise: float) -> Detections:
     if not len(starts):
         return no_detections()
     fit, places, whole = _fit(image, starts, angles, reach)
-    found = Detections(places, fit.covariance + _FLOOR_PX**2 * np.eye(2), reach, 2 * np.abs(fit.contrast))
+    covariance = fit.covariance + _FLOOR_PX**2 * np.eye(2)
+    found = Detections(places, covariance, reach, 2 * np.abs(fit.contrast), _bright_diagonal(fit))
     moved = np.linalg.norm(places - starts, axis=1)
     good = (fit.explained > _EXPLAINED) & (found.contrast > _NOISES * noise) & (moved < 0.6 * reach)
     good &= np.isfinite(found.covariance).all((1, 2)) & (_variance(found) < 1.0) & _crossing(fit) & whole
@@ -163,6 +164,12 @@ def _shape(parameters: Float[Array, "N 6"], at: Float[Array, "Q 2"]) -> tuple[Ar
 def _crossing(fit: PatchFit) -> Mask:
     """Whether the edges of a fit cross at 15 degrees or more, so that the saddle is a point."""
     return np.asarray(np.abs(np.sin(fit.parameters[:, 2] - fit.parameters[:, 3])) > np.sin(np.radians(15)))
+
+
+def _bright_diagonal(fit: PatchFit) -> Float[Array, " N"]:
+    """Return the directions (rad) along which the bright squares lie: half-way between the edges, or across that."""
+    middle = fit.parameters[:, 2:4].mean(axis=1)
+    return np.asarray(np.where(fit.contrast < 0, middle, middle + np.pi / 2))
 
 
 def _variance(found: Detections) -> Float[Array, " N"]:

@@ -9,6 +9,8 @@ import numpy as np
 
 from wingfit.records.array_types import Array, Float, Index, Mask
 
+FIELDS = ("pixels", "covariance", "size_px", "contrast", "diagonal")
+
 
 @dataclass(frozen=True, eq=False)
 class Detections:
@@ -19,29 +21,30 @@ class Detections:
         covariance: [N, 2, 2] (pixels squared), of the noise of the image and of what the pattern does not follow.
         size_px: [N], smallest distance from the centre to the edge of the marker.
         contrast: [N], brightness of the marker above that of its surroundings.
+        diagonal: [N], direction (rad) along which the bright squares of a chequer lie, from x to y; NaN for a dot.
     """
 
     pixels: Float[Array, "N 2"]
     covariance: Float[Array, "N 2 2"]
     size_px: Float[Array, " N"]
     contrast: Float[Array, " N"]
+    diagonal: Float[Array, " N"]
 
     def __len__(self) -> int:
         return len(self.pixels)
 
     def only(self, keep: Mask | Index) -> Detections:
         """Return the detections in ``keep`` [N], a mask or indices."""
-        return Detections(self.pixels[keep], self.covariance[keep], self.size_px[keep], self.contrast[keep])
+        return Detections(*(getattr(self, name)[keep] for name in FIELDS))
 
 
 def no_detections() -> Detections:
     """Return an image in which nothing is detected."""
-    return Detections(np.empty((0, 2)), np.empty((0, 2, 2)), np.empty(0), np.empty(0))
+    return Detections(np.empty((0, 2)), np.empty((0, 2, 2)), *(np.empty(0) for _ in FIELDS[2:]))
 
 
 def joined(parts: Sequence[Detections]) -> Detections:
     """Return the detections of all ``parts``, one after the other."""
     if not parts:
         return no_detections()
-    names = ("pixels", "covariance", "size_px", "contrast")
-    return Detections(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
+    return Detections(*(np.concatenate([getattr(part, name) for part in parts]) for name in FIELDS))

@@ -13,7 +13,7 @@ from zipfile import BadZipFile
 import numpy as np
 
 from wingfit.cameras.computed import Computed
-from wingfit.cameras.markers.detections import Detections, joined
+from wingfit.cameras.markers.detections import FIELDS, Detections, joined
 from wingfit.cameras.video.strobe import FlashMark
 from wingfit.records.array_types import Array
 from wingfit.records.errors import fail
@@ -21,7 +21,6 @@ from wingfit.records.errors import fail
 BLOCK = 50  # instants
 _COMPLETE = "complete"
 _BLOCKS_KEPT = 4
-_NAMES = ("pixels", "covariance", "size_px", "contrast")
 
 
 class DetectionStore:
@@ -69,7 +68,7 @@ class DetectionStore:
             self._write()
 
     def finish(self, bad: Iterable[int], ended: int | None) -> None:
-        """Write what is left; ``ended`` is the frame at which the film ends, if its container states more."""
+        """Write the rest; ``ended`` is the frame at which the film ends, if its container states more."""
         self.bad_frames.extend(bad)
         self._write()
         (self._folder / _COMPLETE).write_text("" if ended is None else str(ended))
@@ -111,7 +110,7 @@ class DetectionStore:
                 counts=np.array([len(seen) for _, seen in self._fresh], dtype=int),
                 marks=marks,
                 bad=bad,
-                **{name: getattr(whole, name) for name in _NAMES},
+                **{name: getattr(whole, name) for name in FIELDS},
             )
         part.replace(file)
         self._counts.append(len(marks))
@@ -120,10 +119,10 @@ class DetectionStore:
 
     def _block(self, number: int) -> list[Detections]:
         """Return the detections of the instants of one block."""
-        of = self._arrays(number, ("counts", *_NAMES))
+        of = self._arrays(number, ("counts", *FIELDS))
         ends = np.cumsum(of["counts"])
         return [
-            Detections(*(of[name][start:end] for name in _NAMES))
+            Detections(*(of[name][start:end] for name in FIELDS))
             for start, end in zip(ends - of["counts"], ends, strict=True)
         ]
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from wingfit.cameras.camera import Camera
 from wingfit.cameras.computed import Computed
+from wingfit.cameras.markers.orientation import between_markers
 from wingfit.cameras.places import from_calibration, pixel_error, residuals
 from wingfit.cameras.track.cloud import Cloud, possible_points
 from wingfit.cameras.track.film_detections import FilmDetections, FilmTask, Light, MarkerKind, detect_film
@@ -191,7 +192,9 @@ def _result(
     markers: tuple[Names, Places],
 ) -> TrackedFilm:
     cameras, shape = request.cameras, followed.chosen.shape
-    pixels, covariance = _observed(instants, followed)
+    pixels, covariance, diagonals = _observed(instants, followed)
+    gaps = between_markers(cameras, surface_of(markers[1]).plane, followed.predicted, diagonals)
+    pixels[:, gaps.ravel()] = np.nan
     error = pixel_error(cameras, pixels, covariance)
     covariance += error**2 * np.eye(2)
     points = triangulate(cameras, pixels, covariance)
@@ -216,7 +219,7 @@ def _result(
         cameras=tuple(camera.name for camera in cameras),
         frames=instants.frames,
         pixel_error=error,
-        rejected=wrong.reshape(shape).sum(0) + jumped.sum(0),
+        rejected=gaps.sum(0) + wrong.reshape(shape).sum(0) + jumped.sum(0),
         bad_frames=tuple(of.bad_frames for of in found),
         remarks=(
             *instants.remarks,
@@ -226,19 +229,23 @@ def _result(
     )
 
 
-def _observed(instants: Instants, followed: Followed) -> tuple[Float[Array, "C N 2"], Float[Array, "C N 2 2"]]:
-    """Return the pixels of each marker in each camera at each instant, and their covariances."""
+def _observed(
+    instants: Instants, followed: Followed
+) -> tuple[Float[Array, "C N 2"], Float[Array, "C N 2 2"], Float[Array, "C T K"]]:
+    """Return the pixels of each marker in each camera at each instant, their covariances, and the bright diagonals."""
     count, cameras, markers = followed.detections.shape
     pixels = np.full((cameras, count, markers, 2), np.nan)
     covariance = np.empty((cameras, count, markers, 2, 2))
     covariance[:] = np.eye(2)
+    diagonals = np.full((cameras, count, markers), np.nan)
     for instant, seen in enumerate(instants.seen):
         for camera, one in enumerate(seen):
             index = followed.detections[instant, camera]
             have = index >= 0
             pixels[camera, instant, have] = one.pixels[index[have]]
             covariance[camera, instant, have] = one.covariance[index[have]]
-    return pixels.reshape(cameras, -1, 2), covariance.reshape(cameras, -1, 2, 2)
+            diagonals[camera, instant, have] = one.diagonal[index[have]]
+    return pixels.reshape(cameras, -1, 2), covariance.reshape(cameras, -1, 2, 2), diagonals
 
 
 def _label_remarks(

@@ -28,7 +28,8 @@ class TrackedFilm:
         cameras: names.
         frames: [T, C], frame of each camera that shows the instant.
         pixel_error: standard deviation (pixels) beside that of each detection, for which the misfits are as expected.
-        rejected: [K], count of places left out because rays do not meet, or because the marker jumps.
+        rejected: [K], count of places left out: rays do not meet, the marker jumps, or a gap between two chequers was
+            taken for it.
         bad_frames: numbers of the frames that could not be decoded, of each camera.
         remarks: what was estimated or is doubtful.
     """

@@ -143,7 +143,8 @@ def owned_at_time(tracklets: Tracklets, time: float, longest: float) -> tuple[De
     covariance = np.einsum("nk,nkij->nij", weights**2, seen.covariance[index])
     covariance += ((0.1 * np.linalg.norm(pixels - straight, axis=1)) ** 2)[:, None, None] * np.eye(2)
     nearest = before + (share > 0.5)
-    between = Detections(pixels, covariance, seen.size_px[nearest], seen.contrast[nearest])
+    own = seen.only(nearest)
+    between = Detections(pixels, covariance, own.size_px, own.contrast, own.diagonal)
     return joined((between, alone)), np.concatenate([owner[before], owner[exact]])
 
 

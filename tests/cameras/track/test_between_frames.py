@@ -19,7 +19,13 @@ DOTS = 40.0 * np.column_stack([np.arange(12) % 4, np.arange(12) // 4])
 
 def detections(pixels: Array, sigma: float = SIGMA) -> Detections:
     count = len(pixels)
-    return Detections(pixels, np.tile(sigma**2 * np.eye(2), (count, 1, 1)), np.full(count, 5.0), np.full(count, 100.0))
+    return Detections(
+        pixels,
+        np.tile(sigma**2 * np.eye(2), (count, 1, 1)),
+        np.full(count, 5.0),
+        np.full(count, 100.0),
+        np.full(count, np.nan),
+    )
 
 
 def track(time: Array | float) -> Array:
