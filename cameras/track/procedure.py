@@ -105,8 +105,11 @@ def _tracked(request: Request, films: Sequence[Frames], found: Sequence[FilmDete
     )
     report("rays", 0.0)
     names, reference, starts = _identified(request, instants, clouds, report)
-    if len(names) * len(clouds) > MOST_PLACES:
-        raise fail("films", len(clouds), f"{len(clouds)} instants; track fewer with first_frame and last_frame")
+    count = len(names) * len(clouds)
+    if count > MOST_PLACES:
+        what = f"{len(clouds)} instants of {len(names)} markers are {count} places"
+        remedy = "track parts of the film, with first_frame and last_frame (not included)"
+        raise fail("films", len(clouds), f"{what}; at most {MOST_PLACES} are tracked at once: {remedy}")
     followed = follow(clouds, reference, surface_of(reference), lambda done, of: report("following", done / of), starts)
     if followed is None:
         most = max(len(cloud) for cloud in clouds)
