@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -87,8 +88,9 @@ def track(request: Request, report: Report = _silent) -> TrackedFilm:
     """
     films = [film.opened() for film in request.films]
     _check(request, films)
-    with TemporaryDirectory(prefix="wingfit-") as scratch:
-        return _tracked(request, films, _detected(request, request.store or Path(scratch), report), report)
+    folder = TemporaryDirectory(prefix="wingfit-") if request.store is None else nullcontext(request.store)
+    with folder as store:
+        return _tracked(request, films, _detected(request, Path(store), report), report)
 
 
 def _tracked(request: Request, films: Sequence[Frames], found: Sequence[FilmDetections], report: Report) -> TrackedFilm:
