@@ -66,7 +66,7 @@ class _Reader:
             where = self.document.where(("clocks_within_ms",))
             raise fail(where, within, "with a strobe, its flashes show the clocks; leave the key out")
         first = self._frame(("first_frame",), 0) or 0
-        last = self._frame(("last_frame",), first + 1)
+        last = self._frame(("last_frame",), first + 1, "the film is used up to this frame, which is not included")
         return Request(
             cameras=cameras,
             films=tuple(films[camera.name] for camera in cameras),
@@ -144,20 +144,19 @@ class _Reader:
             raise fail(self.document.where(path), value, f"{shown(value)!r}; {nearest(str(value), of)}")
         return value
 
-    def _number(self, path: tuple[str, ...], low: float, high: float, default: float) -> float:
+    def _number(self, path: tuple[str, ...], low: float, high: float, default: float, meaning: str = "") -> float:
         value = value_at(self.document, path)
         if value is None:
             return default
         # Decimal is what the reader of YAML makes of numbers with a point; true and false are no numbers.
         number = float("nan") if isinstance(value, (bool, str, list, dict)) else float(value)
         if not low <= number <= high:
-            raise fail(
-                self.document.where(path), value, f"{shown(value)}; it must be a number from {low:g} to {high:g}"
-            )
+            message = f"{shown(value)}; it must be a number from {low:g} to {high:g}"
+            raise fail(self.document.where(path), value, message + (f"; {meaning}" if meaning else ""))
         return number
 
-    def _frame(self, path: tuple[str, ...], low: int) -> int | None:
-        number = self._number(path, low, 10**9, -1)
+    def _frame(self, path: tuple[str, ...], low: int, meaning: str = "") -> int | None:
+        number = self._number(path, low, 10**9, -1, meaning)
         if number != int(number):
             raise fail(self.document.where(path), number, f"{number:g} is no whole number; frames are counted from 0")
         return int(number) if number >= 0 else None

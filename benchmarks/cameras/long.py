@@ -1,6 +1,6 @@
 """Memory and time of tracking a long film: a short rendered film whose detections are repeated.
 
-``python -m benchmarks.cameras.long FOLDER LIGHT INSTANTS`` tracks one such film in this process, and prints its highest
+``python -m benchmarks.cameras.long FOLDER INSTANTS`` tracks one such film in this process, and prints its highest
 memory and its CPU time: the detections of the film in FOLDER fill a store, as if a film of so many instants had been
 read. A strobe flashes every 3.1 frames of 30 per second; continuous light has an instant in each frame.
 """
@@ -41,12 +41,12 @@ _DETECTED = "detected"
 
 def long_films(folder: Path, minutes: float) -> dict[str, Any]:
     """Return memory and time of films of up to ``minutes``, and of films of up to 16 beats in continuous light."""
-    strobe = round(minutes * 60 * RATE_HZ / FRAMES_PER_FLASH)
-    runs = [_tracked_apart(_rendered(folder, "strobe"), "strobe", strobe * of // LENGTHS[-1]) for of in LENGTHS]
+    places = {light: _rendered(folder, light) for light in ("strobe", "continuous")}
+    beat = {light: len(_detected(request_of(place), place / _DETECTED)[0].seen) for light, place in places.items()}
+    longest = round(minutes * 60 * RATE_HZ / FRAMES_PER_FLASH)
+    runs = [_tracked_apart(places["strobe"], longest * of // LENGTHS[-1]) for of in LENGTHS]
     growth = (runs[-1]["peak_memory_mb"] - runs[0]["peak_memory_mb"]) / (minutes * (1 - LENGTHS[0] / LENGTHS[-1]))
-    continuous = _rendered(folder, "continuous")
-    beat = _detected(request_of(continuous), continuous / _DETECTED)
-    fast = [_tracked_apart(continuous, "continuous", len(beat[0].seen) * of) for of in LENGTHS]
+    fast = [_tracked_apart(places["continuous"], beat["continuous"] * of) for of in LENGTHS]
     return {
         "minutes": minutes,
         "peak_memory_mb": runs[-1]["peak_memory_mb"],
@@ -58,7 +58,7 @@ def long_films(folder: Path, minutes: float) -> dict[str, Any]:
     }
 
 
-def _rendered(folder: Path, light: Light) -> Path:
+def _rendered(folder: Path, light: str) -> Path:
     """Return the folder of a short film, which is rendered if it is not there."""
     place = folder / f"{light}-1"
     if not (place / "done").exists():
@@ -69,10 +69,9 @@ def _rendered(folder: Path, light: Light) -> Path:
     return place
 
 
-def _tracked_apart(place: Path, light: Light, instants: int) -> dict[str, Any]:
+def _tracked_apart(place: Path, instants: int) -> dict[str, Any]:
     """Track in a process of its own, whose highest memory is that of this film."""
-    _detected(request_of(place), place / _DETECTED)
-    command = [sys.executable, "-m", __name__, str(place), light, str(instants)]
+    command = [sys.executable, "-m", __name__, str(place), str(instants)]
     ran = subprocess.run(command, check=True, capture_output=True, text=True)  # noqa: S603  # this module
     found: dict[str, Any] = json.loads(ran.stdout.splitlines()[-1])
     print(place.name, found, file=sys.stderr, flush=True)
@@ -99,7 +98,7 @@ class _Replayed(Film):
 
 def main(arguments: list[str]) -> None:
     """Track one long film, and print its memory and time."""
-    place, instants = Path(arguments[0]), int(arguments[2])
+    place, instants = Path(arguments[0]), int(arguments[1])
     short = request_of(place)
     seen = _detected(short, place / _DETECTED)
     frames = round(instants * FRAMES_PER_FLASH) + 2 if short.light == "strobe" else instants

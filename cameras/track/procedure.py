@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -88,8 +89,9 @@ def track(request: Request, report: Report = _silent) -> TrackedFilm:
     """
     films = [film.opened() for film in request.films]
     _check(request, films)
-    with TemporaryDirectory(prefix="wingfit-") as scratch:
-        return _tracked(request, films, _detected(request, request.store or Path(scratch), report), report)
+    folder = TemporaryDirectory(prefix="wingfit-") if request.store is None else nullcontext(request.store)
+    with folder as store:
+        return _tracked(request, films, _detected(request, Path(store), report), report)
 
 
 def _tracked(request: Request, films: Sequence[Frames], found: Sequence[FilmDetections], report: Report) -> TrackedFilm:
@@ -106,8 +108,11 @@ def _tracked(request: Request, films: Sequence[Frames], found: Sequence[FilmDete
     )
     report("rays", 0.0)
     names, reference, starts = _identified(request, instants, clouds, report)
-    if len(names) * len(clouds) > MOST_PLACES:
-        raise fail("films", len(clouds), f"{len(clouds)} instants; track fewer with first_frame and last_frame")
+    count = len(names) * len(clouds)
+    if count > MOST_PLACES:
+        what = f"{len(clouds)} instants of {len(names)} markers are {count} places"
+        remedy = "track parts of the film, with first_frame and last_frame (not included)"
+        raise fail("films", len(clouds), f"{what}; at most {MOST_PLACES} are tracked at once: {remedy}")
     followed = follow(clouds, reference, surface_of(reference), lambda done, of: report("following", done / of), starts)
     if followed is None:
         most = max(len(cloud) for cloud in clouds)

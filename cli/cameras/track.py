@@ -24,7 +24,8 @@ def track(
     store: Annotated[
         Path | None,
         typer.Option(
-            file_okay=False, help="Folder for what is detected, so that an interrupted run goes on; default: none."
+            file_okay=False,
+            help="Folder for what is detected, so that an interrupted run goes on; default: one that is removed.",
         ),
     ] = None,
     report: Annotated[Path | None, new_file("Write pictures of what was seen: FILE.html.", "--report")] = None,

@@ -72,9 +72,9 @@ class FilmCalls(Watching):
         """Submit the tracking of the markers in a film, and return the queued tracking.
 
         ``spec``: kind ("chequer" or "dot") and light ("strobe" or "continuous"), which are needed; name,
-        clocks_within_ms, first_frame, last_frame; dataset_id of the wing, or places: a list of dicts with marker, x_m,
-        y_m and z_m. Without both, the markers get names. labels: a list of dicts with camera, frame, marker, x_px and
-        y_px, of markers that you named in some frames.
+        clocks_within_ms, first_frame, last_frame (not included); dataset_id of the wing, or places: a list of dicts
+        with marker, x_m, y_m and z_m. Without both, the markers get names. labels: a list of dicts with camera, frame,
+        marker, x_px and y_px, of markers that you named in some frames.
         """
         body = given(film_id=film_id, **spec)
         return cast(Tracking, self._json("POST", "/v1/trackings", json=body, key=str(uuid.uuid4())))

@@ -166,7 +166,7 @@ def _spec(service: Service, body: TrackingIn) -> dict[str, Any]:
         message = "name a dataset or give places of the markers, not both"
         raise invalid("the markers have two places", [error_item("body.places", None, message)])
     if body.last_frame is not None and body.last_frame <= body.first_frame:
-        message = f"must be more than first_frame, {body.first_frame}"
+        message = f"must be more than first_frame, {body.first_frame}: it is not included"
         raise invalid("there is no frame to track", [error_item("body.last_frame", body.last_frame, message)])
     if body.light == "strobe" and body.clocks_within_ms:
         message = "with a strobe, its flashes show the clocks; leave it out"

@@ -86,7 +86,7 @@ def test_cameras_without_film_are_left_out_with_their_covariance(film: Path) -> 
         ("continuous", "strobe\nclocks_within_ms: 2", ["line 5", "leave the key out"]),
         ("continuous", "continuous\nclocks_within_ms: 2000", ["line 5", "2000; it must be a number from 0 to 1000"]),
         ("continuous", "continuous\nfirst_frame: 2.5", ["line 5", "2.5 is no whole number; frames are counted from 0"]),
-        ("continuous", "continuous\nfirst_frame: 9\nlast_frame: 9", ["line 6", "9; it must be a number from 10 to"]),
+        ("continuous", "continuous\nfirst_frame: 9\nlast_frame: 9", ["line 6", "from 10 to", "not included"]),
         ("  kind: dot", "  kind: dot\n  wing: markers.csv", ["line 8", "has both 'wing' and 'places'; keep one"]),
         ("markers.csv", "left", ["left", "cannot be read", "check the path"]),
     ],
