@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,7 +12,7 @@ from benchmarks.cameras.render import write
 from benchmarks.cameras.renderer.presets import BEAT, thesis_strobe
 from benchmarks.cameras.renderer.simulated import simulated_scene
 from benchmarks.cameras.tracked import calibrated
-from wingfit.cameras.calibrate.result import Calibration
+from wingfit.cameras.camera import Camera, Lens
 from wingfit.cameras.track.procedure import Request, track
 from wingfit.cameras.track.result import TrackedFilm
 from wingfit.cameras.video.source import Film
@@ -28,8 +28,13 @@ KELVIN = 293.15
 Report = Callable[[str], object]
 
 
-def dataset_from_films(folder: Path, genes: Mapping[str, float], report: Report, flashes: int = FLASHES) -> Dataset:
-    """Film a simulated wing with ``genes`` under all conditions, and return what a user would get from the films."""
+def dataset_from_films(
+    folder: Path, genes: Mapping[str, float], report: Report, *, lens: bool = True, flashes: int = FLASHES
+) -> Dataset:
+    """Film a simulated wing with ``genes`` under all conditions, and return what a user would get from the films.
+
+    ``lens``: whether the distortion that the calibration finds is used, or left out of the cameras.
+    """
     wing = robird_wing()
     films, calibration = list[TrackedFilm](), None
     for number, (pressure, lag) in enumerate(CONDITIONS):
@@ -41,26 +46,29 @@ def dataset_from_films(folder: Path, genes: Mapping[str, float], report: Report,
             write(replace(made, wand=replace(made.wand, until=0.1)), place)
             (place / "done").touch()
         calibration = calibration or calibrated(place, ["left", "right"])  # the cameras stay where they are
+        cameras = [one if lens else replace(one, lens=Lens()) for one in calibration.cameras]
         report(f"{place.name}: tracking")
-        films.append(_tracked(place, wing, calibration))
+        films.append(_tracked(place, wing, cameras, calibration.covariance if lens else None))
     report("aligning")
     known = Known(side="right", flap_frequency_hz=BEAT)
     tracks = [Tracks(f"film{k}", one.times, one.names, one.positions) for k, one in enumerate(films)]
     every = in_common_frame([align(one, wing, known) for one in tracks])
     recordings = tuple(_recording(one, condition) for one, condition in zip(every, CONDITIONS, strict=True))
     frame = FrameError(_triple(every[0].rotation_error), _triple(every[0].origin_error))
-    return Dataset("films of a wing", wing, recordings, (recordings[HELD_OUT].name,), frame_error=frame)
+    poses = tuple(one.pose.seen_from(every[0].rotation, every[0].origin) for one in cameras)
+    held_out = (recordings[HELD_OUT].name,)
+    return Dataset("films of a wing", wing, recordings, held_out, frame_error=frame, cameras=poses)
 
 
-def _tracked(place: Path, wing: Wing, calibration: Calibration) -> TrackedFilm:
+def _tracked(place: Path, wing: Wing, cameras: Sequence[Camera], covariance: Array | None) -> TrackedFilm:
     request = Request(
-        cameras=calibration.cameras,
-        films=tuple(Film(place / f"wing-{camera.name}.avi") for camera in calibration.cameras),
+        cameras=tuple(cameras),
+        films=tuple(Film(place / f"wing-{camera.name}.avi") for camera in cameras),
         kind="chequer",
         light="strobe",
         names=tuple(marker.name for marker in wing.markers),
         reference=np.array([marker.position for marker in wing.markers]),
-        calibration=calibration.covariance,
+        calibration=covariance,
         store=place / "detected",
     )
     return track(request)
