@@ -39,7 +39,7 @@ class CameraPose:
         centre = (np.asarray(self.centre) - origin) @ rotation.T
         return CameraPose.of(self.name, centre, np.asarray(self.rotation) @ rotation.T, self.focal_px)
 
-    def depth(self, point: Float[Array, "... 3"]) -> Float[Array, "..."]:
+    def depth(self, point: Float[Array, "... 3"]) -> Float[Array, ...]:
         """Return the distance of points [..., 3] (m) in front of the camera, along its axis; negative behind it."""
         return np.asarray((np.asarray(point) - np.asarray(self.centre)) @ np.asarray(self.rotation[2]))
 

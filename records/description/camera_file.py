@@ -39,7 +39,7 @@ class CameraFile(fields.Strict):
 def faults_of_cameras(
     cameras: Sequence[CameraFile], markers: Sequence[tuple[str, Float[Array, " 3"]]]
 ) -> Iterator[tuple[Path, object, str]]:
-    """Yield what cannot be of ``cameras`` that filmed ``markers`` (name and rest position in m): path, value, message."""
+    """Yield path, value and message of each fault of ``cameras`` that filmed ``markers`` (name, rest place in m)."""
     names = [camera.name for camera in cameras]
     for index, camera in enumerate(cameras):
         here: Path = ("cameras", index)
@@ -49,8 +49,8 @@ def faults_of_cameras(
         worst = float(np.abs(axes @ axes.T - np.eye(3)).max())
         if worst > ROUNDING:
             message = (
-                f"has rows that are not unit vectors at right angles: a product of two is wrong by {worst:.2g}, at most "
-                f"{ROUNDING:g} is accepted: copy the rotation with seven digits, as wingfit align --cameras prints it"
+                f"has rows that are not unit vectors at right angles: a product of two is wrong by {worst:.2g}, at "
+                f"most {ROUNDING:g} is accepted: copy it with seven digits, as wingfit align --cameras prints it"
             )
             yield (*here, "rotation"), None, message
             continue
@@ -71,8 +71,8 @@ def _too_near(
     if depths[nearest] < LEAST_DEPTH:
         where = f"{-depths[nearest]:.3g} m behind" if depths[nearest] < 0 else f"{depths[nearest]:.3g} m in front of"
         message = (
-            f"camera {camera.name!r} does not see marker {markers[nearest][0]!r}, which at rest is {where} it; at least "
-            f"{LEAST_DEPTH:g} m in front is accepted: check centre_m (m, in the frame of the tracks) and rotation "
-            "(rows: right, down, forward)"
+            f"camera {camera.name!r} cannot see marker {markers[nearest][0]!r}, which at rest is {where} it; at "
+            f"least {LEAST_DEPTH:g} m in front is accepted: check centre_m (m, in the frame of the tracks) and "
+            "rotation (rows: right, down, forward)"
         )
         yield (*here, "centre_m"), camera.name, message

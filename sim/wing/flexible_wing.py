@@ -256,7 +256,8 @@ class FlexibleWing:
         plain[:, :_OWN_GENES] = batch[:, :_OWN_GENES]
         place = {gene.name: k for k, gene in enumerate(self.genes)}
         for effect in effects:
-            columns = [place[f"{effect.name}.{parameter.name}"] for parameter in effect.parameters]
+            parameters = effect.parameters_of(self.wing, self.cameras)
+            columns = [place[f"{effect.name}.{parameter.name}"] for parameter in parameters]
             cells = np.ix_(np.flatnonzero(effect.on(self.genes, batch)), np.array(columns))
             plain[cells] = batch[cells]
         return plain

@@ -24,7 +24,7 @@ def image(camera: CameraPose, points: Array) -> Image:
 
 
 def triangulated(cameras: Sequence[CameraPose], images: Sequence[Image], near: Array) -> Array:
-    """Return the points [..., 3] (m) whose images are ``images`` (u, v) [...], one pair for each of two cameras or more.
+    """Return the points [..., 3] (m) with the ``images`` (u, v) [...] in two cameras or more, a pair for each.
 
     Where rays do not meet, it is the point with the least sum of squared errors in pixels (Hartley and Zisserman 2004,
     Multiple View Geometry, ch. 12), as a tracker triangulates. It is found by Gauss-Newton from the points ``near``
