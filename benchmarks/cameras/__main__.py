@@ -44,7 +44,7 @@ def main() -> None:
         nargs="*",
         choices=sorted(DIAGNOSED),
         help="diagnose wings from films alone, and nothing else: one with a displaced hinge, one filmed through lenses "
-        "whose distortion is left out, or both",
+        "whose distortion is left out, this one with cameras calibrated without distortion; default: all",
     )
     parser.add_argument("--keep", type=Path, help="store the films in this folder, and use those already there")
     chosen = parser.parse_args()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +30,8 @@ def _hinge(folder: Path) -> dict[str, Any]:
 
 def _lens(folder: Path) -> dict[str, Any]:
     """Diagnose a wing as it was described, tracked by cameras from which the distortion of the lenses is left out."""
-    finding = _diagnosed(dataset_from_films(folder / "lens", {}, _say, lens=False))
+    dataset = dataset_from_films(folder / "lens", {}, _say, cameras="undistorted")
+    finding, assumed = _diagnosed(dataset), _diagnosed(replace(dataset, cameras=()))
     lens, genes = thesis_strobe().film.cameras[0].distortion, _genes(finding)
     found = {name: genes.get(f"lens_distortion.{name}") for name in _COEFFICIENTS}
     rounded = {name: [None if v is None else round(v, 5) for v in one] for name, one in found.items() if one}
@@ -38,10 +40,23 @@ def _lens(folder: Path) -> dict[str, Any]:
         "lens": rounded,
         "lens_true": dict(zip(_COEFFICIENTS, map(float, lens), strict=False)),
         **{f"lens_{key}": value for key, value in _scores(finding).items()},
+        **{f"lens_without_stated_cameras_{key}": value for key, value in _scores(assumed).items()},
     }
 
 
-DIAGNOSED: Mapping[str, Callable[[Path], dict[str, Any]]] = {"hinge": _hinge, "lens": _lens}
+def _pinhole(folder: Path) -> dict[str, Any]:
+    """Diagnose the same films with cameras calibrated without distortion: poses and focal lengths are wrong too."""
+    finding = _diagnosed(dataset_from_films(folder / "lens", {}, _say, cameras="pinhole"))
+    named = list(finding.named) == ["lens_distortion"]
+    scores = {f"pinhole_{key}": value for key, value in _scores(finding).items()}
+    return {"pinhole_lens_distortion_named": named, **scores}
+
+
+DIAGNOSED: Mapping[str, Callable[[Path], dict[str, Any]]] = {
+    "hinge": _hinge,
+    "lens": _lens,
+    "pinhole": _pinhole,
+}
 """What is concealed, and a function that films it into a folder, or uses the films there, and diagnoses it."""
 
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
@@ -25,18 +26,19 @@ CONDITIONS = ((1e3, 0.0), (1e4, 0.0524), (1e5, 0.0), (1e5, 0.1222), (1e4, 0.1222
 HELD_OUT = 4
 FLASHES = 62
 KELVIN = 293.15
+Cameras = Literal["right", "undistorted", "pinhole"]
 Report = Callable[[str], object]
 
 
 def dataset_from_films(
-    folder: Path, genes: Mapping[str, float], report: Report, *, lens: bool = True, flashes: int = FLASHES
+    folder: Path, genes: Mapping[str, float], report: Report, *, cameras: Cameras = "right", flashes: int = FLASHES
 ) -> Dataset:
     """Film a simulated wing with ``genes`` under all conditions, and return what a user would get from the films.
 
-    ``lens``: whether the distortion that the calibration finds is used, or left out of the cameras.
+    ``cameras``: "right" as the chessboards give them; "undistorted": these, without the distortion of their lenses;
+    "pinhole": calibrated without distortion, so that focal lengths and poses are wrong too.
     """
-    wing = robird_wing()
-    films, calibration = list[TrackedFilm](), None
+    wing, films, calibration = robird_wing(), list[TrackedFilm](), None
     for number, (pressure, lag) in enumerate(CONDITIONS):
         condition = Condition(BEAT, lag, pressure, KELVIN)
         place = folder / f"film{number}"
@@ -45,24 +47,31 @@ def dataset_from_films(
             made = thesis_strobe(flashes=flashes, seed=number + 1, scene=simulated_scene(condition, genes))
             write(replace(made, wand=replace(made.wand, until=0.1)), place)
             (place / "done").touch()
-        calibration = calibration or calibrated(place, ["left", "right"])  # the cameras stay where they are
-        cameras = [one if lens else replace(one, lens=Lens()) for one in calibration.cameras]
+        calibration = calibration or _calibrated(place, cameras)  # the cameras stay where they are
         report(f"{place.name}: tracking")
-        films.append(_tracked(place, wing, cameras, calibration.covariance if lens else None))
+        films.append(_tracked(place, wing, *calibration))
     report("aligning")
     known = Known(side="right", flap_frequency_hz=BEAT)
     tracks = [Tracks(f"film{k}", one.times, one.names, one.positions) for k, one in enumerate(films)]
     every = in_common_frame([align(one, wing, known) for one in tracks])
     recordings = tuple(_recording(one, condition) for one, condition in zip(every, CONDITIONS, strict=True))
     frame = FrameError(_triple(every[0].rotation_error), _triple(every[0].origin_error))
-    poses = tuple(one.pose.seen_from(every[0].rotation, every[0].origin) for one in cameras)
+    poses = tuple(one.pose.seen_from(every[0].rotation, every[0].origin) for one in calibration[0])
     held_out = (recordings[HELD_OUT].name,)
     return Dataset("films of a wing", wing, recordings, held_out, frame_error=frame, cameras=poses)
 
 
-def _tracked(place: Path, wing: Wing, cameras: Sequence[Camera], covariance: Array | None) -> TrackedFilm:
+def _calibrated(place: Path, cameras: Cameras) -> tuple[tuple[Camera, ...], Array | None]:
+    """Return the cameras, and the covariance of their parameters unless they are wrong on purpose."""
+    found = calibrated(place, ["left", "right"], "pinhole" if cameras == "pinhole" else "brown")
+    if cameras == "right":
+        return found.cameras, found.covariance
+    return tuple(replace(one, lens=Lens()) for one in found.cameras), None
+
+
+def _tracked(place: Path, wing: Wing, cameras: tuple[Camera, ...], covariance: Array | None) -> TrackedFilm:
     request = Request(
-        cameras=tuple(cameras),
+        cameras=cameras,
         films=tuple(Film(place / f"wing-{camera.name}.avi") for camera in cameras),
         kind="chequer",
         light="strobe",
