@@ -38,7 +38,7 @@ def dataset_from_films(
     ``cameras``: "right" as the chessboards give them; "undistorted": these, without the distortion of their lenses;
     "pinhole": calibrated without distortion, so that focal lengths and poses are wrong too.
     """
-    wing, films, calibration = robird_wing(), list[TrackedFilm](), None
+    wing, places = robird_wing(), list[Path]()
     for number, (pressure, lag) in enumerate(CONDITIONS):
         condition = Condition(BEAT, lag, pressure, KELVIN)
         place = folder / f"film{number}"
@@ -47,16 +47,19 @@ def dataset_from_films(
             made = thesis_strobe(flashes=flashes, seed=number + 1, scene=simulated_scene(condition, genes))
             write(replace(made, wand=replace(made.wand, until=0.1)), place)
             (place / "done").touch()
-        calibration = calibration or _calibrated(place, cameras)  # the cameras stay where they are
+        places.append(place)
+    used, covariance = _calibrated(places[0], cameras)  # the cameras stay where they are
+    films = list[TrackedFilm]()
+    for place in places:
         report(f"{place.name}: tracking")
-        films.append(_tracked(place, wing, *calibration))
+        films.append(_tracked(place, wing, used, covariance))
     report("aligning")
     known = Known(side="right", flap_frequency_hz=BEAT)
     tracks = [Tracks(f"film{k}", one.times, one.names, one.positions) for k, one in enumerate(films)]
     every = in_common_frame([align(one, wing, known) for one in tracks])
     recordings = tuple(_recording(one, condition) for one, condition in zip(every, CONDITIONS, strict=True))
     frame = FrameError(_triple(every[0].rotation_error), _triple(every[0].origin_error))
-    poses = tuple(one.pose.seen_from(every[0].rotation, every[0].origin) for one in calibration[0])
+    poses = tuple(one.pose.seen_from(every[0].rotation, every[0].origin) for one in used)
     held_out = (recordings[HELD_OUT].name,)
     return Dataset("films of a wing", wing, recordings, held_out, frame_error=frame, cameras=poses)
 
