@@ -179,7 +179,9 @@ def _refuse_search_division(spec: CalibrationSpec, method: Method, *, wing: bool
 def wing_model(dataset: Dataset, spec: CalibrationSpec) -> FlexibleWing:
     """Return the model of a dataset of a wing; ValueError for an impossible discretisation, estimate or effect."""
     numerics = Numerics(accuracy=spec.accuracy)
-    model = FlexibleWing(dataset.wing, spec.division, spec.bounds_factor, numerics, spec.effects)
+    model = FlexibleWing(
+        dataset.wing, spec.division, spec.bounds_factor, numerics, spec.effects, cameras=dataset.cameras
+    )
     _ = model.structure, model.genes
     return model
 

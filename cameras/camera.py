@@ -9,6 +9,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from wingfit.cameras.opencv import opencv
+from wingfit.records import CameraPose
 from wingfit.records.array_types import Array, Float
 from wingfit.records.errors import fail, nearest
 
@@ -75,6 +76,12 @@ class Camera:
     def centre(self) -> Float[Array, 3]:
         """Return the place of the camera in space (m)."""
         return np.asarray(-self.rotation.T @ self.translation)
+
+    @property
+    def pose(self) -> CameraPose:
+        """Return its place, orientation and mean focal length, which a dataset states."""
+        focal = float(np.sqrt(self.matrix[0, 0] * self.matrix[1, 1]))
+        return CameraPose.of(self.name, self.centre, self.rotation, focal)
 
     def depth(self, points: Float[Array, "N 3"]) -> Float[Array, " N"]:
         """Return the distance (m) of ``points`` in front of the camera, along its axis; negative behind it."""

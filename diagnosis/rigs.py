@@ -18,7 +18,7 @@ from wingfit.records import Condition, Dataset, Recording, Vehicle, Wing
 from wingfit.records.array_types import Array, Float
 from wingfit.records.dataset import ForceAxis
 from wingfit.rigs.suspect import Suspect
-from wingfit.sim.effects.contract import Effect
+from wingfit.sim.effects.contract import Cameras, Effect
 from wingfit.sim.effects.probe import Probe
 from wingfit.sim.effects.registry import EFFECTS
 from wingfit.sim.model import Model
@@ -87,7 +87,7 @@ class WingSubject(_Rig):
     @cached_property
     def suspects(self) -> tuple[Suspect, ...]:
         """Effects that apply to a wing and are not in the nominal model."""
-        return _suspects(self.model.wing, self.model.effects)
+        return _suspects(self.model.wing, self.model.effects, self.model.cameras)
 
     @property
     def outline(self) -> tuple[tuple[float, float], ...]:
@@ -227,13 +227,15 @@ class VehicleSubject(_Rig):
 # -- suspects --------------------------------------------------------------------------------------------------
 
 
-def _suspects(rig: Wing | Vehicle, known: Collection[str]) -> tuple[Suspect, ...]:
+def _suspects(rig: Wing | Vehicle, known: Collection[str], cameras: Cameras = ()) -> tuple[Suspect, ...]:
     return tuple(
-        _suspect(effect, rig) for effect in EFFECTS.values() if effect.applies_to(rig) and effect.name not in known
+        _suspect(effect, rig, cameras)
+        for effect in EFFECTS.values()
+        if effect.applies_to(rig) and effect.name not in known
     )
 
 
-def _suspect(effect: Effect, rig: Wing | Vehicle) -> Suspect:
+def _suspect(effect: Effect, rig: Wing | Vehicle, cameras: Cameras) -> Suspect:
     places = [p.name for p in effect.parameters if p.place and p.name in _LOCATION_GENES]
     location_genes = {_LOCATION_GENES[name]: f"{effect.name}.{name}" for name in places}
     shapes = _marker_shapes(rig) if location_genes and effect.port == "observation" and isinstance(rig, Wing) else ()
@@ -241,9 +243,9 @@ def _suspect(effect: Effect, rig: Wing | Vehicle) -> Suspect:
         name=effect.name,
         title=effect.title,
         family=effect.family,
-        genes=effect.genes(rig),
+        genes=effect.genes(rig, cameras),
         size_genes=sizes(effect),
-        typical=effect.typical(rig),
+        typical=effect.typical(rig, cameras),
         source=effect.source,
         signature=effect.signature,
         location_genes=location_genes,

@@ -5,6 +5,7 @@ Axes (docs/notation.md) of a wing: x aft along the chord, y outboard along the s
 of a vehicle: x forward to the nose, z down.
 """
 
+from wingfit.records.camera_pose import CameraPose
 from wingfit.records.dataset import (
     AnyDataset,
     AnyRecording,
@@ -36,6 +37,7 @@ from wingfit.records.wing import Hinge, Marker, Materials, Rod, Station, Wing
 __all__ = [
     "AnyDataset",
     "AnyRecording",
+    "CameraPose",
     "Channel",
     "ChordStation",
     "Condition",

@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 
 from wingfit.records.array_types import Array, Bool, Float, Mask
+from wingfit.records.camera_pose import CameraPose
 from wingfit.records.name_lists import refuse_text
 from wingfit.records.recorded import Recorded
 from wingfit.records.series import Series, SeriesDataset
@@ -126,7 +127,8 @@ class Dataset(Recorded[Recording]):
     """A wing with recordings of tracks, or a vehicle with recordings of forces; ``rig`` describes the wing or vehicle.
 
     Recordings named in ``held_out`` are used for validation only, never for fitting. ``frame_error``: of the frame of
-    the tracks, which all recordings share; None if unknown, and for a vehicle.
+    the tracks, which all recordings share; None if unknown, and for a vehicle. ``cameras``: which filmed all recordings
+    of a wing, in the frame of the tracks; empty if unknown.
     """
 
     name: str
@@ -135,6 +137,7 @@ class Dataset(Recorded[Recording]):
     held_out: tuple[str, ...] = ()
     description: str = ""
     frame_error: FrameError | None = None
+    cameras: tuple[CameraPose, ...] = ()
 
     def __post_init__(self) -> None:
         refuse_text(self, "held_out")

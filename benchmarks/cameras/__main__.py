@@ -3,8 +3,9 @@
 Renders strobe films of 49 markers as in the thesis of van der Grinten, films in continuous light, and films of three
 cameras of which one is late; calibrates the cameras from rendered chessboards, tracks, and compares with the truth. The
 stereo pairs of OpenCV's samples are calibrated if the environment variable OPENCV_DOC_DATA names their folder. With
-``--diagnose``, a wing with a displaced hinge is filmed under five conditions, tracked, aligned and diagnosed. With
-``--long``, memory and time are measured of films whose detections are repeated. The last line is one JSON object.
+``--diagnose``, wings are filmed under five conditions, tracked, aligned and diagnosed: one with a displaced hinge, and
+one of which the tracks are made without the distortion of the lenses. With ``--long``, memory and time are measured of
+films whose detections are repeated. The last line is one JSON object.
 """
 
 from __future__ import annotations
@@ -12,20 +13,19 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import sys
 import tempfile
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from benchmarks.cameras.from_film import dataset_from_films
+from benchmarks.cameras.diagnosed import DIAGNOSED
 from benchmarks.cameras.long import long_films
 from benchmarks.cameras.peers import peers
 from benchmarks.cameras.tracked import Tracked, render_and_track
 from benchmarks.cameras.wand_lengths import wand_error_percent
 from benchmarks.common.machine import commit, cpu
 from benchmarks.common.progress import show_count
-from wingfit import CalibrationSpec, DiagnosisSpec, diagnose
 from wingfit.cameras.calibrate.board import Board
 from wingfit.cameras.calibrate.boards import find_boards
 from wingfit.cameras.calibrate.from_boards import calibrate_boards
@@ -33,7 +33,6 @@ from wingfit.cameras.calibrate.from_boards import calibrate_boards
 VARIABLE = "OPENCV_DOC_DATA"
 FLASHES, BEATS = 90, 1.0
 MINUTES = 4.0
-HINGE, DISPLACED_M = "hinge_offset.y", 0.008
 
 
 def main() -> None:
@@ -43,7 +42,13 @@ def main() -> None:
     parser.add_argument("--flashes", type=int, default=FLASHES, help="number of flashes of the strobe film")
     parser.add_argument("--beats", type=float, default=BEATS, help="beats filmed in continuous light")
     parser.add_argument("--seed", type=int, default=1, help="the same seed gives the same films")
-    parser.add_argument("--diagnose", action="store_true", help="diagnose a wing from films alone, and nothing else")
+    parser.add_argument(
+        "--diagnose",
+        nargs="*",
+        choices=sorted(DIAGNOSED),
+        help="diagnose wings from films alone, and nothing else: one with a displaced hinge, one filmed through lenses "
+        "whose distortion is left out, this one with cameras calibrated without distortion; default: all",
+    )
     parser.add_argument("--long", action="store_true", help="measure memory and time of long films, and nothing else")
     parser.add_argument("--minutes", type=float, default=MINUTES, help="length of the longest film of --long")
     parser.add_argument("--keep", type=Path, help="store the films in this folder, and use those already there")
@@ -52,8 +57,8 @@ def main() -> None:
         folder = chosen.keep or Path(scratch)
         if chosen.long:
             found = {**long_films(folder, chosen.minutes), "commit": commit(), "machine": cpu()}
-        elif chosen.diagnose:
-            found = _diagnosed(folder)
+        elif chosen.diagnose is not None:
+            found = _diagnosed(folder, chosen.diagnose or sorted(DIAGNOSED))
         else:
             found = _run(folder, chosen.flashes, chosen.beats, chosen.seed)
     for name, value in found.items():
@@ -95,28 +100,12 @@ def _run(folder: Path, flashes: int, beats: float, seed: int) -> dict[str, Any]:
     }
 
 
-def _diagnosed(folder: Path) -> dict[str, Any]:
-    """Film, track and diagnose a wing whose hinge is displaced; return what was found."""
-    dataset = dataset_from_films(folder / "hinge", {HINGE: DISPLACED_M}, lambda what: print(what, file=sys.stderr))
-    finding = diagnose(dataset, DiagnosisSpec(CalibrationSpec(mode="joint")))
-    genes = {gene.name: gene.value for one in finding.hypotheses[:1] for gene in one.genes}
-    return {
-        "hinge_offset_named": "hinge_offset" in finding.named,
-        "named": list(finding.named),
-        "probabilities": {name: round(float(value), 4) for name, value in finding.probabilities.items()},
-        "hinge_mm": None if HINGE not in genes else [_mm(value) for value in vars(genes[HINGE]).values()],
-        "calibrated_over_floor": max(
-            round(one.after.value / one.floor, 3) for one in finding.recordings if not one.held_out
-        ),
-        "held_out_over_floor": max(round(one.after.value / one.floor, 3) for one in finding.recordings if one.held_out),
-        "noise_mm": round(1e3 * finding.floors.noise, 3),
-        "commit": commit(),
-        "machine": cpu(),
-    }
-
-
-def _mm(value: float | None) -> float | None:
-    return None if value is None else round(1e3 * value, 3)
+def _diagnosed(folder: Path, cases: Sequence[str]) -> dict[str, Any]:
+    """Film, track and diagnose the wings of ``cases``; return what was found."""
+    found = dict[str, Any]()
+    for case in cases:
+        found |= DIAGNOSED[case](folder)
+    return found | {"commit": commit(), "machine": cpu()}
 
 
 def _stereo_rms_px() -> float | None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from benchmarks.cameras.render import write
 from benchmarks.cameras.renderer.presets import BEAT, thesis_strobe
 from benchmarks.cameras.renderer.simulated import simulated_scene
 from benchmarks.cameras.tracked import calibrated
-from wingfit.cameras.calibrate.result import Calibration
+from wingfit.cameras.camera import Camera, Lens
 from wingfit.cameras.track.procedure import Request, track
 from wingfit.cameras.track.result import TrackedFilm
 from wingfit.cameras.video.source import Film
@@ -26,13 +27,19 @@ CONDITIONS = ((1e3, 0.0), (1e4, 0.0524), (1e5, 0.0), (1e5, 0.1222), (1e4, 0.1222
 HELD_OUT = 4
 FLASHES = 62
 KELVIN = 293.15
+Cameras = Literal["right", "undistorted", "pinhole"]
 Report = Callable[[str], object]
 
 
-def dataset_from_films(folder: Path, genes: Mapping[str, float], report: Report, flashes: int = FLASHES) -> Dataset:
-    """Film a simulated wing with ``genes`` under all conditions, and return what a user would get from the films."""
-    wing = robird_wing()
-    films, calibration = list[TrackedFilm](), None
+def dataset_from_films(
+    folder: Path, genes: Mapping[str, float], report: Report, *, cameras: Cameras = "right", flashes: int = FLASHES
+) -> Dataset:
+    """Film a simulated wing with ``genes`` under all conditions, and return what a user would get from the films.
+
+    ``cameras``: "right" as the chessboards give them; "undistorted": these, without the distortion of their lenses;
+    "pinhole": calibrated without distortion, so that focal lengths and poses are wrong too.
+    """
+    wing, places = robird_wing(), list[Path]()
     for number, (pressure, lag) in enumerate(CONDITIONS):
         condition = Condition(BEAT, lag, pressure, KELVIN)
         place = folder / f"film{number}"
@@ -41,9 +48,12 @@ def dataset_from_films(folder: Path, genes: Mapping[str, float], report: Report,
             made = thesis_strobe(flashes=flashes, seed=number + 1, scene=simulated_scene(condition, genes))
             write(replace(made, wand=replace(made.wand, until=0.1)), place)
             (place / "done").touch()
-        calibration = calibration or calibrated(place, ["left", "right"])  # the cameras stay where they are
+        places.append(place)
+    used, covariance = _calibrated(places[0], cameras)  # the cameras stay where they are
+    films = list[TrackedFilm]()
+    for place in places:
         report(f"{place.name}: tracking")
-        films.append(_tracked(place, wing, calibration))
+        films.append(_tracked(place, wing, used, covariance))
     report("aligning")
     known = Known(side="right", flap_frequency_hz=BEAT)
     tracks = [Tracks(f"film{k}", one.times, one.names, one.positions) for k, one in enumerate(films)]
@@ -53,18 +63,28 @@ def dataset_from_films(folder: Path, genes: Mapping[str, float], report: Report,
     ]
     recordings = tuple(_recording(*one) for one in zip(every, noises, CONDITIONS, strict=True))
     frame = FrameError(_triple(every[0].rotation_error), _triple(every[0].origin_error))
-    return Dataset("films of a wing", wing, recordings, (recordings[HELD_OUT].name,), frame_error=frame)
+    poses = tuple(one.pose.seen_from(every[0].rotation, every[0].origin) for one in used)
+    held_out = (recordings[HELD_OUT].name,)
+    return Dataset("films of a wing", wing, recordings, held_out, frame_error=frame, cameras=poses)
 
 
-def _tracked(place: Path, wing: Wing, calibration: Calibration) -> TrackedFilm:
+def _calibrated(place: Path, cameras: Cameras) -> tuple[tuple[Camera, ...], Array | None]:
+    """Return the cameras, and the covariance of their parameters unless they are wrong on purpose."""
+    found = calibrated(place, ["left", "right"], "pinhole" if cameras == "pinhole" else "brown")
+    if cameras == "right":
+        return found.cameras, found.covariance
+    return tuple(replace(one, lens=Lens()) for one in found.cameras), None
+
+
+def _tracked(place: Path, wing: Wing, cameras: tuple[Camera, ...], covariance: Array | None) -> TrackedFilm:
     request = Request(
-        cameras=calibration.cameras,
-        films=tuple(Film(place / f"wing-{camera.name}.avi") for camera in calibration.cameras),
+        cameras=cameras,
+        films=tuple(Film(place / f"wing-{camera.name}.avi") for camera in cameras),
         kind="chequer",
         light="strobe",
         names=tuple(marker.name for marker in wing.markers),
         reference=np.array([marker.position for marker in wing.markers]),
-        calibration=calibration.covariance,
+        calibration=covariance,
         store=place / "detected",
     )
     return track(request)

@@ -18,7 +18,7 @@ from wingfit.cameras.calibrate.board import Board
 from wingfit.cameras.calibrate.boards import find_boards
 from wingfit.cameras.calibrate.from_boards import calibrate_boards
 from wingfit.cameras.calibrate.result import Calibration
-from wingfit.cameras.camera import Camera, Lens
+from wingfit.cameras.camera import Camera, Lens, LensModel
 from wingfit.cameras.track.procedure import Report, Request, track
 from wingfit.cameras.track.result import TrackedFilm
 from wingfit.cameras.triangulation import triangulate
@@ -120,12 +120,12 @@ def request_of(folder: Path, calibration: Calibration | None = None) -> Request:
     )
 
 
-def calibrated(folder: Path, names: list[str]) -> Calibration:
-    """Calibrate the cameras of a rendered film from its chessboards."""
+def calibrated(folder: Path, names: list[str], lens: LensModel = "brown") -> Calibration:
+    """Calibrate the cameras of a rendered film from its chessboards, with this model of their lenses."""
     with np.load(folder / "boards.npz") as boards:
         board = Board(int(boards["inner"][0]), int(boards["inner"][1]), float(boards["side"]))
     images = {name: sorted((folder / f"boards-{name}").glob("*.png")) for name in names}
-    return calibrate_boards(find_boards(images, board))
+    return calibrate_boards(find_boards(images, board), lens=lens)
 
 
 def _truth(folder: Path, camera: dict[str, Any], found: TrackedFilm, *, strobe: bool) -> Array:

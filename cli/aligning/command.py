@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
 from wingfit.cli.base.files import check_file, write_text
 from wingfit.cli.base.output import late_progress, note, print_json
 from wingfit.client.transport import WingfitError
+
+if TYPE_CHECKING:
+    from wingfit.records import CameraPose
 
 
 def align(
@@ -60,6 +63,10 @@ def align(
             "axes of the wing is written beside the tracks, to FILE.noise.yaml, for dataset.yaml.",
         ),
     ] = None,
+    cameras: Annotated[
+        Path | None,
+        typer.Option(help="Calibration in whose axes the tracks are, cameras.yaml: printed for the dataset."),
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Find the frame of a wing in tracks of any camera axes, name its markers, and write the tracks in that frame.
@@ -77,6 +84,7 @@ def align(
     targets = _targets(output, tracks, force=force)
     _check_covariances(covariance or [], targets, len(tracks), axes, force=force)
     try:
+        poses = _poses(cameras)
         with late_progress("aligning") as report:
             every = align_recordings(
                 tracks,
@@ -100,13 +108,25 @@ def align(
         write_text(_noise_of(target), noise.yaml(), "keys of the recording in dataset.yaml")
     if as_json:
         written: list[str | None] = [str(one) for one in targets] if targets else [None] * len(every)
-        answers = [found.as_json() | {"written": one} for found, one in zip(every, written, strict=True)]
+        answers = [
+            found.as_json() | {"written": one, "cameras": results.cameras_of(found, poses)}
+            for found, one in zip(every, written, strict=True)
+        ]
         print_json(answers[0] if len(answers) == 1 else {"recordings": answers})
         return
     for found in every:
-        results.show(found, is_true=flap_frequency_hz is not None)
+        results.show(found, poses, is_true=flap_frequency_hz is not None)
     if not targets:
         note("nothing was written; to write the tracks, add: --output FILE.csv")
+
+
+def _poses(file: Path | None) -> tuple[CameraPose, ...]:
+    """Return the cameras in the calibration ``file``, in the axes of the tracks; none without a file."""
+    if file is None:
+        return ()
+    from wingfit.cameras.files.read import read_cameras  # imported late, as above
+
+    return tuple(camera.pose for camera in read_cameras(file).cameras)
 
 
 def _targets(output: Path | None, tracks: list[Path], *, force: bool) -> list[Path]:

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from wingfit.cli.base.output import mm, number, percent, remarks, say, table
+from wingfit.records.camera_pose import CameraPose
 from wingfit.tracking.alignment import AlignedTracks
 from wingfit.tracking.alignment.result import MarkerResult
 
+_DIGITS = 7  # of the axes of a camera, and after the point of metres and pixels
 
-def show(found: AlignedTracks, *, is_true: bool) -> None:
+
+def show(found: AlignedTracks, cameras: Sequence[CameraPose] = (), *, is_true: bool) -> None:
     """Print the frame, the labels, the residuals and the rest positions.
 
+    ``cameras``: of the calibration in whose axes the tracks were; printed in the wing's frame, for the dataset.
     ``is_true``: the flap frequency is not that of an alias.
     """
     frames = f"{len(found.times)} frames, {len(found.markers)} markers"
@@ -27,6 +33,10 @@ def show(found: AlignedTracks, *, is_true: bool) -> None:
     say(f"origin in the tracks: {origin} mm; standard errors along wing x, y, z: {errors} mm")
     turns, moves = (", ".join(f"{value:.3g}" for value in one) for one in (turned, found.origin_error))
     say(f"for the dataset: frame_error: {{rotation_deg: [{turns}], origin_m: [{moves}]}}")
+    if cameras:
+        say("for the dataset: cameras:")
+        for one in cameras_of(found, cameras):
+            say(f"- {{{', '.join(f'{key}: {value}' for key, value in one.items())}}}")
     say(f"side: {found.side}, {_evidence(found.side_evidence)}")
     where = "on the clock of the cameras" if is_true else "as it appears in the frames"
     period = f"{number(found.flap_frequency, 7)} Hz {where}"
@@ -48,6 +58,19 @@ def show(found: AlignedTracks, *, is_true: bool) -> None:
     if found.lost_samples:
         say(f"samples near no marker, left out: {found.lost_samples}")
     remarks(f"{found.file}: {one}" for one in found.remarks)
+
+
+def cameras_of(found: AlignedTracks, cameras: Sequence[CameraPose]) -> list[dict[str, object]]:
+    """Return ``cameras``, given in the axes of the tracks, in the wing's frame, as ``dataset.yaml`` has them."""
+    return [
+        {
+            "name": one.name,
+            "centre_m": [round(value, _DIGITS) for value in one.centre],
+            "rotation": [[round(value, _DIGITS) + 0.0 for value in row] for row in one.rotation],
+            "focal_px": round(one.focal_px, 4),
+        }
+        for one in (camera.seen_from(found.rotation, found.origin) for camera in cameras)
+    ]
 
 
 def _evidence(value: float | None) -> str:

@@ -8,6 +8,7 @@ from decimal import Decimal
 import numpy as np
 
 from wingfit.records.array_types import Array, Float
+from wingfit.records.description.camera_file import LEAST_CAMERAS, faults_of_cameras
 from wingfit.records.description.dataset_file import DatasetFile, SeriesDatasetFile, VehicleDatasetFile, WingDatasetFile
 from wingfit.records.description.fields import FourierFile
 from wingfit.records.description.vehicle_file import MotionFile, VehicleFile, VehicleRecordingFile
@@ -47,6 +48,11 @@ def _wing(dataset: WingDatasetFile) -> Iterator[Inconsistency]:
     yield from _references(("wing", "driven_rods"), wing.driven_rods, rods, "rod")
     yield from _references(("wing", "reference_markers"), wing.reference_markers, markers, "marker")
     yield from _markers(wing)
+    if len(dataset.cameras) == 1:
+        message = f"has one camera; at least {LEAST_CAMERAS} are needed for positions in space: add the others"
+        yield ("cameras",), dataset.cameras[0].name, message
+    places = [(marker.name, np.array([marker.x_m, marker.y_m, marker.z_m], float)) for marker in wing.markers]
+    yield from faults_of_cameras(dataset.cameras, places)
 
 
 def _foam_and_rods(wing: WingFile) -> Iterator[Inconsistency]:

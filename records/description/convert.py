@@ -17,7 +17,9 @@ import numpy as np
 from pydantic import BaseModel
 
 from wingfit.records.array_types import Array, Float
+from wingfit.records.camera_pose import CameraPose
 from wingfit.records.dataset import Condition, FrameError, Recording
+from wingfit.records.description.camera_file import CameraFile
 from wingfit.records.description.dataset_file import VehicleDatasetFile, WingDatasetFile
 from wingfit.records.description.fields import models_in, tag_of
 from wingfit.records.description.vehicle_file import VehicleFile, VehicleRecordingFile
@@ -52,6 +54,17 @@ def to_frame_error(dataset: WingDatasetFile | VehicleDatasetFile) -> FrameError 
 def describe_frame_error(error: FrameError) -> dict[str, object]:
     """Convert the errors of a frame to the plain data that ``dataset.yaml`` has under its key ``frame_error``."""
     return to_data(error, FrameErrorFile)
+
+
+def to_cameras(dataset: WingDatasetFile | VehicleDatasetFile) -> tuple[CameraPose, ...]:
+    """Convert the cameras of a checked description to SI units; none if they are not stated."""
+    stated = dataset.cameras if isinstance(dataset, WingDatasetFile) else []
+    return tuple(to_dataclass(CameraPose, camera) for camera in stated)
+
+
+def describe_cameras(cameras: Iterable[CameraPose]) -> list[dict[str, object]]:
+    """Convert cameras to the plain data that ``dataset.yaml`` has under its key ``cameras``."""
+    return [to_data(camera, CameraFile) for camera in cameras]
 
 
 def to_recording(entry: RecordingFile, samples: Samples, document: Document, path: Path, faults: Faults) -> Recording:

@@ -12,6 +12,7 @@ from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field
 
+from wingfit.records.description.camera_file import MOST_CAMERAS, CameraFile
 from wingfit.records.description.fields import Name, Prose, Strict, Title, whole
 from wingfit.records.description.series_file import ChannelFile, QuantityFile, SeriesRecordingFile
 from wingfit.records.description.vehicle_file import VehicleFile, VehicleRecordingFile
@@ -34,6 +35,11 @@ class WingDatasetFile(_DatasetFile):
         None,
         description="standard errors of the frame of all tracks, about and along x, y and z of the wing; leave out if "
         "unknown",
+    )
+    cameras: list[CameraFile] = Field(
+        default_factory=list,
+        max_length=MOST_CAMERAS,
+        description="which filmed all recordings, two to eight; leave out if unknown",
     )
     recordings: list[WingRecordingFile] = Field(min_length=1, max_length=MAX_RECORDINGS)
 

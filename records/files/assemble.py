@@ -15,9 +15,11 @@ import numpy as np
 from wingfit.records.dataset import AnyDataset, Dataset, Recording
 from wingfit.records.description.convert import (
     RecordingFile,
+    describe_cameras,
     describe_frame_error,
     describe_recording,
     describe_rig,
+    to_cameras,
     to_frame_error,
     to_recording,
     to_rig,
@@ -82,7 +84,8 @@ def assemble(
         recordings.append(recording)
     faults.raise_any()
     frame = to_frame_error(checked)
-    return Dataset(checked.name, rig, tuple(recordings), tuple(checked.held_out), checked.description, frame)
+    held_out, cameras = tuple(checked.held_out), to_cameras(checked)
+    return Dataset(checked.name, rig, tuple(recordings), held_out, checked.description, frame, cameras)
 
 
 def _read_all(
@@ -151,6 +154,7 @@ def describe(dataset: Dataset) -> dict[str, object]:
         **({"description": dataset.description} if dataset.description else {}),
         "vehicle" if isinstance(dataset.rig, Vehicle) else "wing": describe_rig(dataset.rig),
         **({"frame_error": describe_frame_error(dataset.frame_error)} if dataset.frame_error else {}),
+        **({"cameras": describe_cameras(dataset.cameras)} if dataset.cameras else {}),
         "recordings": [describe_recording(recording) for recording in dataset.recordings],
         **({"held_out": list(dataset.held_out)} if dataset.held_out else {}),
     }

@@ -36,6 +36,6 @@ def apply(effects: Iterable[Effect], genes: tuple[Gene, ...], genomes: Array, sa
         if effect.observe is None or not len(on := np.flatnonzero(effect.on(genes, genomes))):
             continue
         times, added = sampling.times[on].copy(), sampling.added[on].copy()
-        part = Sampling(sampling.rig, sampling.recording, sampling.beat[on], times, added)
+        part = Sampling(sampling.rig, sampling.recording, sampling.beat[on], times, added, sampling.cameras)
         effect.observe(part, effect.values(genes, genomes[on]))
         sampling.beat[on], sampling.times[on], sampling.added[on] = part.beat, part.times, part.added

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from wingfit.records import Gene, Vehicle, Wing
+from wingfit.records import CameraPose, Gene, Vehicle, Wing
 from wingfit.records.array_types import Array as Array
 from wingfit.records.array_types import Mask
 from wingfit.records.genes import Scale
@@ -31,6 +31,7 @@ Port = Literal["inertia", "connector", "point", "drive", "air", "observation"]
 Power = Literal["conservative", "dissipative", "any"]
 Measure = Literal["span", "chord", "mass"]
 RigKind = Literal["wing", "vehicle"]
+Cameras = tuple[CameraPose, ...]  # which a dataset states; none if unknown
 Values = Mapping[str, Array]  # parameters of one effect by name, one value per individual
 FAMILIES: dict[Port, tuple[Family, ...]] = {
     "inertia": ("inertia", "aerodynamics"),
@@ -61,6 +62,7 @@ class Parameter:
         positions: of a size that is a choice rather than an amount: the values that it can have besides zero. A fit may
             pass between them, and a diagnosis rejects what ends there. Empty: any value.
         scale: how a search spreads over the bounds, "linear" or "log".
+        assumed: whether it places cameras that are assumed; with a dataset that states its cameras it is not there.
     """
 
     name: str
@@ -74,6 +76,7 @@ class Parameter:
     wing_only: bool = False
     positions: tuple[float, ...] = ()
     scale: Scale = "linear"
+    assumed: bool = False
 
 
 @dataclass(frozen=True)
@@ -184,17 +187,18 @@ class Effect:
         """Return whether the effect can be added to a vehicle's model of these ``terms``."""
         return self.term not in terms and (not self.of_term or self.of_term in terms)
 
-    def parameters_of(self, rig: Wing | Vehicle) -> tuple[Parameter, ...]:
-        """Return the parameters that the effect has on ``rig``."""
-        return tuple(p for p in self.parameters if isinstance(rig, Wing) or not p.wing_only)
+    def parameters_of(self, rig: Wing | Vehicle, cameras: Cameras = ()) -> tuple[Parameter, ...]:
+        """Return the parameters that the effect has on ``rig``, which the stated ``cameras`` filmed."""
+        here = (p for p in self.parameters if isinstance(rig, Wing) or not p.wing_only)
+        return tuple(p for p in here if not (p.assumed and cameras))
 
-    def genes(self, rig: Wing | Vehicle) -> tuple[Gene, ...]:
+    def genes(self, rig: Wing | Vehicle, cameras: Cameras = ()) -> tuple[Gene, ...]:
         """Return the genes of all parameters for ``rig``: sizes nominally zero, the others at their typical values."""
-        return tuple(self._gene(parameter, rig) for parameter in self.parameters_of(rig))
+        return tuple(self._gene(parameter, rig) for parameter in self.parameters_of(rig, cameras))
 
-    def typical(self, rig: Wing | Vehicle) -> dict[str, float]:
+    def typical(self, rig: Wing | Vehicle, cameras: Cameras = ()) -> dict[str, float]:
         """Return the typical values of all genes for ``rig``, in their units, by the names of the genes."""
-        return {f"{self.name}.{p.name}": p.typical * measure(rig, p.of) for p in self.parameters_of(rig)}
+        return {f"{self.name}.{p.name}": p.typical * measure(rig, p.of) for p in self.parameters_of(rig, cameras)}
 
     def values(self, genes: tuple[Gene, ...], genomes: Array) -> dict[str, Array]:
         """Return the parameters [B] by their short names, from ``genomes`` [B, G], whose columns are ``genes``."""

@@ -11,7 +11,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from wingfit.records import Condition, Gene, Recording, Wing
+from wingfit.records import CameraPose, Condition, Gene, Recording, Wing
 from wingfit.records.array_types import Array, ArrayLike, Complex, Index
 from wingfit.records.blas_threads import one_blas_thread
 from wingfit.sim.effects.apply import affected, apply, by_active
@@ -35,7 +35,7 @@ from wingfit.sim.wing.structure import Structure, build
 Key = TypeVar("Key")
 Value = TypeVar("Value")
 
-_DEFINITION = ("wing", "division", "bounds_factor", "numerics", "effects", "probe", "near", "differentiates")
+_DEFINITION = ("wing", "division", "bounds_factor", "numerics", "effects", "probe", "near", "differentiates", "cameras")
 _OWN_GENES = len(STRUCTURAL + AERODYNAMIC)  # the other genes are those of effects
 _MAX_STARTS = 256
 # Solutions used as warm starts, by wing and condition; shared by models that differ only in their effects.
@@ -59,6 +59,7 @@ class FlexibleWing:
         near: values of the wing's own genes. The periodic motion of this genome is the warm start of all individuals.
             Empty: every simulation starts from rest.
         differentiates: whether individuals are neighbours of the first of their batch, whose motion is differentiated.
+        cameras: which filmed the wing, for the effects of cameras; empty: they assume a pair.
     """
 
     wing: Wing
@@ -69,6 +70,7 @@ class FlexibleWing:
     probe: Probe | None = None
     near: tuple[float, ...] = ()
     differentiates: bool = False
+    cameras: tuple[CameraPose, ...] = ()
 
     def __post_init__(self) -> None:
         chosen(self.effects, self.wing)
@@ -81,7 +83,7 @@ class FlexibleWing:
     def genes(self) -> tuple[Gene, ...]:
         """Structural genes (thesis Eq. 18), aerodynamic genes (Eq. 19), then those of the effects and the probe."""
         own = wing_genes(self.wing.estimates, self.bounds_factor)
-        return (*own, *(gene for effect in self.chosen for gene in effect.genes(self.wing)))
+        return (*own, *(gene for effect in self.chosen for gene in effect.genes(self.wing, self.cameras)))
 
     @cached_property
     def chosen(self) -> tuple[Effect, ...]:
@@ -254,7 +256,8 @@ class FlexibleWing:
         plain[:, :_OWN_GENES] = batch[:, :_OWN_GENES]
         place = {gene.name: k for k, gene in enumerate(self.genes)}
         for effect in effects:
-            columns = [place[f"{effect.name}.{parameter.name}"] for parameter in effect.parameters]
+            parameters = effect.parameters_of(self.wing, self.cameras)
+            columns = [place[f"{effect.name}.{parameter.name}"] for parameter in parameters]
             cells = np.ix_(np.flatnonzero(effect.on(self.genes, batch)), np.array(columns))
             plain[cells] = batch[cells]
         return plain
@@ -335,7 +338,7 @@ class FlexibleWing:
         for start in range(0, len(changed), LANES):  # blocks that stay in the cache
             block = changed[start : start + LANES]
             beat = np.stack([grids[k] for k in wing[block].tolist()])
-            sampling = Sampling(self.wing, recording, beat, times[block], added[block])
+            sampling = Sampling(self.wing, recording, beat, times[block], added[block], self.cameras)
             apply(self.chosen, self.genes, batch[block], sampling)
             shown = sampling.beat[:, :, columns].reshape(*sampling.beat.shape[:2], -1)
             series[block] = [series_of(one) for one in shown]

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from wingfit.records import (
+    CameraPose,
     Condition,
     Dataset,
     FourBarDrive,
@@ -106,4 +107,16 @@ def falcon_dataset(frames: int = 60) -> Dataset:
         for seed, (name, condition) in enumerate(conditions.items())
     )
     frame = FrameError((math.radians(0.26), math.radians(0.06), 0.0), (5.6e-4, 1.7e-4, 2e-4))
-    return Dataset("falcon", wing, recordings, ("vacuum-3hz", "tunnel-4hz-8"), "A stiff wing, for tests.", frame)
+    held_out = ("vacuum-3hz", "tunnel-4hz-8")
+    return Dataset("falcon", wing, recordings, held_out, "A stiff wing, for tests.", frame, falcon_cameras())
+
+
+def falcon_cameras() -> tuple[CameraPose, ...]:
+    """Two cameras a metre and a half above the wing, which look at the middle of the span at different angles."""
+    target, found = np.array([0.03, 0.25, 0.0]), []
+    for name, place, focal in (("left", [0.0, 0.05, 1.5], 1900.0), ("right", [0.1, 0.6, 1.4], 1911.97)):
+        forward = (target - place) / np.linalg.norm(target - place)
+        right = np.cross([1.0, 0.0, 0.0], forward) / np.linalg.norm(np.cross([1.0, 0.0, 0.0], forward))
+        axes = np.stack([right, np.cross(forward, right), forward])
+        found.append(CameraPose.of(name, np.array(place), axes, focal))
+    return tuple(found)

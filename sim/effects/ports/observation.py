@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wingfit.records import Recording, Vehicle, Wing
+from wingfit.records import CameraPose, Recording, Vehicle, Wing
 from wingfit.records.array_types import Array, Complex
 from wingfit.records.dataset import STANDARD_GRAVITY
 
@@ -24,6 +24,7 @@ class Sampling:
             recording has one of them, as a tilted balance mixes them.
         times: [B, T], s: T instants at which the beat is sampled, initially those of the recording.
         added: [B, T, C]: values to add after sampling to the C channels of the recording. Initially zero.
+        cameras: which the dataset states, two or more; empty: unknown.
     """
 
     rig: Wing | Vehicle
@@ -31,6 +32,7 @@ class Sampling:
     beat: Array
     times: Array
     added: Array
+    cameras: tuple[CameraPose, ...] = ()
 
     @property
     def wing(self) -> Wing:

@@ -7,17 +7,19 @@ triangulated from the two images: the distance follows from the disparity.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from wingfit.records.array_types import Array
 from wingfit.sim.effects.contract import Parameter, Values
 
+_place = partial(Parameter, assumed=True)
 PLACES = (
-    Parameter("x", "m", -1.0, 2.0, 0.5, "x of the point that both cameras aim at, at height z = 0", "chord"),
-    Parameter("y", "m", 0.0, 1.0, 0.5, "y of the point that both cameras aim at", "span"),
-    Parameter("distance", "m", 2.0, 10.0, 2.5, "height of the cameras above z = 0", "span"),
-    Parameter("base", "1", 0.1, 1.0, 0.4, "distance between the cameras over their height"),
+    _place("x", "m", -1.0, 2.0, 0.5, "x of the point that both cameras aim at, at height z = 0", "chord"),
+    _place("y", "m", 0.0, 1.0, 0.5, "y of the point that both cameras aim at", "span"),
+    _place("distance", "m", 2.0, 10.0, 2.5, "height of the cameras above z = 0", "span"),
+    _place("base", "1", 0.1, 1.0, 0.4, "distance between the cameras over their height"),
 )
 """Shape parameters of an effect that depends on the cameras; typically a metre or two away, 20 degrees apart."""
 

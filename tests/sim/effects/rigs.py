@@ -74,7 +74,7 @@ def force_recording(beats: int = 3, per_beat: int = 60, axes: str = "xz") -> Rec
 def seen(name: str, sampling: Sampling, **values: float) -> Sampling:
     """``sampling`` after the effect called ``name``, at ``values`` of its parameters and else at their nominal ones."""
     effect: Effect = EFFECTS[name]
-    genes = effect.genes(sampling.rig)
+    genes = effect.genes(sampling.rig, sampling.cameras)
     genome = Genome.nominal(genes).replace({f"{name}.{key}": value for key, value in values.items()})
     batch = np.repeat(np.array([genome.values]), len(sampling.beat), axis=0)
     after = replace(sampling, beat=sampling.beat.copy(), times=sampling.times.copy(), added=sampling.added.copy())

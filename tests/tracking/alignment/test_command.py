@@ -7,9 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 
 from tests.command_line import Wingfit, in_process
 from tests.tracking.alignment.recorded import ROBIRD, filmed
+from wingfit.cameras.camera import Camera, Lens
+from wingfit.cameras.files.camera_set import CameraSet
+from wingfit.cameras.files.project import write_cameras
 from wingfit.cli.main import app
 from wingfit.records.files.table import write_table
 from wingfit.records.files.tracks import read_tracks
@@ -71,3 +75,35 @@ def test_json_and_refusals(wingfit: Wingfit, trial: Path) -> None:
     code, _, message = wingfit("align", trial, "--wing", ROBIRD, "--body", "x,y,z")
     assert code == 1
     assert "there is no track 'x'" in message
+
+
+def test_cameras_are_printed_in_the_frame_of_the_wing(wingfit: Wingfit, trial: Path) -> None:
+    """Of a left wing, which is mirrored: a camera sees the aligned markers where it saw the tracks."""
+    calibration, aligned = trial.parent / "cameras.yaml", trial.parent / "seen.csv"
+    turn = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
+    matrix = np.array([[1500.0, 0.0, 640.0], [0.0, 1500.0, 512.0], [0.0, 0.0, 1.0]])
+    cameras = tuple(
+        Camera(name, (1280, 1024), matrix, Lens(), turn, np.array([x, 0.1, 2.0]))
+        for name, x in (("one", 0.0), ("two", -0.4))
+    )
+    write_cameras(calibration, CameraSet(cameras))
+    options = ("align", trial, "--wing", ROBIRD, "--side", "left", "--cameras", calibration)
+    code, out, err = wingfit(*options, "--json", "-o", aligned)
+    assert code == 0, err
+    printed = json.loads(out[out.index("{") :])["cameras"]
+    film = filmed(left=True)
+    positions = read_tracks(aligned.read_bytes(), "seen.csv", film.markers).values.reshape(film.true.shape)
+    found = json.loads(out[out.index("{") :])
+    before = positions @ np.array(found["rotation"]) + found["origin_m"]
+    for camera, one in zip(cameras, printed, strict=True):
+        assert one["name"] == camera.name
+        assert one["focal_px"] == 1500.0
+        own = before @ camera.rotation.T + camera.translation
+        np.testing.assert_allclose((positions - one["centre_m"]) @ np.array(one["rotation"]).T, own, atol=2e-6)
+    code, out, err = wingfit(*options)
+    assert code == 0, err
+    said = out[out.index("for the dataset: cameras:") :].splitlines()[1:3]
+    assert yaml.safe_load("\n".join(said)) == printed
+    code, _, message = wingfit(*options[:-1], trial.parent / "gone.yaml")
+    assert code == 1
+    assert "cannot be read" in message

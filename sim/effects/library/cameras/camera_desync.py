@@ -6,13 +6,22 @@ import numpy as np
 
 from wingfit.sim.effects.contract import Parameter, Values, fault_of_tracks
 from wingfit.sim.effects.ports.observation import Sampling
+from wingfit.sim.effects.ports.stated_cameras import image, triangulated
 from wingfit.sim.effects.ports.stereo import PLACES, Stereo
 
 
 def _observe(sampling: Sampling, values: Values) -> None:
+    delay = np.exp(2j * np.pi * sampling.harmonics * values["delay"][:, None])
+    if sampling.cameras:
+        near = sampling.beat
+        images = [image(camera, near) for camera in sampling.cameras[:-1]]
+        sampling.filtered(delay)
+        images.append(image(sampling.cameras[-1], sampling.beat))
+        sampling.beat = triangulated(sampling.cameras, images, near)
+        return
     cameras = Stereo.of(values)
     inner = cameras.image(sampling.beat, -1.0)
-    sampling.filtered(np.exp(2j * np.pi * sampling.harmonics * values["delay"][:, None]))
+    sampling.filtered(delay)
     outer = cameras.image(sampling.beat, 1.0)
     sampling.beat = cameras.points(inner, outer)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from wingfit.sim.effects.contract import Array, Parameter, Values, fault_of_tracks
 from wingfit.sim.effects.ports.observation import Sampling
+from wingfit.sim.effects.ports.stated_cameras import image, triangulated
 from wingfit.sim.effects.ports.stereo import PLACES, Stereo
 
 
@@ -23,6 +24,10 @@ def distorted(u: Array, v: Array, values: Values) -> tuple[Array, Array]:
 
 
 def _observe(sampling: Sampling, values: Values) -> None:
+    if sampling.cameras:
+        images = [distorted(*image(camera, sampling.beat), values) for camera in sampling.cameras]
+        sampling.beat = triangulated(sampling.cameras, images, sampling.beat)
+        return
     cameras = Stereo.of(values)
     inner, outer = (distorted(*cameras.image(sampling.beat, side), values) for side in (-1.0, 1.0))
     sampling.beat = cameras.points(inner, outer)
