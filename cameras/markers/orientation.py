@@ -1,8 +1,8 @@
 """Which detections of a chequer are not the chequer, but the gap to its neighbour.
 
 Where two chequers are close, a bright square of one and a bright square of the other touch nearly, and the gap between
-them is a saddle too. All cameras see it, so that its rays meet. But its bright squares lie along another diagonal. On the
-wing, the bright diagonal of a marker has the same direction at every instant and for every camera.
+them is a saddle too. All cameras see it, so that its rays meet. But its bright squares lie along another diagonal. On
+the wing, the bright diagonal of a marker has the same direction at every instant and for every camera.
 """
 
 from __future__ import annotations

@@ -7,7 +7,9 @@ D^-1)^-1/2 D^-1 v has the covariance D^2 of the noise alone; wherever a diagnosi
 residual, it means these (Rasmussen and Williams 2006, Sec. 2.7: explicit basis functions with a normal prior).
 
 That of a frame is stated with the dataset. That of rest positions is measured: missing physics displaces neighbours
-alike, errors of single markers do not.
+alike, errors of single markers do not. For the same reason the part of the errors that moves all markers as a rigid
+wing is not integrated out: it would hide cameras that shifted or an axis that is displaced. Genes adapt to it, and it
+is part of their intervals (:mod:`.intervals`).
 """
 
 from __future__ import annotations
@@ -150,6 +152,7 @@ def find_position_errors(
     """
     markers = tuple(dict.fromkeys(name for one in data.beat_recordings for name in one.markers))
     found, columns = PositionErrors(markers, 0.0, np.ones(len(markers), bool), frame), list[Array]()
+    rigid = np.zeros((len(data.scale), 0))
     if frame is not None:
         columns.append(changes_by_frame(data) * deviations(frame))
     places = {p.name: (p.x, p.y) for one in data.beat_recordings for p in subject.channel_locations(one)}
@@ -160,9 +163,10 @@ def find_position_errors(
         if sd >= data.policy.negligible * data.noise:
             found = replace(found, sd=sd, usual=usual)
             columns.insert(0, _own(changes, rest, usual) * sd)
+            rigid = _rigid(changes, rest, usual) * sd
     if not columns:
         return None
-    return found, data.allowing(Marginal.of(data.whitened_slopes(np.hstack(columns))))
+    return found, data.allowing(Marginal.of(data.whitened_slopes(np.hstack(columns))), rigid)
 
 
 def too_many(data: WhitenedData) -> bool:
@@ -176,11 +180,27 @@ def _own(changes: Float[Array, "D K"], rest: Float[Array, "M 2"], usual: Bool[Ma
 
     Zero for the other markers.
     """
-    rigid, _ = np.linalg.qr(_polynomial(rest[usual], 1))
+    rigid = _rigid_motions(rest, usual)
     by_marker = changes.reshape(len(changes), -1, 3)[:, usual]
     found = np.zeros((len(changes), len(rest), 3))
     found[:, usual] = by_marker - np.einsum("mq,nq,dna->dma", rigid, rigid, by_marker, optimize=True)
     return np.asarray(found.reshape(changes.shape))
+
+
+def _rigid(changes: Float[Array, "D K"], rest: Float[Array, "M 2"], usual: Bool[Mask, " M"]) -> Float[Array, "D 9"]:
+    """Return the ``changes`` by errors of the ``usual`` markers that :func:`_own` leaves out, one motion a column.
+
+    Errors of unit variance, independent from marker to marker, have these nine components, of unit variance and
+    independent, as the motions are orthonormal.
+    """
+    by_marker = changes.reshape(len(changes), -1, 3)[:, usual]
+    found = np.einsum("mq,dma->dqa", _rigid_motions(rest, usual), by_marker, optimize=True)
+    return np.asarray(found.reshape(len(changes), -1))
+
+
+def _rigid_motions(rest: Float[Array, "M 2"], usual: Bool[Mask, " M"]) -> Float[Array, "U 3"]:
+    """Return orthonormal displacements [U, 3] of the U ``usual`` markers along an axis: constant and linear."""
+    return np.asarray(np.linalg.qr(_polynomial(rest[usual], 1))[0])
 
 
 def _standard_deviation(

@@ -50,6 +50,8 @@ class WhitenedData:
         policy: thresholds.
         series: reduces recordings without a beat, with their noise; None for tracks and forces.
         errors: of the description, integrated out of the coefficients of every residual; None: none were found.
+        rigid_errors: [D, K] changes of the coefficients by one standard deviation of each of K errors that are not
+            integrated out, because they look like faults: genes adapt to them, so that they are part of the intervals.
         is_steady: of series: whether the residual of the nominal model may be slow noise. If not, because its power
             differs as that of no stationary noise does, the noise is what is visible of it.
     """
@@ -61,6 +63,7 @@ class WhitenedData:
     policy: Policy = POLICY
     series: SeriesReduction | None = None
     errors: Marginal | None = None
+    rigid_errors: Float[Array, "D K"] | None = None
     is_steady: bool = True
 
     @classmethod
@@ -115,11 +118,15 @@ class WhitenedData:
     def noiseless(self) -> WhitenedData:
         """The same with zero noise variance, for coefficients that come from simulations alone."""
         reduced = tuple(replace(fit, variance=np.zeros_like(fit.variance)) for fit in self.reduced)
-        return replace(self, reduced=reduced, errors=None)
+        return replace(self, reduced=reduced, errors=None, rigid_errors=None)
 
-    def allowing(self, errors: Marginal) -> WhitenedData:
-        """Return the same data with ``errors`` of the description, relative to the noise, integrated out."""
-        return replace(self, errors=errors)
+    def allowing(self, errors: Marginal, rigid: Float[Array, "D K"]) -> WhitenedData:
+        """Return the same data with ``errors`` of the description, relative to the noise, integrated out.
+
+        ``rigid`` [D, K]: changes of the coefficients by one standard deviation of each error that is not.
+        """
+        allowing = replace(self, errors=errors)
+        return replace(allowing, rigid_errors=allowing.without_errors(rigid.T).T)
 
     @cached_property
     def noise(self) -> float:

@@ -118,7 +118,8 @@ def test_missing_physics_does_not_push_genes_to_their_bounds() -> None:
 
 
 def test_intervals_include_model_error_and_tolerance() -> None:
-    data = one()
+    """Of one recording, which has no others to disagree with (test_intervals.py)."""
+    data = WhitenedData.of(one().recordings[:1])
     found = fit(data)
     floor = POLICY.tolerance**2 * len(data.scale) / data.effective_samples
     assert data.max_likelihood_weight == pytest.approx(1.0 / (1.0 + floor))
