@@ -37,7 +37,7 @@ def detect_chequers(image: Array, dark: float, noise: float) -> Detections:
         return no_detections()
     fit, places, whole = _fit(image, starts, angles, reach)
     covariance = fit.covariance + _FLOOR_PX**2 * np.eye(2)
-    found = Detections(places, covariance, reach, 2 * np.abs(fit.contrast), _bright_diagonal(fit))
+    found = Detections(places, covariance, reach, 2 * np.abs(fit.contrast), _edges(fit))
     moved = np.linalg.norm(places - starts, axis=1)
     good = (fit.explained > _EXPLAINED) & (found.contrast > _NOISES * noise) & (moved < 0.6 * reach)
     good &= np.isfinite(found.covariance).all((1, 2)) & (_variance(found) < 1.0) & _crossing(fit) & whole
@@ -166,10 +166,12 @@ def _crossing(fit: PatchFit) -> Mask:
     return np.asarray(np.abs(np.sin(fit.parameters[:, 2] - fit.parameters[:, 3])) > np.sin(np.radians(15)))
 
 
-def _bright_diagonal(fit: PatchFit) -> Float[Array, " N"]:
-    """Return the directions (rad) along which the bright squares lie: half-way between the edges, or across that."""
-    middle = fit.parameters[:, 2:4].mean(axis=1)
-    return np.asarray(np.where(fit.contrast < 0, middle, middle + np.pi / 2))
+def _edges(fit: PatchFit) -> Float[Array, "N 2"]:
+    """Return the directions (rad) of the two edges, turned so that a bright square lies between them."""
+    one, two = fit.parameters[:, 2:4].T
+    x, y = np.cos(one) + np.cos(two), np.sin(one) + np.sin(two)
+    between = (np.cos(one) * y - np.sin(one) * x) * (np.cos(two) * y - np.sin(two) * x)
+    return np.stack([one, np.where(fit.contrast * between > 0, two, two + np.pi)], axis=1)
 
 
 def _variance(found: Detections) -> Float[Array, " N"]:

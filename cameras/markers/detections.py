@@ -9,7 +9,7 @@ import numpy as np
 
 from wingfit.records.array_types import Array, Float, Index, Mask
 
-FIELDS = ("pixels", "covariance", "size_px", "contrast", "diagonal")
+FIELDS = ("pixels", "covariance", "size_px", "contrast", "edges")
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,14 +21,15 @@ class Detections:
         covariance: [N, 2, 2] (pixels squared), of the noise of the image and of what the pattern does not follow.
         size_px: [N], smallest distance from the centre to the edge of the marker.
         contrast: [N], brightness of the marker above that of its surroundings.
-        diagonal: [N], direction (rad) along which the bright squares of a chequer lie, from x to y; NaN for a dot.
+        edges: [N, 2], directions (rad, from x to y) of two edges of a chequer, with a bright square between them; NaN
+            for a dot.
     """
 
     pixels: Float[Array, "N 2"]
     covariance: Float[Array, "N 2 2"]
     size_px: Float[Array, " N"]
     contrast: Float[Array, " N"]
-    diagonal: Float[Array, " N"]
+    edges: Float[Array, "N 2"]
 
     def __len__(self) -> int:
         return len(self.pixels)
@@ -40,7 +41,7 @@ class Detections:
 
 def no_detections() -> Detections:
     """Return an image in which nothing is detected."""
-    return Detections(np.empty((0, 2)), np.empty((0, 2, 2)), *(np.empty(0) for _ in FIELDS[2:]))
+    return Detections(np.empty((0, 2)), np.empty((0, 2, 2)), np.empty(0), np.empty(0), np.empty((0, 2)))
 
 
 def joined(parts: Sequence[Detections]) -> Detections:

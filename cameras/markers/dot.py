@@ -89,7 +89,7 @@ def _fitted(image: Array, starts: Array, radii: Array, noise: float) -> Detectio
     fit = fit_patches(_shape, start, patches, seen, at)
     places = fit.parameters[:, :2] + corner
     size = np.exp(np.clip(fit.parameters[:, 2:4], -3, 5)).min(1)
-    none = np.full(len(size), np.nan)
+    none = np.full((len(size), 2), np.nan)
     found = Detections(places, fit.covariance + _FLOOR_PX**2 * np.eye(2), size, fit.contrast, none)
     good = (fit.explained > _EXPLAINED) & (fit.contrast > _NOISES * noise) & np.isfinite(found.covariance).all((1, 2))
     good &= (np.linalg.norm(places - starts, axis=1) < radii.max(1)) & (

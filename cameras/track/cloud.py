@@ -23,10 +23,12 @@ class Cloud:
     Attributes:
         points: triangulated, M of them; a detection may belong to several.
         detections: [C, M], index of the detection in each camera, -1 for a camera that does not see the point.
+        edges: [C, M, 2], directions (rad) of the edges in each image (:class:`Detections`); NaN if unknown.
     """
 
     points: Points
     detections: Index
+    edges: Float[Array, "C M 2"]
 
     def __len__(self) -> int:
         return int(self.detections.shape[1])
@@ -54,7 +56,7 @@ def possible_points(
     for camera in cameras:
         far = camera.depth(np.nan_to_num(points.positions))
         good &= (far > depth[0]) & (far < depth[1])
-    cloud = Cloud(_only(points, good), indices[:, good])
+    cloud = _cloud(_only(points, good), indices[:, good], seen)
     return _with_more_cameras(cameras, seen, cloud, tolerance_px) if len(cameras) > 2 else cloud
 
 
@@ -128,7 +130,14 @@ def _with_more_cameras(
         better = free & (points.misfit <= _gate(points.freedom))
         indices[:, better] = tried[:, better]
     unique = np.unique(indices, axis=1)
-    return Cloud(_triangulated(cameras, seen, unique, tolerance_px), unique)
+    return _cloud(_triangulated(cameras, seen, unique, tolerance_px), unique, seen)
+
+
+def _cloud(points: Points, detections: Index, seen: Sequence[Detections]) -> Cloud:
+    edges = np.full((*detections.shape, 2), np.nan)
+    for own, index, into in zip(seen, detections, edges, strict=True):
+        into[index >= 0] = own.edges[index[index >= 0]]
+    return Cloud(points, detections, edges)
 
 
 def _only(points: Points, keep: Mask) -> Points:

@@ -11,9 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wingfit.cameras.camera import Camera
+from wingfit.cameras.markers.orientation import Orientation
 from wingfit.cameras.track.cloud import Cloud
 from wingfit.cameras.track.registration import Deformed, Surface, assign, deformed, register, spacing
-from wingfit.records.array_types import Array, Float, Index
+from wingfit.records.array_types import Array, Float, Index, Mask
 
 Progress = Callable[[int, int], object]
 _STARTS = 12  # instants at which a start is tried
@@ -30,6 +32,7 @@ class Followed:
         chosen: [T, K], index of a point of the cloud, -1 where a marker was not found.
         detections: [T, C, K], index of the detection in each camera, -1 where there is none.
         predicted: [T, K, 3] (m), where the smooth motion of the wing places the markers; NaN at instants that are lost.
+        directions: [T, C, K] (rad), of their bright diagonals on the wing, by camera; NaN if unknown.
         start: the instant at which the markers were identified first.
         again: instants at which the wing was found again, after others at which it was lost.
         renamed: instants at which markers were followed to other points than those that are known there, and these
@@ -39,6 +42,7 @@ class Followed:
     chosen: Index
     detections: Index
     predicted: Float[Array, "T K 3"]
+    directions: Float[Array, "T C K"]
     start: int
     again: tuple[int, ...]
     renamed: Mapping[int, tuple[int, ...]]
@@ -50,6 +54,7 @@ def follow(
     surface: Surface,
     progress: Progress,
     known: Mapping[int, tuple[Index, Array]] | None = None,
+    cameras: Sequence[Camera] = (),
 ) -> Followed | None:
     """Identify the markers in the ``clouds`` of all instants; None if the wing is seen in none of those tried.
 
@@ -66,7 +71,7 @@ def follow(
             return None
     else:
         found = known[start]
-    state = _State(clouds, surface, reference)
+    state = _State(clouds, surface, reference, cameras)
     state.put(start, *found)
     done = 1
     for direction in (1, -1):
@@ -77,7 +82,8 @@ def follow(
                 state.correct(instant, *known[instant])
             done += 1
             progress(done, len(clouds))
-    return Followed(state.chosen, state.detections, state.predicted, start, tuple(sorted(state.again)), state.renamed)
+    again = tuple(sorted(state.again))
+    return Followed(state.chosen, state.detections, state.predicted, state.directions, start, again, state.renamed)
 
 
 def _start(clouds: Sequence[Cloud], reference: Float[Array, "K 3"]) -> tuple[int, tuple[Index, Array] | None]:
@@ -99,8 +105,16 @@ def _start(clouds: Sequence[Cloud], reference: Float[Array, "K 3"]) -> tuple[int
 class _State:
     """The markers at the instants so far, and how well they were predicted."""
 
-    def __init__(self, clouds: Sequence[Cloud], surface: Surface, reference: Float[Array, "K 3"]) -> None:
+    def __init__(
+        self,
+        clouds: Sequence[Cloud],
+        surface: Surface,
+        reference: Float[Array, "K 3"],
+        cameras: Sequence[Camera],
+    ) -> None:
         self.clouds, self.surface, self.reference = clouds, surface, reference
+        self.orientation = Orientation(cameras, surface.plane)
+        self.directions = np.full((len(clouds), len(cameras), len(reference)), np.nan)
         count = len(reference)
         # Errors of predictions are not all alike; a search that is narrower than this loses markers, and gains nothing.
         self.spacing = spacing(reference)
@@ -124,6 +138,10 @@ class _State:
         self.chosen[instant], self.predicted[instant] = chosen, smooth
         self.detections[instant] = np.where(found, cloud.detections[:, chosen], -1)
         self.places[instant] = np.where(found[:, None], cloud.positions[chosen], smooth)
+        if self.directions.size:
+            seen = np.where(found[:, None], cloud.edges[:, chosen], np.nan)[:, :, None]
+            self.directions[instant] = self.orientation.directions(smooth, seen)[:, :, 0]
+            self.orientation.learn(self.directions[instant])
 
     def correct(self, instant: int, chosen: Index, smooth: Float[Array, "K 3"]) -> None:
         """Replace what was followed to ``instant`` by what is known there; if they differ, go on from that alone."""
@@ -172,20 +190,30 @@ class _State:
 
     def _near(self, expected: Float[Array, "K 3"], cloud: Cloud) -> tuple[Index, Array] | None:
         """Return the identification near the places that are ``expected``."""
-        covariance = cloud.points.covariance
-        chosen = assign(expected, np.full(len(expected), self.error), cloud.positions, covariance)
+        covariance, allowed = cloud.points.covariance, self._allowed(expected, cloud)
+        wide = np.full(len(expected), self.error)
+        chosen = assign(expected, wide, cloud.positions, covariance, allowed=allowed)
         smooth = expected
         for _ in range(8):
             if (chosen >= 0).sum() < _LEAST_MARKERS:
                 return None
             found = np.where((chosen >= 0)[:, None], cloud.positions[chosen], np.nan)
             moved = self._moved(found, expected)
-            again = assign(moved.positions, np.maximum(moved.deviation, self.least), cloud.positions, covariance)
+            wide = np.maximum(moved.deviation, self.least)
+            again = assign(moved.positions, wide, cloud.positions, covariance, allowed=allowed)
             smooth = moved.positions
             if (again == chosen).all():
                 break
             chosen = again
         return chosen, smooth
+
+    def _allowed(self, expected: Float[Array, "K 3"], cloud: Cloud) -> Mask | None:
+        """Return the points [K, M] whose bright diagonals are those of the markers; None if cameras are unknown."""
+        if not self.directions.size or not len(cloud):
+            return None
+        places = np.where(np.isfinite(expected), expected, self.places[self.known[-1]])
+        seen = np.repeat(cloud.edges[:, None], len(places), axis=1)
+        return self.orientation.allowed(self.orientation.directions(places, seen))
 
     def _moved(self, found: Float[Array, "K 3"], expected: Float[Array, "K 3"]) -> Deformed:
         """Return the markers after the smooth motion that those ``found`` show.

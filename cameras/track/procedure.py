@@ -113,7 +113,8 @@ def _tracked(request: Request, films: Sequence[Frames], found: Sequence[FilmDete
         what = f"{len(clouds)} instants of {len(names)} markers are {count} places"
         remedy = "track parts of the film, with first_frame and last_frame (not included)"
         raise fail("films", len(clouds), f"{what}; at most {MOST_PLACES} are tracked at once: {remedy}")
-    followed = follow(clouds, reference, surface_of(reference), lambda done, of: report("following", done / of), starts)
+    surface, progress = surface_of(reference), lambda done, of: report("following", done / of)
+    followed = follow(clouds, reference, surface, progress, starts, request.cameras)
     if followed is None:
         most = max(len(cloud) for cloud in clouds)
         raise fail(
@@ -197,8 +198,8 @@ def _result(
     markers: tuple[Names, Places],
 ) -> TrackedFilm:
     cameras, shape = request.cameras, followed.chosen.shape
-    pixels, covariance, diagonals = _observed(instants, followed)
-    gaps = between_markers(cameras, surface_of(markers[1]).plane, followed.predicted, diagonals)
+    pixels, covariance = _observed(instants, followed)
+    gaps = between_markers(followed.directions)
     pixels[:, gaps.ravel()] = np.nan
     error = pixel_error(cameras, pixels, covariance)
     covariance += error**2 * np.eye(2)
@@ -234,23 +235,19 @@ def _result(
     )
 
 
-def _observed(
-    instants: Instants, followed: Followed
-) -> tuple[Float[Array, "C N 2"], Float[Array, "C N 2 2"], Float[Array, "C T K"]]:
-    """Return the pixels of each marker in each camera at each instant, their covariances, and the bright diagonals."""
+def _observed(instants: Instants, followed: Followed) -> tuple[Float[Array, "C N 2"], Float[Array, "C N 2 2"]]:
+    """Return the pixels of each marker in each camera at each instant, and their covariances."""
     count, cameras, markers = followed.detections.shape
     pixels = np.full((cameras, count, markers, 2), np.nan)
     covariance = np.empty((cameras, count, markers, 2, 2))
     covariance[:] = np.eye(2)
-    diagonals = np.full((cameras, count, markers), np.nan)
     for instant, seen in enumerate(instants.seen):
         for camera, one in enumerate(seen):
             index = followed.detections[instant, camera]
             have = index >= 0
             pixels[camera, instant, have] = one.pixels[index[have]]
             covariance[camera, instant, have] = one.covariance[index[have]]
-            diagonals[camera, instant, have] = one.diagonal[index[have]]
-    return pixels.reshape(cameras, -1, 2), covariance.reshape(cameras, -1, 2, 2), diagonals
+    return pixels.reshape(cameras, -1, 2), covariance.reshape(cameras, -1, 2, 2)
 
 
 def _label_remarks(

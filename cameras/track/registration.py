@@ -13,7 +13,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial import cKDTree
 
-from wingfit.records.array_types import Array, Float, Index
+from wingfit.records.array_types import Array, Float, Index, Mask
 
 _TRIPLES, _HYPOTHESES = 60, 4000
 _STRETCH = 0.02  # of a distance, beside a share of the wing's size for bending
@@ -130,8 +130,12 @@ def assign(
     points: Float[Array, "M 3"],
     covariance: Float[Array, "M 3 3"],
     gate: float = 4.0,
+    allowed: Mask | None = None,
 ) -> Index:
-    """Return the index [K] of the point of each marker, -1 for none: least sum of squared distances in deviations."""
+    """Return the index [K] of the point of each marker, -1 for none: least sum of squared distances in deviations.
+
+    ``allowed`` [K, M]: points that a marker can be; None: all.
+    """
     chosen = np.full(len(predicted), -1)
     rows = np.flatnonzero(np.isfinite(predicted).all(1) & np.isfinite(deviation))
     if not len(rows) or not len(points):
@@ -139,6 +143,8 @@ def assign(
     apart = points[None] - predicted[rows][:, None]
     spread = covariance[None] + (deviation[rows] ** 2)[:, None, None, None] * np.eye(3)
     squared = np.einsum("kmi,kmi->km", apart, np.linalg.solve(spread, apart[..., None])[..., 0])
+    if allowed is not None:
+        squared = np.where(allowed[rows], squared, np.inf)
     cost = np.minimum(squared, gate**2)
     at, of = linear_sum_assignment(cost)
     good = squared[at, of] < gate**2

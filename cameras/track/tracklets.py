@@ -144,7 +144,7 @@ def owned_at_time(tracklets: Tracklets, time: float, longest: float) -> tuple[De
     covariance += ((0.1 * np.linalg.norm(pixels - straight, axis=1)) ** 2)[:, None, None] * np.eye(2)
     nearest = before + (share > 0.5)
     own = seen.only(nearest)
-    between = Detections(pixels, covariance, own.size_px, own.contrast, own.diagonal)
+    between = Detections(pixels, covariance, own.size_px, own.contrast, own.edges)
     return joined((between, alone)), np.concatenate([owner[before], owner[exact]])
 
 

@@ -40,4 +40,4 @@ def cloud_of(true: Array, seen: Mask, rng: np.random.Generator, false: int = 0) 
     points = Points((places + noise)[order], spread, np.zeros(len(places)), np.ones(len(places), dtype=int))
     index = np.full(len(true), -1)
     index[np.flatnonzero(seen)] = np.argsort(order)[: int(seen.sum())]
-    return Cloud(points, np.full((2, len(places)), -1)), index
+    return Cloud(points, np.full((2, len(places)), -1), np.full((2, len(places), 2), np.nan)), index

@@ -118,7 +118,9 @@ def filmed(
             own = pixels[camera, at][rng.permutation(len(rest))][: 0 if hidden(at) else None]
             count = len(own)
             spread = np.tile(NOISE_PX**2 * np.eye(2), (count, 1, 1))
-            seen.append(Detections(own, spread, np.full(count, 4.0), np.full(count, 100.0), np.full(count, np.nan)))
+            seen.append(
+                Detections(own, spread, np.full(count, 4.0), np.full(count, 100.0), np.full((count, 2), np.nan))
+            )
             marks.append(FlashMark(int(numbers[camera, at]), 0.0, (-np.inf, np.inf)))
         return FilmDetections(seen, marks, ())
 

@@ -24,7 +24,7 @@ def detections(pixels: Array, sigma: float = SIGMA) -> Detections:
         np.tile(sigma**2 * np.eye(2), (count, 1, 1)),
         np.full(count, 5.0),
         np.full(count, 100.0),
-        np.full(count, np.nan),
+        np.full((count, 2), np.nan),
     )
 
 
