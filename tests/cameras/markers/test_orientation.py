@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.cameras.markers.drawing import affine, chequer, drawn, lattice, noisy
+from tests.cameras.markers.drawing import Mark, affine, chequer, drawn, lattice, noisy
 from tests.cameras.track.simulated_films import around, wing_at
 from wingfit.cameras.markers.chequer import detect_chequers
 from wingfit.cameras.markers.orientation import Orientation, between_markers
@@ -70,7 +70,7 @@ def test_places_on_a_line_show_no_direction() -> None:
 def test_a_bright_square_lies_between_the_detected_edges(size: float) -> None:
     rng = np.random.default_rng(4)
     area, places = lattice(rng, 30, 3 * size + 8)
-    marks = [(chequer, place, affine(rng, size)) for place in places]
+    marks: list[Mark] = [(chequer, place, affine(rng, size)) for place in places]
     found = detect_chequers(noisy(drawn(area, marks, 0.6), 1.0, rng), 10.0, 1.0)
     apart = np.linalg.norm(places[:, None] - found.pixels[None], axis=2)
     seen = np.flatnonzero(apart.min(1) < 1)
