@@ -213,7 +213,7 @@ def _result(
     jumped = jumps(instants.times, places, spread, _JUMP * spacing(markers[1]))
     places[jumped] = np.nan
     spread[~np.isfinite(places).all(2)] = np.nan
-    left = residuals(cameras, pixels, points.positions)
+    missed = residuals(cameras, pixels, points.positions)
     return TrackedFilm(
         names=markers[0],
         times=instants.times,
@@ -221,7 +221,7 @@ def _result(
         covariance=spread,
         by_calibration=by_calibration,
         pixels=np.moveaxis(pixels.reshape(-1, *shape, 2), 0, 1),
-        residuals=np.moveaxis(left.reshape(-1, *shape, 2), 0, 1),
+        residuals=np.moveaxis(missed.reshape(-1, *shape, 2), 0, 1),
         cameras=tuple(camera.name for camera in cameras),
         frames=instants.frames,
         pixel_error=error,

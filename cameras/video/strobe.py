@@ -86,7 +86,7 @@ def background(frames: Frames) -> Background:
         raise fail(str(frames.path), len(sampled), f"has {len(sampled)} frames; the background takes 5 without flash")
     stack = np.stack(sampled)
     middle = np.median(stack, axis=0)
-    deviations = np.array([np.percentile(np.abs(one - middle), 68.3) for one in stack.astype(np.float32)])
+    deviations = np.array([np.percentile(np.abs(one.astype(np.float32) - middle), 68.3) for one in stack])
     return Background(middle, max(float(np.median(deviations)), 0.3))
 
 
