@@ -31,6 +31,8 @@ Array = npt.NDArray[np.float64]
 WING = robird_wing()
 MODEL = FlexibleWing(WING, "4", numerics=Numerics(accuracy=1e-5))
 NOMINAL = {gene.name: gene.nominal for gene in MODEL.genes}
+CHORDS = np.array([(one.y, one.chord) for one in WING.stations]).T
+MEAN_CHORD = float(np.trapezoid(CHORDS[1], CHORDS[0]) / np.ptp(CHORDS[0]))
 THIN, STREAM = vacuum(10.0, 0.12, 4.0), tunnel(0.05, 3.5, 6.0)
 # Genes of the library's effects whose meaning differs from the law's, at the values that come nearest.
 NEAREST: dict[str, Callable[[float, Mapping[str, float]], dict[str, float]]] = {
@@ -39,6 +41,7 @@ NEAREST: dict[str, Callable[[float, Mapping[str, float]], dict[str, float]]] = {
     "tether": lambda s, at: {"k": 0.75 * s, "c": s * at["time"]},  # the cord softens
     "cable": lambda s, at: {"k": s, "c": s * at["time"]},
     "compliant_drive": lambda s, _: {"d": s},
+    "mass_offset": lambda s, _: {"distance": s * MEAN_CHORD},
 }
 # The least change in mm that a typical strength must cause: friction and pitch rates hardly move a wing of this size.
 LEAST = {"rotational_circulation": 0.05, "viscous_drag": 0.003}

@@ -43,10 +43,6 @@ def _aft(draft: Draft, strength: float, _: Values) -> None:
     draft.aft = strength * _mean_chord(draft.wing)
 
 
-def _aft_genes(wing: Wing, strength: float, _: Values) -> dict[str, float]:
-    return {"mass_offset.distance": strength * _mean_chord(wing)}
-
-
 def _mean_chord(wing: Wing) -> float:
     y = [station.y for station in wing.stations]
     return float(np.trapezoid([station.chord for station in wing.stations], y)) / (y[-1] - y[0])
@@ -154,8 +150,8 @@ LISTED_STRUCTURE = (
     ),
     Kind(
         "mass_offset", "inertia", True, "1", 0.05, 0.3,
-        "mass aft by the same fraction of every chord; the library moves it by the same distance", _aft,
-        genes=_aft_genes, before=True,
+        "mass aft by the same fraction of every chord; the library moves it by the same distance, so that no distance "
+        "is the true one: near the tip, where it acts most, it is less than at the mean chord", _aft, before=True,
     ),
     Kind(
         "tether", "structure", True, "N/m", 1.0, 20.0,

@@ -14,8 +14,6 @@ from wingfit.sim.kernels.lanes.matrices import load_matrix
 from wingfit.sim.kernels.lanes.vector import greatest, load, load0, magnitude, root, store, store0
 from wingfit.sim.kernels.laws import connector_port
 
-_EDGE = 0.02  # distance before and behind a stop over which the spring sets in, over the play
-
 
 def _law(frame: Any, moment: int) -> None:
     """Add a pin about x, free to turn by half the play, b / 2, to either side, in series with the spring of rotation.
@@ -57,7 +55,7 @@ def _wing(scene: WingScene, values: Values) -> None:
     k = np.moveaxis(scene.lanes.stiffness[:, :3], 1, 0)
     half, root = 0.5 * values["b"], ~Joints.of(scene.structure).within[:, None]
     g1, g2 = 0.5 * (k[2] + k[0] - k[1]), 0.5 * (k[0] + k[1] - k[2])
-    scene.add_connector_law(_law, [root.astype(float), half, 2 * _EDGE * half, g1, g2])
+    scene.add_connector_law(_law, [root.astype(float), half, values["edge"] * values["b"], g1, g2])
 
 
 EFFECT = Effect(
@@ -66,6 +64,13 @@ EFFECT = Effect(
     family="actuation",
     port="connector",
     size=(Parameter("b", "rad", 0.0, 0.12, 0.015, "full angle about x through which the wing turns freely"),),
+    shape=(
+        Parameter(
+            "edge", "1", 0.02, 0.25, 0.02,
+            "how soft the stops are: distance before and behind one over which the spring sets in, as a fraction of b",
+            scale="log",
+        ),
+    ),
     power="conservative",
     law="M_x = 0                                    |phi| < b / 2\nM_x = -r sin(phi - sign(phi) b / 2)        beyond",
     source="Dubowsky and Freudenstein (1971), Journal of Engineering for Industry 93, 305, and Nordin and Gutman "
@@ -74,4 +79,4 @@ EFFECT = Effect(
     "the size of the jump does not depend on the load",
     confused_with=("stroke_amplitude", "compliant_drive"),
     wing=_wing,
-)
+)  # fmt: skip

@@ -34,16 +34,16 @@ def board() -> Structure:
     return build(plank(), Division((1,)))
 
 
-def with_play(b: float, stiffness: Array, damping: float = 0.0, beside: str = "") -> Lanes:
+def with_play(b: float, stiffness: Array, damping: float = 0.0, beside: str = "", edge: float = EDGE) -> Lanes:
     """A plank of one body, held by two rods of this ``stiffness`` [6] and ``damping`` (N m s/rad) about x each.
 
-    ``beside``: another effect, as it is typical.
+    ``beside``: another effect, as it is typical; ``edge``: of the stops, over the play.
     """
     scene = WingScene.of(board(), AIR, loaded(board(), {}))
     scene.lanes.stiffness[:] = stiffness[:, None]
     scene.lanes.damping[:] = 0.0
     scene.lanes.damping[:, 0] = damping
-    for name, values in ((beside, {}), ("backlash", {"b": b})):
+    for name, values in ((beside, {}), ("backlash", {"b": b, "edge": edge})):
         if name and values.get("b") != 0.0:
             act = EFFECTS[name].wing
             assert act is not None
@@ -59,12 +59,12 @@ class Held(NamedTuple):
     added: Array  # stiffness [6] that the play adds to one of them
 
 
-def held(b: float, turn: Array, beside: str = "", memory: float = 0.0) -> Held:
+def held(b: float, turn: Array, beside: str = "", memory: float = 0.0, edge: float = EDGE) -> Held:
     """The plank turned by the rotation vector ``turn`` about its root, where the rods hold it.
 
     ``memory``: all states of the effect ``beside``.
     """
-    structure, lanes = board(), with_play(b, STIFFNESS, beside=beside)
+    structure, lanes = board(), with_play(b, STIFFNESS, beside=beside, edge=edge)
     here, state = vacuum_here(1e-3), at_rest(structure)
     work = new_work(structure.wiring, here, lanes)
     R = Rotation.from_rotvec(turn)
@@ -92,6 +92,23 @@ def test_moment_over_angle_is_zero_within_the_play_and_the_springs_beyond(sign: 
         expected = -sign * 2 * STIFFNESS[0] * np.sin(phi - 0.5 * B)
         assert held(B, sign * phi * x).moment[0] == pytest.approx(expected, rel=2e-3)
         assert abs(expected) < abs(held(0.0, sign * phi * x).moment[0])
+
+
+@pytest.mark.parametrize("soft", [0.01, 0.03, 0.06])
+def test_an_edge_describes_stops_of_another_soft_law(soft: float) -> None:
+    """Of log(1 + exp) with the width ``soft`` b, closer than sharp stops of the same play.
+
+    An edge of pi soft has the same variance of the stiffness about the stop: edge^2 / 3 of a uniform distribution, and
+    (pi soft)^2 / 3 of the logistic one.
+    """
+    apart = {}
+    for edge in (EDGE, np.pi * soft):
+        moments = [held(B, np.array([phi, 0.0, 0.0]), edge=edge).moment[0] for phi in np.linspace(0.2, 0.8, 25) * B]
+        apart[edge] = np.array(moments) / (-2 * STIFFNESS[0] * B)
+    beyond = soft * np.log1p(np.exp((np.linspace(0.2, 0.8, 25) - 0.5) / soft))
+    if soft > EDGE:
+        assert np.abs(apart[np.pi * soft] - beyond).max() < np.abs(apart[EDGE] - beyond).max() / 4
+    assert np.abs(apart[np.pi * soft] - beyond).max() < 0.12 * soft
 
 
 @pytest.mark.parametrize("beside", ["viscoelastic", "hysteresis", "cubic_stiffness", "rod_slip", "damage"])
