@@ -68,11 +68,7 @@ class DetectionStore:
             self._write()
 
     def finish(self, bad: Iterable[int], ended: int | None) -> None:
-<<<<<<< HEAD
-        """Write the rest; ``ended`` is the frame at which the film ends, if its container states more."""
-=======
         """Write the last block; ``ended`` is the frame at which the film ends, if its container states more."""
->>>>>>> hour
         self.bad_frames.extend(bad)
         self._write()
         (self._folder / _COMPLETE).write_text("" if ended is None else str(ended))
