@@ -1,4 +1,4 @@
-"""Gaps between chequers are told from chequers by the direction of their bright squares on the wing."""
+"""Gaps between chequers differ from chequers in the direction of their bright squares on the wing."""
 
 from __future__ import annotations
 
