@@ -28,6 +28,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import IO, Any, BinaryIO, NoReturn
 
+import numpy as np
+
 from wingfit.records.errors import DatasetError, Fault, fail
 from wingfit.records.limits import MAX_UPLOADED_NETCDF_VALUES, MAX_VALUES, MIB
 
@@ -211,6 +213,7 @@ def confine(arguments: Sequence[str], prepare: Callable[[], Convert], smaller: s
     _limit(resource.RLIMIT_FSIZE, limits.output_mib * MIB)
     _limit(resource.RLIMIT_NOFILE, FILES_OPEN)
     convert = prepare()
+    np.linalg.eigvalsh(np.ones((64, 64)))  # OpenBLAS takes its memory at the first large product, and exits without it
     if sys.platform == "linux":  # elsewhere the limit does not exist, or the present size is unknown
         _limit(resource.RLIMIT_AS, _address_space() + limits.memory_mib * MIB)
     try:
