@@ -87,11 +87,16 @@ class _Reader:
         if not 2 <= len(films) <= MOST_CAMERAS:
             where = self.document.where(("films",))
             raise fail(where, len(films), f"{len(films)} films; tracks in space take 2 to {MOST_CAMERAS} cameras")
-        found = {}
+        found = dict[str, Film]()
         for name in films:
             mapping_at(self.document, ("films", name), ("path",), ("rate_hz",))
             rate = self._number(("films", name, "rate_hz"), 1e-3, 1e6, 0.0)
-            found[name] = Film(self._file(("films", name, "path")), rate or None)
+            film = Film(self._file(("films", name, "path")), rate or None)
+            same = next((other for other, one in found.items() if one.path.resolve() == film.path.resolve()), None)
+            if same is not None:
+                where = self.document.where(("films", name, "path"))
+                raise fail(where, str(film.path), f"is the film of camera {same!r} too; each camera has its own film")
+            found[name] = film
         return found
 
     def _places(self, markers: Mapping[str, Any]) -> tuple[tuple[str, ...], Array | None]:

@@ -294,6 +294,7 @@ def _empty_recording(
         forces=forces,
         values=values,
         standard_deviation=None,
+        noise_correlation=None,
     )
 
 

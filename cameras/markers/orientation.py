@@ -83,7 +83,7 @@ def between_markers(directions: Float[Array, "T C K"]) -> Mask:
 
 def _groups(plane: Float[Array, "K 2"]) -> tuple[Index, Float[Array, "K 2 N"]]:
     """Return the markers [K, N] around each one, and the inverse of their differences of place from their mean."""
-    count = min(_NEIGHBOURS + 1, len(plane))
+    count = min(_NEIGHBOURS + 1, int(np.isfinite(plane).all(axis=1).sum()))
     apart = np.linalg.norm(plane[:, None] - plane[None], axis=2)
     groups = np.argsort(np.nan_to_num(apart, nan=np.inf), axis=1, kind="stable")[:, :count]
     inverse = np.full((len(plane), 2, count), np.nan)

@@ -5,9 +5,12 @@ A block is written as a whole, so that a run that is interrupted leaves whole bl
 
 from __future__ import annotations
 
+import os
+import threading
 import zlib
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
+from typing import BinaryIO
 from zipfile import BadZipFile
 
 import numpy as np
@@ -58,7 +61,8 @@ class DetectionStore:
 
     def last(self) -> FlashMark | None:
         """Return where the last instant is that an earlier run wrote; None if there is none."""
-        return _mark(self._marks[-1][-1]) if self._marks and len(self._marks[-1]) else None
+        rows = next((marks for marks in reversed(self._marks) if len(marks)), None)
+        return None if rows is None else _mark(rows[-1])
 
     def add(self, mark: FlashMark, seen: Detections, bad: Iterable[int]) -> None:
         """Add the next instant, and the numbers of the ``bad`` frames before it."""
@@ -70,8 +74,9 @@ class DetectionStore:
     def finish(self, bad: Iterable[int], ended: int | None) -> None:
         """Write the last block; ``ended`` is the frame at which the film ends, if its container states more."""
         self.bad_frames.extend(bad)
-        self._write()
-        (self._folder / _COMPLETE).write_text("" if ended is None else str(ended))
+        if self._fresh or len(self.bad_frames) > self._bad_kept:
+            self._write()
+        self._whole(self._folder / _COMPLETE, lambda to: to.write(("" if ended is None else str(ended)).encode()))
 
     def marks(self) -> Computed[FlashMark]:
         """Return where the instants are."""
@@ -99,23 +104,29 @@ class DetectionStore:
 
     def _write(self) -> None:
         file = self._file(len(self._counts))
-        part = file.with_suffix(".part")
         whole = joined([seen for _, seen in self._fresh])
         marks = np.array([(one.frame, one.split, *one.between) for one, _ in self._fresh]).reshape(-1, 4)
-        bad = np.array(self.bad_frames[self._bad_kept :], dtype=int)
-        with part.open("wb") as to:
-            np.savez_compressed(
-                to,
-                allow_pickle=False,
-                counts=np.array([len(seen) for _, seen in self._fresh], dtype=int),
-                marks=marks,
-                bad=bad,
-                **{name: getattr(whole, name) for name in FIELDS},
-            )
-        part.replace(file)
+        arrays = {
+            "counts": np.array([len(seen) for _, seen in self._fresh], dtype=int),
+            "marks": marks,
+            "bad": np.array(self.bad_frames[self._bad_kept :], dtype=int),
+            **{name: getattr(whole, name) for name in FIELDS},
+        }
+        self._whole(file, lambda to: np.savez_compressed(to, allow_pickle=False, **arrays))
         self._counts.append(len(marks))
         self._marks.append(marks)
         self._fresh, self._bad_kept = [], len(self.bad_frames)
+
+    def _whole(self, file: Path, write: Callable[[BinaryIO], object]) -> None:
+        """Write a ``file`` of which no part is ever read, even if two runs write it at once."""
+        part = file.with_suffix(f".{os.getpid()}-{threading.get_ident()}.part")
+        try:
+            with part.open("wb") as to:
+                write(to)
+            part.replace(file)
+        except OSError as error:
+            remedy = "free the disk, or choose another folder for what is detected (--store, TMPDIR)"
+            raise fail(str(self._folder), None, f"cannot be written ({error.strerror or error}): {remedy}") from error
 
     def _block(self, number: int) -> list[Detections]:
         """Return the detections of the instants of one block."""

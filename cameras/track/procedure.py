@@ -44,6 +44,7 @@ MOST_PLACES = 20_000_000  # instants times markers
 Names = tuple[str, ...]
 Places = Float[Array, "K 3"]
 _JUMP = 0.05  # of the distance between neighbouring markers
+_SHOWN = 12  # instants of which the points are counted for a message
 _UNLIKELY = 15.1  # chi-square with one degree of freedom, 99.99 %
 
 
@@ -116,7 +117,7 @@ def _tracked(request: Request, films: Sequence[Frames], found: Sequence[FilmDete
     surface, progress = surface_of(reference), lambda done, of: report("following", done / of)
     followed = follow(clouds, reference, surface, progress, starts, request.cameras)
     if followed is None:
-        most = max(len(cloud) for cloud in clouds)
+        most = max(len(clouds[at]) for at in np.unique(np.linspace(0, len(clouds) - 1, _SHOWN).astype(int)))
         raise fail(
             "markers",
             most,

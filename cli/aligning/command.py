@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -83,6 +84,10 @@ def align(
 
     targets = _targets(output, tracks, force=force)
     _check_covariances(covariance or [], targets, len(tracks), axes, force=force)
+    for option, given in (("--cameras", cameras), ("--covariance", covariance)):
+        if given and body:
+            message = "belongs to cameras that stand still in the frame of the wing; with --body, they do not"
+            raise typer.BadParameter(message, param_hint=option)
     try:
         poses = _poses(cameras)
         with late_progress("aligning") as report:
@@ -125,8 +130,20 @@ def _poses(file: Path | None) -> tuple[CameraPose, ...]:
     if file is None:
         return ()
     from wingfit.cameras.files.read import read_cameras  # imported late, as above
+    from wingfit.records.description.camera_file import LEAST_CAMERAS, MOST_CAMERAS
+    from wingfit.records.description.fields import NAME_PATTERN
+    from wingfit.records.errors import fail
 
-    return tuple(camera.pose for camera in read_cameras(file).cameras)
+    found = tuple(camera.pose for camera in read_cameras(file).cameras)
+    if not LEAST_CAMERAS <= len(found) <= MOST_CAMERAS:
+        counts = f"{len(found)} cameras; a dataset has {LEAST_CAMERAS} to {MOST_CAMERAS}"
+        raise fail(str(file), len(found), f"{counts}: leave those in the file that filmed the wing")
+    for one in found:
+        if not re.fullmatch(NAME_PATTERN, one.name):
+            raise fail(
+                str(file), one.name, f"camera {one.name!r}: a dataset takes letters, digits, '.', '_', '-'; rename it"
+            )
+    return found
 
 
 def _targets(output: Path | None, tracks: list[Path], *, force: bool) -> list[Path]:

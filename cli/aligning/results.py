@@ -36,7 +36,7 @@ def show(found: AlignedTracks, cameras: Sequence[CameraPose] = (), *, is_true: b
     if cameras:
         say("for the dataset: cameras:")
         for one in cameras_of(found, cameras):
-            say(f"- {{{', '.join(f'{key}: {value}' for key, value in one.items())}}}")
+            say(f"- {{{', '.join(f'{key}: {_plain(value)}' for key, value in one.items())}}}")
     say(f"side: {found.side}, {_evidence(found.side_evidence)}")
     where = "on the clock of the cameras" if is_true else "as it appears in the frames"
     period = f"{number(found.flap_frequency, 7)} Hz {where}"
@@ -58,6 +58,10 @@ def show(found: AlignedTracks, cameras: Sequence[CameraPose] = (), *, is_true: b
     if found.lost_samples:
         say(f"samples near no marker, left out: {found.lost_samples}")
     remarks(f"{found.file}: {one}" for one in found.remarks)
+
+
+def _plain(value: object) -> str:
+    return f'"{value}"' if isinstance(value, str) else str(value)
 
 
 def cameras_of(found: AlignedTracks, cameras: Sequence[CameraPose]) -> list[dict[str, object]]:

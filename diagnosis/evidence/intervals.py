@@ -40,13 +40,20 @@ def covariance(data: WhitenedData, fit: Fit) -> Float[Array, "F F"]:
         scores = weight * np.array([slopes[part].T @ white[part] for part in data.recording_slices])
         scores -= scores.mean(axis=0)
         meat = meat + recordings / (recordings - 1.0) * scores.T @ scores
-    found = bread @ meat @ bread
-    if data.kind == "tracks" and recordings > 1:
-        found = found + (1.0 - weight) * _jackknife(data, white, slopes, weight)
+    found = bread @ meat @ bread + disagreement(data, fit)
     if data.rigid_errors is not None:
         moves = bread @ (weight * slopes.T @ data.whitened_slopes(data.rigid_errors))
         found = found + moves @ moves.T
     return np.asarray(found)
+
+
+def disagreement(data: WhitenedData, fit: Fit) -> Float[Array, "F F"]:
+    """Return the part of :func:`covariance` [F, F] that recordings of tracks show by their disagreement."""
+    if data.kind != "tracks" or len(data.recordings) < 2:
+        return np.zeros((len(fit.unit), len(fit.unit)))
+    weight = min(data.likelihood_weight(fit.coefficients), data.max_likelihood_weight)
+    white, slopes = data.whiten(fit.coefficients), data.whitened_slopes(fit.jacobian)
+    return (1.0 - weight) * _jackknife(data, white, slopes, weight)
 
 
 def _jackknife(data: WhitenedData, white: Array, slopes: Float[Array, "D F"], weight: float) -> Float[Array, "F F"]:
@@ -71,14 +78,26 @@ def _clustered(data: WhitenedData) -> bool:
 
 def gene_values(data: WhitenedData, refit: Refit) -> tuple[GeneValue, ...]:
     """Return values and 90 % intervals of all free genes; ``off`` is 0 for a size gene of an added suspect."""
-    fit, errors = refit.fit, np.sqrt(np.diag(covariance(data, refit.fit)))
-    freedom = max(len(data.recordings) - 1, 1) if _clustered(data) else np.inf
-    wide = standard_errors(freedom)
+    fit, variances = refit.fit, np.diag(covariance(data, refit.fit))
+    errors = np.sqrt(variances)
+    wide = [standard_errors(one) for one in _freedom(data, fit, variances)]
     off = {name: 0.0 for trial in refit.trials for name in trial.suspect.size_genes}
     found = []
-    for gene, unit, error in zip(free_genes(fit.problem), fit.unit, errors, strict=True):
-        low, high = unit - wide * error, unit + wide * error
+    for gene, unit, error in zip(free_genes(fit.problem), fit.unit, wide * errors, strict=True):
+        low, high = unit - error, unit + error
         ends = [float(gene.from_unit(x)) if 0.0 <= x <= 1.0 else None for x in (low, high)]
         value = Interval(float(gene.from_unit(unit)), ends[0], ends[1])
         found.append(GeneValue(gene.name, gene.unit, gene.description, value, off.get(gene.name)))
     return tuple(found)
+
+
+def _freedom(data: WhitenedData, fit: Fit, variances: Float[Array, " F"]) -> Float[Array, " F"]:
+    """Return the degrees of freedom of the ``variances`` [F] of genes: few recordings show a disagreement roughly.
+
+    The parts of a variance that are known have infinitely many (Satterthwaite 1946).
+    """
+    recordings = max(len(data.recordings) - 1, 1)
+    if _clustered(data):
+        return np.full(len(variances), float(recordings))
+    own = np.maximum(np.diag(disagreement(data, fit)), np.finfo(float).tiny)
+    return np.asarray(np.minimum(recordings * (variances / own) ** 2, 1e9))

@@ -36,6 +36,9 @@ class CameraFile(fields.Strict):
     focal_px: _Focal
 
 
+LEAST_APART = 0.001  # m, between two cameras: those at one place do not see depth
+
+
 def faults_of_cameras(
     cameras: Sequence[CameraFile], markers: Sequence[tuple[str, Float[Array, " 3"]]]
 ) -> Iterator[tuple[Path, object, str]]:
@@ -45,6 +48,15 @@ def faults_of_cameras(
         here: Path = ("cameras", index)
         if camera.name in names[:index]:
             yield (*here, "name"), camera.name, used_twice(camera.name)
+        centre = np.array(camera.centre_m, float)
+        for other in cameras[:index]:
+            apart = float(np.linalg.norm(centre - np.array(other.centre_m, float)))
+            if apart < LEAST_APART:
+                message = (
+                    f"camera {camera.name!r} is {apart:.2g} m from {other.name!r}; two cameras that see depth are at "
+                    f"least {LEAST_APART:g} m apart: check centre_m, or remove one"
+                )
+                yield (*here, "centre_m"), camera.name, message
         axes = np.array(camera.rotation, float)
         worst = float(np.abs(axes @ axes.T - np.eye(3)).max())
         if worst > ROUNDING:

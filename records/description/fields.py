@@ -13,10 +13,11 @@ from wingfit.records.limits import MAX_ESTIMATES, MAX_HARMONICS
 
 METRES = "give metres: 0.22, not 220 or 22"
 
+NAME_PATTERN = "[A-Za-z0-9](?:[A-Za-z0-9._-]*[A-Za-z0-9_-])?"
 Name = Annotated[
     str,
     text(
-        "[A-Za-z0-9](?:[A-Za-z0-9._-]*[A-Za-z0-9_-])?",
+        NAME_PATTERN,
         100,
         "name",
         "a name has letters, digits, '.', '_', '-'; it starts with a letter or digit, ends without '.'",

@@ -72,6 +72,7 @@ def test_cameras_without_film_are_left_out_with_their_covariance(film: Path) -> 
         ("version: 1", "version: 2", ["'wingfit film 2' is not"]),
         ("path: left,", "path: lefft,", ["line 6", "there is no", "lefft", "paths count from the folder of film.yaml"]),
         ("{path: left, rate_hz: 100}", "left", ["line 6", "is no mapping with the keys path, rate_hz"]),
+        ("{path: right,", "{path: left,", ["line 7", "is the film of camera 'left' too"]),
         ("path: left,", "path: 7,", ["line 6", "7 is no path; state that of a file or folder"]),
         ("cameras.yaml", "other.yaml", ["line 3", "there is no", "other.yaml"]),
         ("  right: {path: right, rate_hz: 100}\n", "", ["line 5", "1 films", "2 to 8 cameras"]),

@@ -13,6 +13,7 @@ from tests.command_line import in_process
 from tests.tracking.alignment.recorded import ROBIRD, TURN, filmed
 from wingfit import DatasetError, align_tracks, load_dataset, marker_noise
 from wingfit.cli.main import app
+from wingfit.inference.noise.stated import correlation_matrices
 from wingfit.records import Dataset
 from wingfit.records.array_types import Array
 from wingfit.records.files.table import write_table
@@ -92,6 +93,18 @@ def test_other_files_are_refused(aligned: tuple[AlignedTracks, bool], tmp_path: 
         assert "wingfit track --covariance" in str(caught.value)
 
 
+def test_noise_that_is_nearly_all_along_the_line_of_sight_can_be_stated(
+    aligned: tuple[AlignedTracks, bool], tmp_path: Path
+) -> None:
+    sight = np.array([0.6, 0.0, 0.8])
+    extreme = 1e-10 * (np.eye(3) + 1e8 * np.outer(sight, sight))
+    stored = written(tmp_path / "t.npz", names=NAMES, covariance=np.tile(extreme, (5, 40, 1, 1)))
+    noise = marker_noise(aligned[0], stored)
+    found = correlation_matrices(np.round(noise.correlation, 6))
+    assert np.abs(noise.correlation).max() <= 0.9999
+    assert np.linalg.eigvalsh(found).min() > 1e-6, "as a dataset takes it"
+
+
 def test_what_the_command_writes_is_read_in_a_dataset(tmp_path: Path) -> None:
     wingfit, one = in_process(app), filmed()
     columns = [f"{name}_{axis}_m" for name in one.tracks.names for axis in "xyz"]
@@ -102,6 +115,7 @@ def test_what_the_command_writes_is_read_in_a_dataset(tmp_path: Path) -> None:
     assert wingfit(*command)[0] == 2, "nothing is written without --output"
     assert wingfit(*command, "--covariance", stored, "-o", target)[0] == 2
     assert wingfit(*command, "--axes", "body", "-o", target)[0] == 2
+    assert wingfit(*command, "--body", "t1,t2,t3", "-o", target)[0] == 2
     code, _, err = wingfit(*command, "-o", target)
     assert code == 0, err
     assert wingfit(*command, "-o", tmp_path / "other.csv")[0] == 0

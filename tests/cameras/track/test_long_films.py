@@ -100,6 +100,33 @@ def test_detections_that_were_stored_are_read_block_by_block(tmp_path: Path) -> 
     assert 0 < most <= 6 * BLOCK
 
 
+def test_a_film_that_ends_with_a_block_goes_on_where_it_stopped(tmp_path: Path) -> None:
+    """Interrupted between its last block and the mark that it is complete, with bad frames behind that block."""
+    seen, _ = filmed(0.0, 1)
+    store = DetectionStore(tmp_path)
+    for number in range(BLOCK):
+        store.add(FlashMark(number, 0.5, (-np.inf, 2.0)), seen[0], ())
+    store.finish((BLOCK,), None)
+    (tmp_path / "complete").unlink()
+    again = DetectionStore(tmp_path)
+    assert not again.complete
+    last = again.last()
+    assert last is not None
+    assert last.frame == BLOCK - 1
+    again.finish((), 60)
+    assert (len(DetectionStore(tmp_path).marks()), DetectionStore(tmp_path).ended) == (BLOCK, 60)
+    assert sorted(one.name for one in tmp_path.iterdir()) == ["000000.npz", "000001.npz", "complete"]
+
+
+def test_a_store_that_cannot_be_written_says_what_to_do(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "replace", full)
+    with pytest.raises(DatasetError, match=r"No space left on device.*free the disk.*--store, TMPDIR"):
+        DetectionStore(tmp_path).finish((3,), None)
+
+
 def _alive() -> int:
     return sum(isinstance(one, Detections) for one in gc.get_objects())
 

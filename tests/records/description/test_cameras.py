@@ -50,6 +50,7 @@ def turned(axes: np.ndarray) -> CameraPose:
         ((LEFT, replace(RIGHT, centre=(0.03, 0.25, 0.0))), ["cannot see marker", "0.01 m", "centre_m"]),
         ((LEFT, replace(RIGHT, centre=(0.1, float("nan"), 1.4))), ["centre_m", "finite number"]),
         ((LEFT, replace(RIGHT, focal_px=float("inf"))), ["focal_px", "finite number"]),
+        ((LEFT, replace(LEFT, name="copy")), ["[1].centre_m", "'copy' is 0 m from 'left'", "remove one"]),
         ((LEFT, replace(RIGHT, focal_px=0.0)), ["focal_px", "px"]),
         ((LEFT, replace(RIGHT, centre=(0.1, 0.6, 1400.0))), ["centre_m", "1400", "[-1000, 1000] m", "metres"]),
     ],
