@@ -99,5 +99,5 @@ def _freedom(data: WhitenedData, fit: Fit, variances: Float[Array, " F"]) -> Flo
     recordings = max(len(data.recordings) - 1, 1)
     if _clustered(data):
         return np.full(len(variances), float(recordings))
-    own = np.maximum(np.diag(disagreement(data, fit)), np.finfo(float).tiny)
-    return np.asarray(np.minimum(recordings * (variances / own) ** 2, 1e9))
+    share = np.diag(disagreement(data, fit)) / variances
+    return np.asarray(recordings / np.maximum(share, 1e-6) ** 2)

@@ -124,6 +124,7 @@ def test_nothing_that_was_sent_or_stored_is_unpickled_or_executed() -> None:
         ("workers/ray_cluster.py", "pickle.loads"),  # from the process that owns the worker
         ("workers/processes.py", "pickle.loads"),  # what it wrote itself
         ("sim/kernels/lanes/vector.py", "exec"),  # a text of its own, when it is imported
+        ("tracking/marker_noise.py", "np.load"),  # arrays alone: with allow_pickle=False; on the command line
     }
 
 
