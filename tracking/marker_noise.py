@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from wingfit.records.array_types import Array, Float
+from wingfit.records.description.yaml_text import write_yaml
 from wingfit.records.errors import DatasetError, check_most, fail, nearest
 from wingfit.tracking.alignment.result import AlignedTracks
 
@@ -36,14 +37,10 @@ class MarkerNoise:
 
     def yaml(self) -> str:
         """Return the keys ``standard_deviation_m`` and ``noise_correlation`` of a recording in ``dataset.yaml``."""
-        sizes = [
-            f"  {name}: [{', '.join(f'{v:.4g}' for v in row)}]" for name, row in self._rows(self.standard_deviation)
-        ]
-        pairs = [f"  {name}: [{', '.join(f'{v:.6f}' for v in row)}]" for name, row in self._rows(self.correlation)]
-        return "\n".join(["standard_deviation_m:", *sizes, "noise_correlation:", *pairs, ""])
-
-    def _rows(self, values: Float[Array, "N 3"]) -> list[tuple[str, list[float]]]:
-        return list(zip(self.markers, values.tolist(), strict=True))
+        sizes = [[float(f"{value:.4g}") for value in row] for row in self.standard_deviation.tolist()]
+        pairs = [[round(value, 6) for value in row] for row in self.correlation.tolist()]
+        data = {"standard_deviation_m": sizes, "noise_correlation": pairs}
+        return write_yaml({key: dict(zip(self.markers, rows, strict=True)) for key, rows in data.items()})
 
 
 def marker_noise(aligned: AlignedTracks, covariance: str | PathLike[str]) -> MarkerNoise:

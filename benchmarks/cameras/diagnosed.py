@@ -1,4 +1,4 @@
-"""Diagnoses of wings from films alone: of a displaced hinge, and of lenses whose distortion the calibration lacks."""
+"""Diagnoses of wings from films alone: of a displaced hinge, and of lenses whose distortion is not calibrated."""
 
 from __future__ import annotations
 

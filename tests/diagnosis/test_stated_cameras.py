@@ -21,7 +21,7 @@ PLACES = ("x", "y", "distance", "base")
 
 
 def through_lenses(points: Array, k1: float) -> Array:
-    """Points [..., 3] as cameras see them through a barrel that their calibration lacks, by linear triangulation."""
+    """Points [..., 3] as cameras see them through a barrel that is not calibrated, by linear triangulation."""
     rows, sides = [], []
     for camera in falcon_cameras():
         axes, centre = np.array(camera.rotation), np.array(camera.centre)
@@ -44,7 +44,7 @@ def distorted(dataset: Dataset) -> Dataset:
     return replace(dataset, recordings=recordings, cameras=falcon_cameras())
 
 
-def test_a_distortion_that_the_calibration_lacks_is_named_with_its_size() -> None:
+def test_a_distortion_that_the_calibration_leaves_out_is_named_with_its_size() -> None:
     spec = DiagnosisSpec(CalibrationSpec(division="4"), suspects=("lens_distortion", "scale_error", "hinge_offset"))
     *_, last = diagnose(distorted(described(0.0)), spec, InProcessEvaluator())
     finding = last.finding

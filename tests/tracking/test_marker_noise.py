@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -60,6 +61,8 @@ def test_the_covariance_turns_with_the_axes_and_mirrors_with_a_left_wing(
     parsed = yaml.safe_load(noise.yaml())
     assert set(parsed) == {"standard_deviation_m", "noise_correlation"}
     np.testing.assert_allclose(list(parsed["noise_correlation"].values()), noise.correlation, atol=1e-6)
+    numbered = replace(noise, markers=tuple(str(number) for number in range(40)))
+    assert list(yaml.safe_load(numbered.yaml())["standard_deviation_m"]) == list(numbered.markers), "names stay text"
 
 
 @pytest.mark.parametrize(
