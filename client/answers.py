@@ -154,6 +154,7 @@ class Dataset(TypedDict):
     sha256: str
     size_bytes: int
     markers: int
+    notes: str
     rig: RigInfo | None
     recordings: list[RecordingInfo]
     warnings: list[DatasetWarning]
@@ -236,6 +237,7 @@ class Job(TypedDict):
     error: str | None
     rig: str | None
     driven: bool
+    notes: str
 
 
 class Run(Job):
