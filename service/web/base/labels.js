@@ -1,6 +1,6 @@
 // Labels of settings, and differences between runs on tracked markers, on forces, and on series of a rig of the user's own.
 
-import { forceUnit, mm, rounded, significant } from "./format.js";
+import { el, forceUnit, mm, rounded, significant } from "./format.js";
 
 export const isForces = (thing) => thing?.kind === "forces";
 export const isSeries = (thing) => thing?.kind === "series";
@@ -39,6 +39,15 @@ export const recordingOptions = ({ recordings }) =>
 export function modelOf(run) {
   if (isSeries(run)) return run.rig;
   return isForces(run) ? SHORT[run.spec.preset] ?? spoken(run.spec.preset) : `${run.spec.division} bodies`;
+}
+
+// How the model of a job fits: "good 1.1", with the larger one of its misfits as multiples of the noise; null if not known.
+export function fitBadge(job) {
+  const { fit_badge: fit = null, residual_over_noise: fitted = null, held_out_over_noise: heldOut = null } = job;
+  if (fit === null) return null;
+  const worst = Math.max(fitted ?? 0, heldOut ?? 0);
+  const title = `Residual ${rounded(fitted, 2)} times the noise${heldOut === null ? "" : `, held out ${rounded(heldOut, 2)} times`}`;
+  return el("span", { className: `badge fit-${fit}`, title }, worst ? `${fit} ${rounded(worst, 2)}` : fit);
 }
 
 export const modelInWords = (job) => (isSeries(job) ? `rig ${job.rig}` : modelOf(job));

@@ -1,10 +1,11 @@
 // The selected diagnosis: its progress, then its report as the server draws it.
 
-import { call, follow, get, getText, isFinal, part, postJson } from "../base/api.js";
+import { follow, get, getText, isFinal, part, postJson } from "../base/api.js";
 import { $, plural, toast, when } from "../base/format.js";
+import { showNotes } from "../lists/edit.js";
 import { showWaiting } from "../parts/driving.js";
 import { badge, setBar, timeLeft } from "../parts/sidebar.js";
-import { randomKey, remove } from "./submit.js";
+import { cancel, randomKey, remove } from "./submit.js";
 import { forceSetup, isForces, modelInWords, withEffects } from "../base/labels.js";
 
 let diagnosis = null;
@@ -75,6 +76,10 @@ function update() {
   $("diagnosis-name").replaceChildren(diagnosis.name, " ", badge(diagnosis));
   $("diagnosis-about").textContent = [modelInWords(diagnosis), withEffects(diagnosis), ...(isForces(diagnosis) ? forceSetup(diagnosis.spec) : []),
     diagnosis.run_id ? "from the best genome of a run" : null, when(diagnosis.created_at)].filter(Boolean).join(" · ");
+  showNotes($("diagnosis-name"), "diagnoses", diagnosis, ({ name, notes }) => {
+    diagnosis = { ...diagnosis, name, notes };
+    update();
+  });
   $("diagnosis-error").hidden = !diagnosis.error;
   $("diagnosis-error").textContent = diagnosis.error ?? "";
   showWaiting($("diagnosis-waiting"), diagnosis);
@@ -119,5 +124,5 @@ async function act(action) {
     if (await remove("diagnoses", diagnosis.id, diagnosis.name)) hooks.onDeleted();
     return;
   }
-  await call("POST", `diagnoses/${part(diagnosis.id)}/${action}`).catch((error) => toast(error.message));
+  if (action === "cancel") await cancel("diagnoses", diagnosis.id, diagnosis.name);
 }
