@@ -19,7 +19,7 @@ TEXT = "document.getElementById('{}').textContent"
 @pytest.fixture(scope="module")
 def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ServerProcess]:
     data = tmp_path_factory.mktemp("page") / "data"
-    with ServerProcess(data, ("tests.service.toy_server", "0.4")) as process:
+    with ServerProcess(data, ("tests.service.toy_server", "0.6")) as process:
         yield process
 
 
