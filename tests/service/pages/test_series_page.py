@@ -144,8 +144,8 @@ def test_many_channels_and_samples_are_drawn_a_few_at_a_time(seen: Seen, api: Ap
 
 
 def test_the_panel_says_how_to_simulate(seen: Seen, api: Api, decay: str) -> None:
-    seen.show("")
     for button in ("run", "diagnose"):
+        seen.show("")
         seen.page.click(f"[data-key={button}-{decay}]")
         seen.wait(f"location.hash === '#dataset={decay}' && document.activeElement.id === 'simulate-title'")
         assert not seen.page.evaluate("document.getElementById('submit-dialog').open")

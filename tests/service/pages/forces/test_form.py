@@ -25,6 +25,7 @@ def test_a_live_run_on_forces_grows_and_is_cancelled(seen: Seen, api: Api, datas
     item = api.history(run_id)[2]
     assert (best, mean) == pytest.approx((item["best"], item["mean"]))
     seen.page.click("[data-action=cancel]")
+    seen.page.click("#confirm-yes")
     seen.wait("document.querySelector('#run-name .badge').textContent === 'cancelled'", 30)
     assert seen.errors == []
 
