@@ -16,6 +16,7 @@ from wingfit.client.load_answers import Outputs
 
 State = Literal["QUEUED", "RUNNING", "PAUSED", "SUCCEEDED", "FAILED", "CANCELLED"]
 Kind = Literal["tracks", "forces", "series"]
+FitBadge = Literal["good", "doubtful", "wrong"]
 FINAL: frozenset[str] = frozenset({"SUCCEEDED", "FAILED", "CANCELLED"})
 Point = Annotated[list[float | None], Len(3, 3)]
 Item = TypeVar("Item")
@@ -218,7 +219,8 @@ class Job(TypedDict):
     ``stage`` names the present step, null before the first; ``progress`` lies in [0, 1]; ``eta_seconds`` estimates the
     remaining time; ``evaluations`` counts evaluated individuals (of equal ones each counts, and one is simulated);
     ``error`` says why the job failed, else null. Of a job on series, ``rig`` names the simulation, and ``driven`` says
-    whether its user simulates it ('wingfit drive'); such a job is QUEUED while no driver serves it.
+    whether its user simulates it ('wingfit drive'); such a job is QUEUED while no driver serves it. After success,
+    the misfits as multiples of the noise, and ``fit_badge``: ``good`` up to 1.3, ``doubtful`` up to 3, else ``wrong``.
     """
 
     id: str
@@ -236,6 +238,9 @@ class Job(TypedDict):
     error: str | None
     rig: str | None
     driven: bool
+    residual_over_noise: float | None
+    held_out_over_noise: float | None
+    fit_badge: FitBadge | None
 
 
 class Run(Job):

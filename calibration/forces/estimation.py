@@ -119,6 +119,7 @@ def summarise_forces(
         after=_rms(fitted, ("local", "joint")) or np.nan,
         held_out_before=_rms(held_out, ("nominal",)),
         held_out_after=_rms(held_out, ("global", "joint", "average")),
+        noise=_noise(everywhere),
         remarks=tuple(dict.fromkeys((*remarks, *warnings))),
     )
 
@@ -278,7 +279,7 @@ def _misfit_remark(judged: _Judged, everywhere: list[_Compared]) -> str | None:
     left = _rms(mine, ("local", "joint"))
     if left is None:
         return None
-    noise = np.sqrt(np.average([(c.scatter or 0.0) ** 2 for c in mine], weights=[c.samples for c in mine]))
+    noise = _noise(mine) or 0.0
     if left <= ADEQUATE * noise:
         return None
     ratio = f"{left / noise:.2g} times the scatter from beat to beat" if noise > 0 else "with no scatter between beats"
@@ -287,6 +288,14 @@ def _misfit_remark(judged: _Judged, everywhere: list[_Compared]) -> str | None:
         f"its motion misses physics ('wingfit effects' lists what can be added), or the search was cut short. Standard "
         f"errors assume at most {ADEQUATE:g} times the scatter, so no coefficient counts as identifiable"
     )
+
+
+def _noise(some: list[_Compared]) -> float | None:
+    """Return the RMS (N) of the noise over all samples of the recordings ``some``; None if it is known of none."""
+    known = [(one.scatter, one.samples) for one in some if one.scatter is not None and one.samples]
+    if not known:
+        return None
+    return float(np.sqrt(np.sum([scatter**2 * count for scatter, count in known]) / sum(count for _, count in known)))
 
 
 def _rms(some: list[_Compared], order: tuple[Source, ...]) -> float | None:

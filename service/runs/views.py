@@ -16,6 +16,7 @@ from wingfit.client.answers import Comparison, Numerics
 from wingfit.records import AnyDataset, Recording, Series, SeriesDataset
 from wingfit.records.array_types import Array, Mask
 from wingfit.service.answers import answer, checked
+from wingfit.service.outcomes import fit_quality
 from wingfit.service.runs.spec_views import run_settings
 from wingfit.service.storage import store
 from wingfit.service.storage.tables import DatasetRow, RunRow
@@ -133,7 +134,8 @@ def job_of(shape: type[T], values: Mapping[str, Any], spec: object) -> T:
     ``values``: its database row, column name to value; ``spec``: its settings as the answer contains them.
     """
     action = None if values["wish"] == Wish.NONE else values["wish"]
-    shown = {"rig": values["rig_name"], "driven": bool(values["driven"])}
+    shown: dict[str, Any] = {"rig": values["rig_name"], "driven": bool(values["driven"])}
+    shown["fit_badge"] = fit_quality.badge(values["residual_over_noise"], values["held_out_over_noise"])
     return checked(shape, {**values, **shown, "pending_action": action, "steps": values["generations"], "spec": spec})
 
 

@@ -32,6 +32,7 @@ from wingfit.service.storage.tables import (
     KeyRow,
     OwnedRow,
     ParsedRow,
+    PartialRow,
     RunRow,
     SimulatedRow,
     StepOfJob,
@@ -216,6 +217,19 @@ def finding(session: Session, diagnosis_id: str) -> dict[str, Any]:
     if body is None:
         message = f"diagnosis {diagnosis_id} is {row.state}; it has a finding when it has SUCCEEDED"
         raise conflict(message, state=row.state)
+    return body
+
+
+def partial_finding(session: Session, diagnosis_id: str) -> dict[str, Any]:
+    """Return what a diagnosis without a finding knows so far, as JSON.
+
+    Raises a 404, or a 409 before its nominal model has been fitted, and once it has a finding.
+    """
+    row = one(session, DiagnosisRow, diagnosis_id)
+    body: dict[str, Any] | None = session.scalar(select(PartialRow.body).where(PartialRow.diagnosis_id == diagnosis_id))
+    if body is None:
+        has = "it has a finding" if row.state == State.SUCCEEDED else "its nominal model has not been fitted"
+        raise conflict(f"diagnosis {diagnosis_id} is {row.state} and has no partial finding: {has}", state=row.state)
     return body
 
 

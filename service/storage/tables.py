@@ -152,6 +152,8 @@ class DatasetJobRow(JobRow):
         rig: of a job on series, the rig as `service.rigs.stored_rig` stores it; else None.
         rig_name, driven: its name, and whether drivers simulate it; lists of jobs do not read the rig.
         evaluations: number of evaluated individuals so far.
+        residual_over_noise, held_out_over_noise: misfit to the fitted and the held-out recordings as a multiple of the
+            noise; None if unknown, or before the job has succeeded.
     """
 
     kind: Mapped[str] = mapped_column(server_default="tracks")
@@ -160,6 +162,8 @@ class DatasetJobRow(JobRow):
     rig_name: Mapped[str | None]
     driven: Mapped[bool] = mapped_column(default=False)
     evaluations: Mapped[int] = mapped_column(default=0)
+    residual_over_noise: Mapped[float | None]
+    held_out_over_noise: Mapped[float | None]
 
     @property
     def subject(self) -> tuple[type[OwnedRow], str]:
@@ -205,6 +209,15 @@ class FindingRow(Table):
     """The finding (result as JSON) of a succeeded diagnosis; not in DiagnosisRow, because lists do not need it."""
 
     __tablename__ = "finding"
+
+    diagnosis_id: Mapped[str] = mapped_column(ForeignKey("diagnosis.id", ondelete="CASCADE"), primary_key=True)
+    body: Mapped[dict[str, Any]]
+
+
+class PartialRow(Table):
+    """What the diagnosis knew at its last stored step (a partial finding as JSON); deleted when it has its finding."""
+
+    __tablename__ = "partial"
 
     diagnosis_id: Mapped[str] = mapped_column(ForeignKey("diagnosis.id", ondelete="CASCADE"), primary_key=True)
     body: Mapped[dict[str, Any]]

@@ -29,7 +29,7 @@ def test_migrations_from_nothing_give_the_tables_that_the_code_means(tmp_path: P
     with engine.connect() as connection:
         context = MigrationContext.configure(connection, opts={"compare_type": True})
         assert compare_metadata(context, Table.metadata) == []
-        assert context.get_current_revision() == "0008"
+        assert context.get_current_revision() == "0009"
     engine.dispose()
 
 
@@ -150,6 +150,8 @@ def test_what_the_first_schema_stored_is_all_there(tmp_path: Path) -> None:
         assert (done.spec.mode, done.spec.method, done.spec.finish, done.spec.seed) == ("staged", "genetic", False, 4)
         result = valid(Result, api.get("/v1/runs/run_1/result"))
         assert (result.kind, result.after_mm) == ("tracks", 1.5)
+        noise = result.noise_mm
+        assert (done.residual_over_noise, done.fit_badge) == ((1.5 / noise, "wrong") if noise else (None, None))
         (item,) = api.history("run_1")
         assert (item["best_mm"], item["best_mn"]) == (1.5, None)
         went_on = api.finish("run_2")
