@@ -12,9 +12,10 @@ from wingfit.calibration.effects import absent, is_measured
 from wingfit.calibration.estimates.drift_remark import drift_remark
 from wingfit.calibration.estimates.likelihood import STEP, at_bounds, iterate
 from wingfit.calibration.estimates.linearised import free_genes
-from wingfit.calibration.estimates.uncertainty import Standing, Uncertainty, uncertainty
+from wingfit.calibration.estimates.uncertainty import IDENTIFIABLE, Standing, Uncertainty, uncertainty
 from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.forces.agreement import POINTS, agreements, comparison, quantities
+from wingfit.calibration.forces.disagreement import disagreement_remarks, disagreements
 from wingfit.calibration.forces.global_model import at, average, fit_global
 from wingfit.calibration.forces.result import (
     Agreement,
@@ -103,7 +104,8 @@ def summarise_forces(
         remarks = (*remarks, *warnings)
     misfits = [_misfit_remark(one, everywhere) for one in judged]
     drift = drift_remark((as_fitted(spec, recording) for recording in dataset.recordings), spec.axes)
-    remarks = (*remarks, *(remark for remark in misfits if remark), *drift, *_filtered_before(spec, dataset))
+    apart = disagreement_remarks([one.estimate for one in judged])
+    remarks = (*apart, *remarks, *(remark for remark in misfits if remark), *drift, *_filtered_before(spec, dataset))
     names = {name for one in judged for name in one.estimate.recordings}
     left_out, warnings = _left_out(model, spec, dataset, nominal, [one.estimate for one in judged]) if law else ((), ())
     fitted = [one for one in everywhere if one.recording.name in names]
@@ -348,8 +350,10 @@ def _filtered_before(spec: CalibrationSpec, dataset: Dataset) -> tuple[str, ...]
 def _genes(model: BladeElementWing, nominal: Genome, judged: list[_Judged], adequate: bool) -> tuple[GeneResult, ...]:
     """Summarise each gene over all estimates: mean value, largest standard error, whether identifiable in all of them.
 
+    Where the estimates of a gene disagree (:func:`disagreements`), its error is at least their standard deviation.
     ``adequate``: noise explains the residual of every estimate; otherwise no gene counts as identifiable.
     """
+    apart = disagreements([one.estimate for one in judged])
     best = nominal.replace(average([one.estimate for one in judged]))
     results = []
     for gene in model.genes:
@@ -360,5 +364,8 @@ def _genes(model: BladeElementWing, nominal: Genome, judged: list[_Judged], adeq
             identifiable = adequate and all(s.identifiable for s in standings) and inside
             largest, absolute = max(s.standard_error for s in standings), max(s.absolute for s in standings)
             worst = Standing(largest, identifiable, absolute)
+            if gene.name in apart and absolute < apart[gene.name]:
+                relative = largest * apart[gene.name] / absolute
+                worst = Standing(relative, identifiable and relative <= IDENTIFIABLE, apart[gene.name])
         results.append(GeneResult.of(gene, nominal[gene.name], best[gene.name], worst))
     return tuple(results)
