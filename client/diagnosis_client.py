@@ -46,9 +46,9 @@ class DiagnosisCalls(Watching):
         """Fetch the finding (result) of a diagnosis; its JSON schema is at /v1/schemas/finding."""
         return cast(dict[str, Any], self._json("GET", f"{_path(diagnosis_id)}/finding"))
 
-    def partial_finding(self, diagnosis_id: str) -> PartialFinding:
-        """Fetch what a running diagnosis knows so far; a 409 before its nominal model is fitted, and after its end."""
-        return cast(PartialFinding, self._json("GET", f"{_path(diagnosis_id)}/partial"))
+    def partial_finding(self, diagnosis_id: str) -> PartialFinding | None:
+        """Fetch what a running diagnosis knows so far; None before its nominal model is fitted, and after its end."""
+        return cast(PartialFinding | None, self._json("GET", f"{_path(diagnosis_id)}/partial"))
 
     def export_diagnosis(
         self,

@@ -107,11 +107,15 @@ def finding(service: ServiceDep, diagnosis_id: str, if_none_match: http.IfNoneMa
     return http.marked(json.dumps(finding_of(service, diagnosis_id)).encode(), http.JSON, if_none_match)
 
 
-@router.get("/{diagnosis_id}/partial", responses=http.errors(404, 409), summary="Partial finding")
-def partial(service: ServiceDep, diagnosis_id: str) -> PartialFinding:
-    """Return what a diagnosis without a finding knows: the misfit of the nominal model, and the leading hypotheses."""
+@router.get("/{diagnosis_id}/partial", responses=http.errors(404), summary="Partial finding")
+def partial(service: ServiceDep, diagnosis_id: str) -> PartialFinding | None:
+    """Return what a diagnosis without a finding knows: the misfit of the nominal model, and the leading hypotheses.
+
+    Null before its nominal model has been fitted, and once it has a finding.
+    """
     with service.database.read() as session:
-        return checked(PartialFinding, store.partial_finding(session, diagnosis_id))
+        known = store.partial_finding(session, diagnosis_id)
+    return None if known is None else checked(PartialFinding, known)
 
 
 @router.get(

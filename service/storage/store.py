@@ -220,17 +220,13 @@ def finding(session: Session, diagnosis_id: str) -> dict[str, Any]:
     return body
 
 
-def partial_finding(session: Session, diagnosis_id: str) -> dict[str, Any]:
-    """Return what a diagnosis without a finding knows so far, as JSON.
+def partial_finding(session: Session, diagnosis_id: str) -> dict[str, Any] | None:
+    """Return what a diagnosis without a finding knows so far, as JSON; raise a 404 if there is no such diagnosis.
 
-    Raises a 404, or a 409 before its nominal model has been fitted, and once it has a finding.
+    None before its nominal model has been fitted, and once it has a finding.
     """
-    row = one(session, DiagnosisRow, diagnosis_id)
-    body: dict[str, Any] | None = session.scalar(select(PartialRow.body).where(PartialRow.diagnosis_id == diagnosis_id))
-    if body is None:
-        has = "it has a finding" if row.state == State.SUCCEEDED else "its nominal model has not been fitted"
-        raise conflict(f"diagnosis {diagnosis_id} is {row.state} and has no partial finding: {has}", state=row.state)
-    return body
+    one(session, DiagnosisRow, diagnosis_id)
+    return session.scalar(select(PartialRow.body).where(PartialRow.diagnosis_id == diagnosis_id))
 
 
 def admitted(session: Session, row: JobRow, most: int) -> str | None:

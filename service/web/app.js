@@ -1,10 +1,11 @@
 // Entry point: sidebar, state of the server, and the page that the address after # names.
 
 import { askForKey, isRefused, setUpAccess } from "./parts/access.js";
-import { get } from "./base/api.js";
+import { get, postJson } from "./base/api.js";
 import { redrawComparison, setUpCompare, showComparison } from "./pages/compare.js";
 import { redrawDataset, selectDataset, setUpDataset, simulate } from "./pages/dataset.js";
-import { diagnose, selectDiagnosis, setUpDiagnosis } from "./pages/diagnosis.js";
+import { openDiagnoseForm, setUpDiagnoseForm } from "./diagnosing/form.js";
+import { redrawDiagnosis, selectDiagnosis, setUpDiagnosis } from "./pages/diagnosis.js";
 import { showEffects } from "./pages/effects.js";
 import { FILM_PAGES, redrawFilms, setUpFilms, showFilms } from "./films/page.js";
 import { $, plural, toast } from "./base/format.js";
@@ -14,7 +15,7 @@ import { refreshListing, setUpListing, showListing } from "./pages/table_page.js
 import { drawDatasets, drawDiagnoses, drawRuns } from "./parts/sidebar.js";
 import { stored } from "./parts/warnings.js";
 import { redraw, selectRun, setUpRun } from "./pages/run.js";
-import { openSubmit, remove, setUpSubmit } from "./pages/submit.js";
+import { openSubmit, randomKey, remove, setUpSubmit } from "./pages/submit.js";
 
 const POLL_MS = 2500;
 const SHOWN = 50;
@@ -34,7 +35,7 @@ const current = (page) => parameters().get(page);
 // Series need a simulation: their page has the ways to give one.
 const starting = {
   onRun: (dataset) => (isSeries(dataset) ? simulate(dataset.id) : openSubmit(lists.datasets, dataset)),
-  onDiagnose: (dataset) => (isSeries(dataset) ? simulate(dataset.id) : startDiagnosis({ dataset_id: dataset.id })),
+  onDiagnose: (dataset) => (isSeries(dataset) ? simulate(dataset.id) : openDiagnoseForm(dataset)),
 };
 
 function drawLists() {
@@ -123,9 +124,20 @@ function go(id, kind = "run") {
   location.hash = id ? `${kind}=${encodeURIComponent(id)}` : "";
 }
 
-async function startDiagnosis(body) {
-  const diagnosis = await diagnose(body);
-  if (!diagnosis) return;
+// A run of series has its simulation, and no settings to choose.
+async function diagnoseRun(run, dataset) {
+  if (!isSeries(run)) {
+    openDiagnoseForm(dataset, run);
+    return;
+  }
+  try {
+    onDiagnosisSubmitted(await postJson("diagnoses", { run_id: run.id }, { "Idempotency-Key": randomKey() }));
+  } catch (error) {
+    toast(error.text);
+  }
+}
+
+function onDiagnosisSubmitted(diagnosis) {
   go(diagnosis.id, "diagnosis");
   poll();
 }
@@ -146,10 +158,11 @@ function redrawAll() {
   redrawDataset();
   redrawComparison();
   redrawFilms();
+  redrawDiagnosis();
 }
 
 const common = (page) => ({ currentId: () => current(page), onAway: setAway, onDeleted, onMissing });
-setUpRun({ ...common("run"), onChange: onChange("runs"), onDiagnose: (run) => startDiagnosis({ run_id: run.id }) });
+setUpRun({ ...common("run"), onChange: onChange("runs"), onDiagnose: diagnoseRun });
 setUpDiagnosis({ ...common("diagnosis"), onChange: onChange("diagnoses") });
 setUpDataset({
   ...common("dataset"), ...starting,
@@ -167,6 +180,7 @@ setUpImport({
 });
 setUpFilms({ onAway: setAway, onMissing });
 setUpListing();
+setUpDiagnoseForm({ onSubmitted: onDiagnosisSubmitted });
 setUpCompare();
 setUpSubmit({
   onSubmitted(run) {

@@ -1,6 +1,6 @@
 // Labels of settings, and differences between runs on tracked markers, on forces, and on series of a rig of the user's own.
 
-import { forceUnit, mm, rounded, significant } from "./format.js";
+import { el, forceUnit, mm, rounded, significant } from "./format.js";
 
 export const isForces = (thing) => thing?.kind === "forces";
 export const isSeries = (thing) => thing?.kind === "series";
@@ -56,6 +56,31 @@ export function misfit(run) {
 export const relativeMisfit = ({ relative_to: relativeTo }, value) => (relativeTo === "noise"
   ? { value: rounded(value), unit: "× noise" }
   : { value: rounded(value === null ? null : 100 * value), unit: OF_RANGE });
+
+const FIT_TITLES = {
+  good: "Noise explains what the model leaves", doubtful: "More is left than noise explains",
+  wrong: "Most of what is left is not noise",
+};
+
+// A badge with the residual as a multiple of the noise, the larger one of fitted and held-out recordings; null where it is not known.
+export function fitBadge(job) {
+  if (!job.fit_badge) return null;
+  const worst = Math.max(job.residual_over_noise, job.held_out_over_noise ?? 0);
+  return el("span", { className: `badge fit-${job.fit_badge}`, title: `${FIT_TITLES[job.fit_badge]}: residual / noise` },
+    `${job.fit_badge} ${rounded(worst, 2)}×`);
+}
+
+// What the fit of a finished job means, in a sentence.
+export function fitSentence(job) {
+  if (!job.fit_badge) return "The noise of the recordings is not known, so the residual cannot be judged: record at least two beats, or state the noise.";
+  const [fitted, held] = [job.residual_over_noise, job.held_out_over_noise];
+  const both = `The residual is ${rounded(fitted, 2)} times the noise on the fitted recordings`
+    + (held === null ? "; none was held out, so no prediction is tested." : `, and ${rounded(held, 2)} times on those held out.`);
+  if (job.fit_badge === "good") return `${both} Noise explains it.`;
+  const held_out_only = held !== null && fitted <= 1.3;
+  if (held_out_only) return `${both} The model fits, and does not predict: physics is missing, or the genes absorbed noise.`;
+  return `${both} ${job.fit_badge === "doubtful" ? "Physics may be missing" : "Physics is missing, or the input is wrong"}: diagnose it.`;
+}
 
 export const newtons = (mn) => (mn === null || mn === undefined ? null : mn / 1e3);
 
