@@ -11,6 +11,7 @@ let of = "";
 let fetchedAt = 0;
 let fetching = false;
 let ready = null;
+let later = null;
 
 // Show what the diagnosis knows, or hide it (null, or one that has its finding).
 export function showPartial(diagnosis) {
@@ -33,7 +34,10 @@ export function redrawPartial() {
 async function refresh(diagnosis) {
   const { id, steps } = diagnosis;
   if (known) drawStage(diagnosis);
-  if (!steps || fetching || Date.now() - fetchedAt < REFRESH_MS) return;
+  const soon = Date.now() - fetchedAt < REFRESH_MS;
+  clearTimeout(later);
+  if (fetching || soon) later = setTimeout(() => of === id && refresh(diagnosis), REFRESH_MS); // the last one is not missed
+  if (!steps || fetching || soon) return;
   [fetching, fetchedAt] = [true, Date.now()];
   try {
     const answer = await get(`diagnoses/${part(id)}/partial`);
