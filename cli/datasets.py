@@ -11,6 +11,7 @@ import typer
 
 from wingfit.cli.base.options import AsJson, Url
 from wingfit.cli.base.output import Columns, emit, moment, number, progress, records, remarks, say, size
+from wingfit.cli.jobs import NewName, NewNotes, changes, edited
 from wingfit.cli.jobs import upload as upload_dataset
 from wingfit.client import answers as a
 from wingfit.client.client import DEFAULT_URL, Client, WingfitError
@@ -73,6 +74,16 @@ def download(
     with Client(url) as client, progress("downloading") as report:
         target = client.download(dataset_id, output, on_bytes=lambda got, total: report(got / total if total else None))
     say(str(target))
+
+
+@app.command()
+def edit(dataset_id: DatasetId, name: NewName = None, notes: NewNotes = None, url: Url = DEFAULT_URL) -> None:
+    """Change the name or the notes of a dataset.
+
+    Example: wingfit datasets edit ID --notes 'after the repair'
+    """
+    with Client(url) as client:
+        say(edited("dataset", client.update_dataset(dataset_id, **changes(name, notes))))
 
 
 @app.command()

@@ -41,6 +41,7 @@ DIAGNOSES = JobKind(
     cancel=Client.cancel_diagnosis,
     delete=Client.delete_diagnosis,
     export=Client.export_diagnosis,
+    update=Client.update_diagnosis,
 )
 app = commands(DIAGNOSES)
 

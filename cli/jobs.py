@@ -1,4 +1,4 @@
-"""Commands for both runs and diagnoses (jobs): list, cancel, delete, export; functions to follow and upload."""
+"""Commands for both runs and diagnoses (jobs): list, edit, cancel, delete, export; functions to follow and upload."""
 
 from __future__ import annotations
 
@@ -27,6 +27,8 @@ STANDARD_OUTPUT = Path("-")
 FormatName = Annotated[
     str, typer.Option("--format", help="json: everything; csv: a table; netcdf: series and maps, which needs a file.")
 ]
+NewName = Annotated[str | None, typer.Option("--name", help="The new name; default: it stays.")]
+NewNotes = Annotated[str | None, typer.Option("--notes", help="The new notes, '' for none; default: they stay.")]
 Output = Annotated[Path, typer.Option("--output", "-o", help="File to write to; default, or -: standard output.")]
 
 
@@ -36,7 +38,7 @@ class JobKind:
 
     ``stage_of`` and ``outcome_of`` return the stage and the outcome of a job as text; ``outcome`` is the heading of the
     column of outcomes, ``work`` the title of the progress bar, ``submit`` an example command, ``exported`` the help on
-    export formats. ``find`` lists the jobs, ``fetch`` returns one.
+    export formats. ``find`` lists the jobs, ``fetch`` returns one, ``update`` changes name and notes.
     """
 
     name: str
@@ -54,10 +56,11 @@ class JobKind:
     cancel: Callable[[Client, str], Any]
     delete: Callable[[Client, str], None]
     export: Callable[[Client, str, Format, Path], Path]
+    update: Callable[..., Any]
 
 
 def commands(kind: JobKind) -> typer.Typer:
-    """Return a command group with list, cancel, delete and export, to which the caller adds further commands."""
+    """Return a command group with list, edit, cancel, delete and export, to which the caller adds further commands."""
     app = typer.Typer(no_args_is_help=True, help=kind.help)
     group = f"wingfit {kind.plural}"
 
@@ -76,6 +79,11 @@ def commands(kind: JobKind) -> typer.Typer:
         columns = ["id", "name", "state", ">progress", ">left", kind.outcome, "submitted"]
         empty = f"no {kind.plural}; submit one: {kind.submit}"
         emit(jobs, lambda jobs: table(columns, [_row(kind, job) for job in jobs], empty), as_json=as_json)
+
+    @command("edit", f"Change the name or the notes of a {kind.name}.", "ID --notes 'after the repair'")
+    def edit(job_id: JobId, name: NewName = None, notes: NewNotes = None, url: Url = DEFAULT_URL) -> None:
+        with Client(url) as client:
+            say(edited(kind.name, kind.update(client, job_id, **changes(name, notes))))
 
     @command("cancel", f"Stop a {kind.name} for good; its results so far are kept.", "ID")
     def cancel(job_id: JobId, url: Url = DEFAULT_URL) -> None:
@@ -100,6 +108,18 @@ def commands(kind: JobKind) -> typer.Typer:
 def _row(kind: JobKind, job: Any) -> list[object]:
     progress = percent(job["progress"]), duration(job["eta_seconds"])
     return [job["id"], job["name"] or "", job["state"], *progress, kind.outcome_of(job), moment(job["created_at"])]
+
+
+def changes(name: str | None, notes: str | None) -> dict[str, str | None]:
+    """Return the arguments of ``Client.update_run`` and others; typer.BadParameter if there is nothing to change."""
+    if name is None and notes is None:
+        raise typer.BadParameter("give a new name, or notes ('' for none)", param_hint="--name or --notes")
+    return {"name": name, "notes": notes}
+
+
+def edited(what: str, answer: Any) -> str:
+    """Return id, name and notes of a changed dataset or job as text."""
+    return f"{what} {answer['id']} '{answer['name']}'" + (f"\n{answer['notes']}" if answer["notes"] else "")
 
 
 def state_of(kind: JobKind, job: Any) -> str:

@@ -54,6 +54,7 @@ RUNS = JobKind(
     cancel=Client.cancel,
     delete=Client.delete_run,
     export=Client.export_run,
+    update=Client.update_run,
 )
 app = commands(RUNS)
 app.command()(forces)
@@ -190,6 +191,7 @@ def _show(run: a.Run) -> None:
     rows = [
         ["run", f"{run['id']} {run['name'] or ''}"],
         ["dataset", run["dataset_id"]],
+        *([["notes", run["notes"]]] if run["notes"] else []),
         ["state", f"{run['state']}{', stage ' + run['stage'] if run['stage'] else ''}"],
         ["progress", f"{percent(run['progress'])}, {duration(run['eta_seconds'])} left"],
         ["generations", f"{run['generations']} ({run['evaluations']} evaluations)"],

@@ -66,9 +66,8 @@ class Problem(TypedDict):
 class Health(TypedDict):
     """Status of the service; ``detail``: the cause if ``status`` is "degraded", or what a "starting" service does.
 
-    ``evaluator`` says how simulations are run: ray, processes or in_process. ``runs_active``,
-    ``diagnoses_active`` and ``trackings_active`` count jobs that have not ended; they are null if the database does not
-    answer.
+    ``evaluator`` says how simulations are run: ray, processes or in_process. ``runs_active``, ``diagnoses_active`` and
+    ``trackings_active`` count jobs that have not ended; they are null if the database does not answer.
     """
 
     status: Literal["starting", "ok", "degraded"]
@@ -155,6 +154,7 @@ class Dataset(TypedDict):
     sha256: str
     size_bytes: int
     markers: int
+    notes: str
     rig: RigInfo | None
     recordings: list[RecordingInfo]
     warnings: list[DatasetWarning]
@@ -219,8 +219,8 @@ class Job(TypedDict):
     ``stage`` names the present step, null before the first; ``progress`` lies in [0, 1]; ``eta_seconds`` estimates the
     remaining time; ``evaluations`` counts evaluated individuals (of equal ones each counts, and one is simulated);
     ``error`` says why the job failed, else null. Of a job on series, ``rig`` names the simulation, and ``driven`` says
-    whether its user simulates it ('wingfit drive'); such a job is QUEUED while no driver serves it. After success,
-    the misfits as multiples of the noise, and ``fit_badge``: ``good`` up to 1.3, ``doubtful`` up to 3, else ``wrong``.
+    whether its user simulates it ('wingfit drive'), QUEUED while no driver serves it. ``fit_badge`` of a success rates
+    its misfits as multiples of the noise: ``good`` up to 1.3, ``doubtful`` up to 3, else ``wrong``.
     """
 
     id: str
@@ -238,6 +238,7 @@ class Job(TypedDict):
     error: str | None
     rig: str | None
     driven: bool
+    notes: str
     residual_over_noise: float | None
     held_out_over_noise: float | None
     fit_badge: FitBadge | None

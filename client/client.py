@@ -29,6 +29,7 @@ from wingfit.client.export_answers import Format
 from wingfit.client.films.calls import FilmCalls
 from wingfit.client.importing.calls import ImportCalls
 from wingfit.client.key_client import KeyCalls
+from wingfit.client.lists.calls import ListCalls
 from wingfit.client.load_answers import Loads
 from wingfit.client.series_answers import SeriesResult
 from wingfit.client.transport import (
@@ -47,7 +48,7 @@ __all__ = ["DEFAULT_URL", "Client", "ServerAwayError", "WingfitError"]
 OnRun = Callable[[a.Run], None]
 
 
-class Client(DiagnosisCalls, DriveCalls, FilmCalls, ImportCalls, KeyCalls):
+class Client(DiagnosisCalls, DriveCalls, FilmCalls, ImportCalls, KeyCalls, ListCalls):
     """Sends requests to one server and returns the answers; a context manager, at whose end the connections close."""
 
     def health(self) -> a.Health:
@@ -88,10 +89,6 @@ class Client(DiagnosisCalls, DriveCalls, FilmCalls, ImportCalls, KeyCalls):
 
             return cast(a.Dataset, self._repeat(send).json())
 
-    def datasets(self) -> list[a.Dataset]:
-        """List all datasets, newest first."""
-        return cast(list[a.Dataset], self._all("/v1/datasets"))
-
     def dataset(self, dataset_id: str) -> a.Dataset:
         """Fetch one dataset with its recordings."""
         return cast(a.Dataset, self._json("GET", f"/v1/datasets/{part(dataset_id)}"))
@@ -129,10 +126,6 @@ class Client(DiagnosisCalls, DriveCalls, FilmCalls, ImportCalls, KeyCalls):
         """Return the name and settings that :meth:`submit_run` would submit, or raise its error; submit nothing."""
         body = given(dataset_id=dataset_id, **spec)
         return cast(a.Checked, self._json("POST", "/v1/runs?validate_only=true", json=body))
-
-    def runs(self, *, dataset_id: str | None = None, state: str | None = None) -> list[a.Run]:
-        """List all runs, newest first; only those of ``dataset_id`` or in ``state`` (e.g. "RUNNING") if given."""
-        return cast(list[a.Run], self._all("/v1/runs", dataset_id=dataset_id, state=state))
 
     def run(self, run_id: str) -> a.Run:
         """Fetch one run with its progress."""

@@ -31,13 +31,6 @@ class DiagnosisCalls(Watching):
         body = given(dataset_id=dataset_id, run_id=run_id, **spec)
         return cast(Diagnosis, self._json("POST", "/v1/diagnoses", json=body, key=str(uuid.uuid4())))
 
-    def diagnoses(
-        self, *, dataset_id: str | None = None, run_id: str | None = None, state: str | None = None
-    ) -> list[Diagnosis]:
-        """List all diagnoses, newest first, optionally only those of a dataset, of a run, in a state."""
-        found = self._all("/v1/diagnoses", dataset_id=dataset_id, run_id=run_id, state=state)
-        return cast(list[Diagnosis], found)
-
     def diagnosis(self, diagnosis_id: str) -> Diagnosis:
         """Fetch one diagnosis with its progress."""
         return cast(Diagnosis, self._json("GET", _path(diagnosis_id)))

@@ -26,7 +26,7 @@ KEY_VARIABLE = "WINGFIT_API_KEY"
 LOOPBACK = {"127.0.0.1", "localhost", "::1"}
 # A fixed time stamp makes the archive of an unchanged folder the same bytes, hence the same digest.
 ZIP_TIME = (1980, 1, 1, 0, 0, 0)
-SENT_TWICE_IS_HARMLESS = {"GET", "DELETE"}
+SENT_TWICE_IS_HARMLESS = {"GET", "DELETE", "PATCH"}
 
 OnBytes = Callable[[int, int], None]
 ENDINGS: dict[Format, str] = {"json": ".json", "csv": ".csv", "netcdf": ".nc"}

@@ -43,6 +43,7 @@ _DATASET: Dataset = {
     "sha256": "9f86d081884c7d659a2feaa0c55ad015a3bf4f1b2b0b822cd15d6c15b0f00a08",
     "size_bytes": 1482003,
     "markers": 49,
+    "notes": "after the repair of the rear rod",
     "rig": None,
     "recordings": [_RECORDING],
     "warnings": [],
@@ -66,6 +67,7 @@ _JOB: Job = {
     "residual_over_noise": None,
     "held_out_over_noise": None,
     "fit_badge": None,
+    "notes": "",
 }
 _RUN: Run = {
     **_JOB,

@@ -20,8 +20,8 @@ from wingfit.service.auth.access import visible_owner
 from wingfit.service.http import responses as http
 from wingfit.service.http.problems import not_found
 from wingfit.service.runs import views
-from wingfit.service.storage import store
 from wingfit.service.storage.database import Database
+from wingfit.service.storage.listing import Wanted
 from wingfit.service.storage.tables import RunRow
 
 RUN = tuple(column.name for column in RunRow.__table__.columns if column.name not in ("genome", "result", "rig"))
@@ -40,20 +40,20 @@ async def answer(read: Callable[[], bytes], *, short: bool) -> Response:
     return Response(body, media_type=http.JSON)
 
 
-def runs(database: Database, limit: int, cursor: str | None, dataset_id: str | None, state: str | None) -> bytes:
-    """Return a page of up to ``limit`` runs as JSON, newest first.
+def runs(database: Database, wanted: Wanted[RunRow], limit: int, cursor: str | None) -> bytes:
+    """Return a page of up to ``limit`` of the runs that are ``wanted`` as JSON.
 
-    ``cursor``: where the page begins (None: at the newest); ``dataset_id``, ``state``: of the runs (None: any).
+    ``cursor``: where the page begins (None: at the first run).
     """
-    equal = {"dataset_id": dataset_id, "state": state, "owner": visible_owner()}
-    where = [f"{name} = :{name}" for name, value in equal.items() if value is not None]
-    values: dict[str, Any] = equal | {"rows": limit + 1}
-    if cursor is not None:
-        where, values["before"] = [*where, "number < :before"], store.number(cursor)
+    where, values = wanted.conditions()
+    beyond, place = wanted.after(cursor)
+    owner = visible_owner()
+    own = () if owner is None else ("owner = :owner",)
+    query = _page_of_runs((*where, *own, *beyond), wanted.expression, wanted.order)
     with database.look() as connection:
-        rows = connection.execute(_page_of_runs(tuple(where)), values).fetchall()
-    next_cursor = store.cursor_before(rows[limit - 1][0]) if len(rows) > limit else None
-    items = b",".join(_run_json(row[1:]) for row in rows[:limit])
+        rows = connection.execute(query, {**values, **place, "owner": owner, "rows": limit + 1}).fetchall()
+    next_cursor = wanted.cursor(rows[limit - 1][1], rows[limit - 1][0]) if len(rows) > limit else None
+    items = b",".join(_run_json(row[2:]) for row in rows[:limit])
     return b'{"items":[' + items + b'],"next_cursor":' + to_json(next_cursor) + b"}"
 
 
@@ -73,9 +73,11 @@ def history(database: Database, run_id: str, after: int, limit: int) -> bytes:
 
 
 @lru_cache
-def _page_of_runs(where: tuple[str, ...]) -> str:
+def _page_of_runs(where: tuple[str, ...], expression: str = "number", order: str = "number DESC") -> str:
+    """Return the query of a page; ``expression``: by which it is sorted, for the cursor; ``order``: after ORDER BY."""
     conditions = f"WHERE {' AND '.join(where)}" if where else ""
-    return f"SELECT number, {', '.join(RUN)} FROM run {conditions} ORDER BY number DESC LIMIT :rows"  # noqa: S608
+    columns = f"number, {expression}, {', '.join(RUN)}"
+    return f"SELECT {columns} FROM run {conditions} ORDER BY {order} LIMIT :rows"  # noqa: S608
 
 
 @lru_cache(RUNS_IN_CACHE)

@@ -24,7 +24,7 @@ HISTORY_PAGE, LARGEST_HISTORY_PAGE = 1000, 10_000
 LARGEST_INTEGER = 2**53 - 1  # the largest that every JSON parser reads exactly
 
 Limit = Annotated[int, Query(ge=1, le=LARGEST_PAGE, description="number of items on a page")]
-Cursor = Annotated[str | None, Query(max_length=200, description="next_cursor of the page before")]
+Cursor = Annotated[str | None, Query(max_length=4000, description="next_cursor of the page before")]
 RepeatKey = Annotated[
     str | None,
     Header(

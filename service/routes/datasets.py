@@ -20,12 +20,15 @@ from wingfit.report.wing_drawing import wing_drawing
 from wingfit.service.auth.access import owner_of_new
 from wingfit.service.container import DOWNLOAD_SLOT, UPLOAD_SLOT, Service, ServiceDep
 from wingfit.service.datasets.parsed_datasets import Opened
+from wingfit.service.http import list_query as q
 from wingfit.service.http import responses as http
 from wingfit.service.http.problems import ProblemError, conflict, error_item, invalid
 from wingfit.service.http.request_limits import UPLOAD_LIMIT
+from wingfit.service.routes.lists import add_edit_route
 from wingfit.service.runs import views
-from wingfit.service.storage import store
+from wingfit.service.storage import listing, store
 from wingfit.service.storage.database import Database
+from wingfit.service.storage.listing import Wanted
 from wingfit.service.storage.tables import ArchiveRow, DatasetRow
 
 router = APIRouter(prefix="/v1/datasets", tags=["datasets"])
@@ -90,10 +93,19 @@ def upload(
 
 
 @router.get("", response_model=a.Page[a.Dataset], responses=http.errors(), summary="List datasets")
-def list_datasets(service: ServiceDep, limit: http.Limit = 50, cursor: http.Cursor = None) -> a.Page[a.Dataset]:
-    """List datasets, newest first."""
+def list_datasets(
+    service: ServiceDep,
+    kind: a.Kind | None = None,
+    text: q.Text = None,
+    sort: q.OfDatasets = "created_at",
+    order: q.Way = None,
+    limit: http.Limit = 50,
+    cursor: http.Cursor = None,
+) -> a.Page[a.Dataset]:
+    """List datasets, newest first unless sorted otherwise."""
+    wanted = Wanted(DatasetRow, {"kind": kind}, text, sort=sort, ascending=q.ascending(sort, order))
     with service.database.read() as session:
-        rows, following = store.page(session, DatasetRow, limit, cursor)
+        rows, following = listing.page(session, wanted, limit, cursor)
     return {"items": [views.dataset(row) for row in rows], "next_cursor": following}
 
 
@@ -174,6 +186,9 @@ def fetch_drawing(service: ServiceDep, dataset_id: str, if_none_match: http.IfNo
     """Return the described wing from above, to scale, as SVG: outline, flapping axis, rods and markers."""
     drawing = wing_drawing(service.datasets.flapping(dataset_id).rig)
     return http.marked(drawing.encode(), DRAWING_TYPE, if_none_match, DRAWING_HEADERS)
+
+
+add_edit_route(router, "dataset", DatasetRow, a.Dataset, views.dataset)
 
 
 @router.delete("/{dataset_id}", status_code=204, responses=http.errors(404, 409), summary="Delete a dataset")

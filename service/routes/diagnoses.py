@@ -15,12 +15,15 @@ from wingfit.service.answers import checked
 from wingfit.service.container import DOWNLOAD_SLOT, Service, ServiceDep
 from wingfit.service.diagnoses import checks, views
 from wingfit.service.diagnoses.requests import DiagnosisIn
+from wingfit.service.http import list_query as q
 from wingfit.service.http import responses as http
 from wingfit.service.http.problems import ProblemError, conflict, error_item, invalid
 from wingfit.service.rigs.stored_rig import given_rig, requested_rig, stored_rig
 from wingfit.service.routes.jobs import Actions, add_job_routes, load_any, submit_job
+from wingfit.service.routes.lists import add_edit_route, add_groups_route
 from wingfit.service.runs import spec_views
-from wingfit.service.storage import store
+from wingfit.service.storage import listing, store
+from wingfit.service.storage.listing import Wanted
 from wingfit.service.storage.tables import DiagnosisRow, RunRow
 from wingfit.workers import jobs
 
@@ -44,6 +47,8 @@ data: {"id": "dx_7d20c14be5a9f386", "state": "SUCCEEDED", "verdict": "named"}
 
 """
 _ACTIONS: Actions = {"cancel": (jobs.Cancel(), "Cancel a diagnosis; if it is running, it ends within seconds.")}
+add_groups_route(router, "diagnoses", DiagnosisRow)
+add_edit_route(router, "diagnosis", DiagnosisRow, Diagnosis, views.diagnosis)
 add_job_routes(router, "diagnosis", lambda service: service.diagnosing, Diagnosis, _ACTIONS, "step", _EVENTS)
 
 
@@ -71,8 +76,7 @@ def submit(
             known = wing_or_vehicle(dataset)
             spec = checks.checked(body, known, service.engine, service.diagnoser, of_run, _genome(run))
         name = body.name or f"{dataset.name}, {spec_views.model_name(dataset, spec.calibration)}"
-        row = DiagnosisRow(dataset_id=dataset_id, kind=dataset.kind, **stored_rig(given))
-        row.name = name[: spec_views.LONGEST_NAME]
+        row = DiagnosisRow(dataset_id=dataset_id, kind=dataset.kind, name=name, **stored_rig(given))
         row.run_id, row.spec = body.run_id, store.spec_json(spec)
         return row
 
@@ -82,16 +86,22 @@ def submit(
 @router.get("", response_model=Page[Diagnosis], responses=http.errors(), summary="List diagnoses")
 def list_diagnoses(
     service: ServiceDep,
-    dataset_id: Annotated[str | None, Query(max_length=200)] = None,
+    dataset_id: q.OfDataset = None,
     run_id: Annotated[str | None, Query(max_length=200)] = None,
     state: jobs.State | None = None,
+    active: q.Active = False,
+    badge: q.Fit = None,
+    text: q.Text = None,
+    sort: q.OfDiagnoses = "created_at",
+    order: q.Way = None,
     limit: http.Limit = 50,
     cursor: http.Cursor = None,
 ) -> Page[Diagnosis]:
-    """List diagnoses, newest first."""
+    """List diagnoses, newest first unless sorted otherwise."""
     equal = {"dataset_id": dataset_id, "run_id": run_id, "state": state}
+    wanted = Wanted(DiagnosisRow, equal, text, active, badge, sort, q.ascending(sort, order))
     with service.database.read() as session:
-        rows, following = store.page(session, DiagnosisRow, limit, cursor, **equal)
+        rows, following = listing.page(session, wanted, limit, cursor)
     return {"items": [views.diagnosis(row) for row in rows], "next_cursor": following}
 
 

@@ -17,7 +17,7 @@ from wingfit.service.container import FRAME_SLOT, ServiceDep
 from wingfit.service.films import views
 from wingfit.service.films.requests import FilmIn
 from wingfit.service.http import responses as http
-from wingfit.service.storage import store
+from wingfit.service.storage import listing, store
 from wingfit.service.storage.tables import FilmRow
 
 router = APIRouter(prefix="/v1/films", tags=["films"])
@@ -53,7 +53,7 @@ def make(request: Request, service: ServiceDep, body: FilmIn, idempotency_key: h
 def list_films(service: ServiceDep, limit: http.Limit = 50, cursor: http.Cursor = None) -> Page[a.Film]:
     """List films, newest first."""
     with service.database.read() as session:
-        rows, following = store.page(session, FilmRow, limit, cursor)
+        rows, following = listing.page(session, listing.Wanted(FilmRow), limit, cursor)
     return {"items": [service.films.view(row) for row in rows], "next_cursor": following}
 
 

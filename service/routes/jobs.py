@@ -45,6 +45,8 @@ def submit_job(
     def create(session: Session) -> store.Answer:
         row.id, row.created_at = store.new_id(kind.prefix), store.now()
         row.owner = store.admitted(session, row, service.settings.max_active)
+        if getattr(body, "name", None) is None:
+            row.name = store.free_name(session, row, row.name)
         store.put_job(row, jobs.step(None, jobs.Submit())[0])
         session.add(row)
         session.flush()  # sets the columns that have a default

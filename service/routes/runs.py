@@ -15,14 +15,17 @@ from wingfit.records import AnyDataset, SeriesDataset, wing_or_vehicle
 from wingfit.rigs.rig import Rig
 from wingfit.service.container import Service, ServiceDep
 from wingfit.service.http import json_reads
+from wingfit.service.http import list_query as q
 from wingfit.service.http import responses as http
 from wingfit.service.http.problems import error_item, invalid
 from wingfit.service.rigs.stored_rig import requested_rig, stored_rig
 from wingfit.service.routes.jobs import Actions, add_job_routes, load_any, submit_job
-from wingfit.service.runs import spec_views
+from wingfit.service.routes.lists import add_edit_route, add_groups_route
+from wingfit.service.runs import spec_views, views
 from wingfit.service.runs.request_checks import gene_names, refuse_unknown
 from wingfit.service.runs.requests import RunIn
 from wingfit.service.storage import store
+from wingfit.service.storage.listing import Wanted
 from wingfit.service.storage.tables import RunRow
 from wingfit.workers import jobs
 
@@ -41,6 +44,8 @@ _ACTIONS: Actions = {
     "pause": (jobs.Pause(), "Pause a run; if it is running, it pauses after its current generation."),
     "resume": (jobs.Resume(), "Continue a paused run after its last finished generation."),
 }
+add_groups_route(router, "runs", RunRow)
+add_edit_route(router, "run", RunRow, Run, views.run)
 add_job_routes(router, "run", lambda service: service.calibrating, Run, _ACTIONS, "generation", _EVENTS)
 
 
@@ -66,7 +71,7 @@ def submit(
 
     def plan() -> RunRow:
         dataset, spec = _planned(service, body)
-        name = body.name or spec_views.run_name(dataset, spec)
+        name = body.name or spec_views.run_name(dataset, spec)[: store.LONGEST_NAME]
         row = RunRow(dataset_id=body.dataset_id, kind=dataset.kind, name=name, **stored_rig(body.rig))
         row.spec = store.spec_json(spec)
         return row
@@ -80,17 +85,22 @@ def submit(
 @router.get("", response_model=Page[Run], responses=http.errors(), summary="List runs")
 async def list_runs(
     service: ServiceDep,
-    dataset_id: Annotated[str | None, Query(max_length=200)] = None,
+    dataset_id: q.OfDataset = None,
     state: jobs.State | None = None,
+    active: q.Active = False,
+    badge: q.Fit = None,
+    text: q.Text = None,
+    sort: q.OfRuns = "created_at",
+    order: q.Way = None,
     limit: http.Limit = http.PAGE,
     cursor: http.Cursor = None,
 ) -> Response:
-    """List runs, newest first."""
-    # A filter may pass over many rows before it finds one.
-    short = limit <= http.PAGE and dataset_id is None and state is None
-    return await json_reads.answer(
-        lambda: json_reads.runs(service.database, limit, cursor, dataset_id, state), short=short
-    )
+    """List runs, newest first unless sorted otherwise."""
+    equal = {"dataset_id": dataset_id, "state": state}
+    wanted = Wanted(RunRow, equal, text, active, badge, sort, q.ascending(sort, order))
+    # A filter may pass over many rows before it finds one, and an order looks at all.
+    short = limit <= http.PAGE and wanted.plain
+    return await json_reads.answer(lambda: json_reads.runs(service.database, wanted, limit, cursor), short=short)
 
 
 def _planned(service: Service, body: RunIn) -> tuple[AnyDataset, CalibrationSpec]:

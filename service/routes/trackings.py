@@ -20,11 +20,12 @@ from wingfit.service.films.files import COVARIANCE, REPORT, TRACKS
 from wingfit.service.films.films import require_opencv
 from wingfit.service.films.requests import TrackingIn
 from wingfit.service.http import csv_text
+from wingfit.service.http import list_query as q
 from wingfit.service.http import responses as http
 from wingfit.service.http.problems import ProblemError, conflict, error_item, invalid
 from wingfit.service.routes.jobs import Actions, add_job_routes, load, submit_job
-from wingfit.service.runs.spec_views import LONGEST_NAME
-from wingfit.service.storage import store
+from wingfit.service.storage import listing, store
+from wingfit.service.storage.listing import Wanted
 from wingfit.service.storage.tables import FilmRow, TrackedRow, TrackingRow
 from wingfit.workers import jobs
 
@@ -68,7 +69,7 @@ def submit(request: Request, service: ServiceDep, body: TrackingIn, idempotency_
         require_opencv()
         _check(service, film, spec)
         row = TrackingRow(film_id=film.id, dataset_id=body.dataset_id, spec=spec)
-        row.name = (body.name or f"{film.name}, {body.kind}")[:LONGEST_NAME]
+        row.name = body.name or f"{film.name}, {body.kind}"
         return row
 
     return submit_job(request, service, service.tracking, idempotency_key, body, plan)
@@ -81,10 +82,12 @@ def list_trackings(
     state: jobs.State | None = None,
     limit: http.Limit = 50,
     cursor: http.Cursor = None,
+    active: q.Active = False,
 ) -> Page[a.Tracking]:
     """List trackings, newest first."""
+    wanted = Wanted(TrackingRow, {"film_id": film_id, "state": state}, active=active)
     with service.database.read() as session:
-        rows, following = store.page(session, TrackingRow, limit, cursor, film_id=film_id, state=state)
+        rows, following = listing.page(session, wanted, limit, cursor)
     return {"items": [views.tracking(row) for row in rows], "next_cursor": following}
 
 

@@ -31,6 +31,11 @@ _HIDDEN = r"\u0000-\u001f\u007f-\u009f\u200b\u200e\u200f\u2028-\u202e\u2060-\u20
 TITLE = rf"^[^{_HIDDEN}]*[^{_HIDDEN}\s][^{_HIDDEN}]*$"
 
 
+# What notes may not have: other control characters than tabs and ends of lines, and half a surrogate pair.
+_UNWRITTEN = re.compile(r"[\u0000-\u0008\u000b-\u001f\u007f-\u009f\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
+LONGEST_NOTES = 10_000  # characters
+
+
 def _visible(title: str) -> str:
     # Half a surrogate pair is no character: it can be sent as JSON, and neither stored nor shown. The published pattern
     # leaves it out, because to many readers of patterns every character beyond U+FFFF is two halves.
@@ -42,6 +47,16 @@ def _visible(title: str) -> str:
 Title = Annotated[
     str, AfterValidator(_visible), Field(min_length=1, max_length=200, json_schema_extra={"pattern": TITLE})
 ]
+
+
+def _written(notes: str) -> str:
+    if hidden := _UNWRITTEN.search(notes):
+        code = f"U+{ord(hidden[0]):04X}"
+        raise PydanticCustomError("notes", "must be text without control characters; it has {code}", {"code": code})
+    return notes
+
+
+Notes = Annotated[str, AfterValidator(_written), Field(max_length=LONGEST_NOTES)]
 
 
 def _readable(division: str) -> str:

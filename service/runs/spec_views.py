@@ -32,7 +32,6 @@ WHY_IDLE = {
     "auto": "which ends with Gauss-Newton in any case; leave it out",
 }
 USUAL = {"tracks": "genetic", "forces": "gauss_newton", "series": "auto"}
-LONGEST_NAME = 200
 
 
 def run_settings(spec: CalibrationSpec) -> RunSpec:
@@ -148,7 +147,7 @@ def run_name(dataset: AnyDataset, spec: CalibrationSpec) -> str:
         method = f"{METHODS.get(spec.method or '', spec.method)} finished by Gauss-Newton"
     coarse = f"searched with division {spec.search_division}" if spec.search_division else None
     parts = (dataset.name, model_name(dataset, spec), spec.mode, method, coarse)
-    return ", ".join(part for part in parts if part)[:LONGEST_NAME]
+    return ", ".join(part for part in parts if part)
 
 
 def model_name(dataset: AnyDataset, spec: CalibrationSpec) -> str:

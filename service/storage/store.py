@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import json
 import logging
-import re
 import secrets
 import sqlite3
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime, timedelta
+from itertools import chain
 from typing import Any, TypeVar
 
 from pydantic import TypeAdapter
@@ -43,7 +43,8 @@ from wingfit.workers.jobs import Job, State, Wish
 LOG = logging.getLogger("wingfit")
 ANSWERS_KEPT = timedelta(days=7)
 MB = 10**6
-BEFORE = "before-"  # beginning of a cursor
+LONGEST_NAME = 200
+LONGEST_STEM = LONGEST_NAME - 10  # leaves room for a number
 # Value of fields that the first version did not store.
 _SPEC = TypeAdapter(CalibrationSpec)
 BEFORE_METHODS: dict[str, Any] = {"method": "genetic"}
@@ -78,41 +79,6 @@ def one(session: Session, table: type[Row], row_id: str) -> Row:
     if found is None:
         raise not_found(table.__tablename__, row_id)
     return found
-
-
-# -- lists -----------------------------------------------------------------------------------------------
-
-
-def page(
-    session: Session, table: type[Row], limit: int, cursor: str | None, **equal: str | None
-) -> tuple[list[Row], str | None]:
-    """Return up to ``limit`` rows of ``table``, newest first, and the cursor of the next page (None: no more).
-
-    ``cursor``: where the page begins, as returned with the page before; None: at the newest row. ``equal``: value that
-    a column must have, by column name; columns with the value None are not compared.
-    """
-    query = select(table).order_by(table.number.desc()).limit(limit + 1)
-    if cursor is not None:
-        query = query.where(table.number < number(cursor))
-    for column, value in equal.items():
-        if value is not None:
-            query = query.where(getattr(table, column) == value)
-    rows = list(session.scalars(query))
-    following = cursor_before(rows[limit - 1].number) if len(rows) > limit else None
-    return rows[:limit], following
-
-
-def cursor_before(number: int) -> str:
-    """Return the page cursor (text that clients pass back unchanged) for the rows created before row ``number``."""
-    return f"{BEFORE}{number}"
-
-
-def number(cursor: str) -> int:
-    """Return the row number in ``cursor``, text made by :func:`cursor_before`; raise a 422 for any other text."""
-    if re.fullmatch(rf"{BEFORE}[0-9]{{1,18}}", cursor):
-        return int(cursor.removeprefix(BEFORE))
-    item = error_item("query.cursor", cursor, "use next_cursor of the last page")
-    raise invalid("the cursor is not one of this server", [item])
 
 
 # -- datasets --------------------------------------------------------------------------------------------
@@ -244,6 +210,19 @@ def admitted(session: Session, row: JobRow, most: int) -> str | None:
         detail = f"{count} jobs have not ended, and {most} are the most at a time; wait for some, or cancel them"
         raise ProblemError(429, "too-many", detail)
     return owner
+
+
+def free_name(session: Session, row: JobRow, name: str) -> str:
+    """Return ``name``, the default one of the new job ``row``, or with the first number that makes it the only one.
+
+    Compared are the jobs of its kind on the same dataset or film. The name is cut to the length that names may have.
+    """
+    table, (subject, subject_id) = type(row), row.subject
+    of_subject = getattr(table, f"{subject.__tablename__}_id") == subject_id
+    stem = name[:LONGEST_STEM]
+    taken = set(session.scalars(select(table.name).where(of_subject, table.name.startswith(stem, autoescape=True))))
+    candidates = chain([name[:LONGEST_NAME]], (f"{stem}, {count}" for count in range(2, len(taken) + 3)))
+    return next(one for one in candidates if one not in taken)
 
 
 def of_owner(table: type[OwnedRow], owner: str | None) -> ColumnElement[bool]:

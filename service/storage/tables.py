@@ -65,7 +65,8 @@ class DatasetRow(OwnedRow, Table):
     ``kind``: "tracks" (markers of a flexible wing), "forces" (of a vehicle) or "series" (of a rig of the user's own).
     ``filename``, ``sha256`` and ``size_bytes`` are those of the uploaded file; ``markers`` is the number of markers on
     the wing (else 0); ``recordings`` describes each recording as JSON, ``rig`` the rig of a dataset of series (else
-    None); ``warnings`` the likely mistakes found at its upload (None for one of an earlier version).
+    None); ``warnings`` the likely mistakes found at its upload (None for one of an earlier version); ``notes`` what
+    its users wrote about it.
     """
 
     __tablename__ = "dataset"
@@ -79,6 +80,7 @@ class DatasetRow(OwnedRow, Table):
     recordings: Mapped[list[dict[str, Any]]]
     rig: Mapped[dict[str, Any] | None] = mapped_column(JSON(none_as_null=True))
     warnings: Mapped[list[dict[str, Any]] | None] = mapped_column(JSON(none_as_null=True))
+    notes: Mapped[str] = mapped_column(default="", server_default="")
 
 
 class ArchiveRow(Table):
@@ -154,6 +156,7 @@ class DatasetJobRow(JobRow):
         evaluations: number of evaluated individuals so far.
         residual_over_noise, held_out_over_noise: misfit to the fitted and the held-out recordings as a multiple of the
             noise; None if unknown, or before the job has succeeded.
+        notes: what its users wrote about it.
     """
 
     kind: Mapped[str] = mapped_column(server_default="tracks")
@@ -164,6 +167,7 @@ class DatasetJobRow(JobRow):
     evaluations: Mapped[int] = mapped_column(default=0)
     residual_over_noise: Mapped[float | None]
     held_out_over_noise: Mapped[float | None]
+    notes: Mapped[str] = mapped_column(default="", server_default="")
 
     @property
     def subject(self) -> tuple[type[OwnedRow], str]:

@@ -1,7 +1,7 @@
-// Entry point: sidebar, state of the server, and the page that the address after # names.
+// Entry point: side column, state of the server, and the page that the address after # names.
 
 import { askForKey, isRefused, setUpAccess } from "./parts/access.js";
-import { get, postJson } from "./base/api.js";
+import { get, isFinal, postJson } from "./base/api.js";
 import { redrawComparison, setUpCompare, showComparison } from "./pages/compare.js";
 import { redrawDataset, selectDataset, setUpDataset, simulate } from "./pages/dataset.js";
 import { openDiagnoseForm, setUpDiagnoseForm } from "./diagnosing/form.js";
@@ -11,14 +11,18 @@ import { FILM_PAGES, redrawFilms, setUpFilms, showFilms } from "./films/page.js"
 import { $, plural, toast } from "./base/format.js";
 import { setUpImport, showImport } from "./importing/page.js";
 import { isSeries } from "./base/labels.js";
-import { refreshListing, setUpListing, showListing } from "./pages/table_page.js";
-import { drawDatasets, drawDiagnoses, drawRuns } from "./parts/sidebar.js";
+import { buildLists, placeUpload } from "./lists/page.js";
+import { drawHome, newest } from "./lists/home.js";
+import { refreshListing, setUpListing, showListing } from "./lists/table.js";
+import { setUpUpload } from "./lists/upload.js";
+import { drawActive } from "./parts/sidebar.js";
 import { stored } from "./parts/warnings.js";
 import { redraw, selectRun, setUpRun } from "./pages/run.js";
 import { openSubmit, randomKey, remove, setUpSubmit } from "./pages/submit.js";
 
 const POLL_MS = 2500;
-const SHOWN = 50;
+const MOST_ACTIVE = 20;
+const MOST_CHOICES = 200;
 const AGAIN_MS = 3000;
 const LISTINGS = ["runs", "diagnoses", "datasets"];
 const LISTS = ["effects", "import", "films", ...LISTINGS]; // pages that need no id
@@ -26,25 +30,33 @@ const PAGES = ["run", "diagnosis", "dataset", "compare", "film", "tracking", ...
 const SECTIONS = { run: "runs", compare: "runs", diagnosis: "diagnoses", dataset: "datasets", import: "datasets", film: "films", tracking: "films" }; // menu entry of each page
 const BROAD = ["compare", "import", ...FILM_PAGES, ...LISTINGS]; // without the lists of the sidebar
 
-let lists = { runs: [], diagnoses: [], datasets: [] };
+let active = { runs: [], diagnoses: [], trackings: [] };
+let atHome = null; // the newest findings, runs and datasets
 let polling = null;
 
 const parameters = () => new URLSearchParams(location.hash.slice(1));
 const current = (page) => parameters().get(page);
+const pageOf = (params) => PAGES.find((name) => params.get(name) || (params.has(name) && LISTS.includes(name))) ?? null; // those of one job or dataset need its id
+const isHome = () => pageOf(parameters()) === null || !$("empty").hidden;
 
 // Series need a simulation: their page has the ways to give one.
 const starting = {
-  onRun: (dataset) => (isSeries(dataset) ? simulate(dataset.id) : openSubmit(lists.datasets, dataset)),
+  onRun: (dataset) => (isSeries(dataset) ? simulate(dataset.id) : newRun(dataset)),
   onDiagnose: (dataset) => (isSeries(dataset) ? simulate(dataset.id) : openDiagnoseForm(dataset)),
 };
 
+// The form of a run, with the datasets among which can be chosen.
+async function newRun(dataset) {
+  try {
+    openSubmit((await get(`datasets?limit=${MOST_CHOICES}`)).items, dataset);
+  } catch (error) {
+    toast(error.message);
+  }
+}
+
 function drawLists() {
-  drawRuns(lists.runs, current("run"));
-  drawDiagnoses(lists.diagnoses, current("diagnosis"));
-  drawDatasets(lists.datasets, {
-    ...starting,
-    onDelete: async (dataset) => (await remove("datasets", dataset.id, dataset.name)) && poll(),
-  });
+  drawActive(active, (page, id) => current(page) === id);
+  if (atHome) drawHome(atHome, { ...starting, onDelete: async (dataset) => (await remove("datasets", dataset.id, dataset.name)) && poll() });
 }
 
 function setAway(away) {
@@ -63,13 +75,13 @@ function showHealth(health) {
 async function poll() {
   clearTimeout(polling);
   try {
-    const [health, ...pages] = await Promise.all([get("health"), ...LISTINGS.map((kind) => get(`${kind}?limit=${SHOWN}`))]);
-    lists = Object.fromEntries(LISTINGS.map((kind, k) => [kind, pages[k].items]));
+    const [health, fresh] = await Promise.all([get("health"), isHome() ? newest() : atHome]);
+    atHome = fresh;
+    active = Object.fromEntries(await Promise.all(Object.keys(active).map(async (kind) => [kind, health[`${kind}_active`] === 0 ? [] : (await get(`${kind}?active=true&limit=${MOST_ACTIVE}`)).items])));
     setAway(false);
     showHealth(health);
     drawLists();
-    refreshListing(lists);
-    await missed();
+    await Promise.all([refreshListing(active), missed()]);
   } catch (error) {
     if (isRefused(error)) askForKey();
     else if (error.away) setAway(true);
@@ -82,13 +94,13 @@ async function poll() {
 async function route() {
   drawLists();
   const params = parameters();
-  // Pages of one job or dataset need its id.
-  const page = PAGES.find((name) => params.get(name) || (params.has(name) && LISTS.includes(name))) ?? null;
+  const page = pageOf(params);
   const value = (name) => (page === name ? params.get(name) : null);
   $("empty").hidden = page !== null;
   document.body.classList.toggle("home", page === null);
   document.body.classList.toggle("broad", BROAD.includes(page));
-  if (!page) nothing("Nothing selected");
+  placeUpload(page);
+  if (!page) nothing("Newest results");
   for (const link of document.querySelectorAll(".menu a")) {
     if (link.hash === `#${SECTIONS[page] ?? page}`) link.setAttribute("aria-current", "page");
     else link.removeAttribute("aria-current");
@@ -105,10 +117,10 @@ function nothing(why) {
   $("empty-title").textContent = why;
 }
 
-// The job or dataset shown may have been deleted by another user; the lists do not cover older ones.
+// The job or dataset shown may have been deleted by another user.
 async function missed() {
-  const page = Object.keys(SECTIONS).find((name) => lists[SECTIONS[name]] && !["compare", "import"].includes(name) && current(name));
-  if (!page || lists[SECTIONS[page]].some((one) => one.id === current(page))) return;
+  const page = Object.keys(SECTIONS).find((name) => LISTINGS.includes(SECTIONS[name]) && !["compare", "import"].includes(name) && current(name));
+  if (!page || active[SECTIONS[page]]?.some((one) => one.id === current(page))) return;
   await get(`${SECTIONS[page]}/${encodeURIComponent(current(page))}`).catch((error) => error.status === 404 && $("empty").hidden && route());
 }
 
@@ -147,9 +159,9 @@ function onDeleted() {
   poll();
 }
 
-// A page passes a changed job to the lists.
+// A page passes a changed job to the side column.
 const onChange = (kind) => (job) => {
-  lists = { ...lists, [kind]: lists[kind].map((other) => (other.id === job.id ? job : other)) };
+  active = { ...active, [kind]: active[kind].map((other) => (other.id === job.id ? job : other)).filter((other) => !isFinal(other)) };
   drawLists();
 };
 
@@ -187,21 +199,34 @@ setUpSubmit({
     go(run.id);
     poll();
   },
-  onUploaded(dataset) {
-    // Likely mistakes are looked at before anything is started.
-    if (dataset.warnings?.length) go(dataset.id, "dataset");
-    poll().then(() => !dataset.warnings?.length && starting.onRun(dataset));
-  },
 });
 $("skip").addEventListener("click", (event) => {
   event.preventDefault(); // the address must keep naming the page
   $("detail").focus();
 });
-$("new-run").addEventListener("click", () => openSubmit(lists.datasets));
+$("new-run").addEventListener("click", () => newRun());
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redrawAll);
-if (await setUpAccess()) {
-  window.addEventListener("hashchange", route);
-  document.addEventListener("visibilitychange", () => document.hidden || poll());
+
+// Likely mistakes are looked at before anything is started; of several datasets none is.
+function onUploaded(dataset, alone) {
+  if (alone && dataset.warnings?.length) go(dataset.id, "dataset");
+  else if (alone) starting.onRun(dataset);
+  if (current("datasets") !== null) route();
   poll();
+}
+
+const built = buildLists().then(() => {
+  setUpListing({ onRun: () => newRun() });
+  setUpUpload({ onUploaded });
+  $("home-run").addEventListener("click", () => newRun());
+}, (error) => toast(error.message));
+if (await setUpAccess()) {
+  await built;
+  window.addEventListener("hashchange", () => {
+    route();
+    if (isHome()) poll();
+  });
+  document.addEventListener("visibilitychange", () => document.hidden || poll());
   route();
+  poll();
 }

@@ -41,6 +41,15 @@ export function modelOf(run) {
   return isForces(run) ? SHORT[run.spec.preset] ?? spoken(run.spec.preset) : `${run.spec.division} bodies`;
 }
 
+// How the model of a job fits: "good 1.1×", with the larger one of its misfits as multiples of the noise; null if not known.
+export function fitBadge(job) {
+  const { fit_badge: fit = null, residual_over_noise: fitted = null, held_out_over_noise: heldOut = null } = job;
+  if (fit === null) return null;
+  const worst = Math.max(fitted ?? 0, heldOut ?? 0);
+  const title = `Residual ${rounded(fitted, 2)} times the noise${heldOut === null ? "" : `, held out ${rounded(heldOut, 2)} times`}`;
+  return el("span", { className: `badge fit-${fit}`, title }, `${fit} ${rounded(worst, 2)}×`);
+}
+
 export const modelInWords = (job) => (isSeries(job) ? `rig ${job.rig}` : modelOf(job));
 
 // The misfit of a run: a number and its unit.
@@ -56,19 +65,6 @@ export function misfit(run) {
 export const relativeMisfit = ({ relative_to: relativeTo }, value) => (relativeTo === "noise"
   ? { value: rounded(value), unit: "× noise" }
   : { value: rounded(value === null ? null : 100 * value), unit: OF_RANGE });
-
-const FIT_TITLES = {
-  good: "Noise explains what the model leaves", doubtful: "More is left than noise explains",
-  wrong: "Most of what is left is not noise",
-};
-
-// A badge with the residual as a multiple of the noise, the larger one of fitted and held-out recordings; null where it is not known.
-export function fitBadge(job) {
-  if (!job.fit_badge) return null;
-  const worst = Math.max(job.residual_over_noise, job.held_out_over_noise ?? 0);
-  return el("span", { className: `badge fit-${job.fit_badge}`, title: `${FIT_TITLES[job.fit_badge]}: residual / noise` },
-    `${job.fit_badge} ${rounded(worst, 2)}×`);
-}
 
 // What the fit of a finished job means, in a sentence.
 export function fitSentence(job) {

@@ -4,7 +4,7 @@ import { call, follow, get, isFinal, part } from "../base/api.js";
 import { $, el, fixed, keyNumber, rounded, toast, when } from "../base/format.js";
 import { showRemarks } from "../base/form_errors.js";
 import { badge, setBar, timeLeft } from "../parts/sidebar.js";
-import { remove } from "../pages/submit.js";
+import { cancel, remove } from "../pages/submit.js";
 import { importFile } from "../importing/page.js";
 import { hidePictures, setUpPictures, showPictures } from "./pictures.js";
 import { drawFound } from "./found.js";
@@ -146,7 +146,7 @@ async function act(action) {
     if (await remove("trackings", tracking.id, tracking.name)) location.hash = "films";
     return;
   }
-  await call("POST", `trackings/${part(tracking.id)}/${action}`).catch((error) => toast(error.message));
+  if (action === "cancel") await cancel("trackings", tracking.id, tracking.name);
 }
 
 // The tracks become a file of the import page, which asks for what they do not state.

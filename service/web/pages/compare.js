@@ -3,7 +3,7 @@
 import { get, history, part } from "../base/api.js";
 import { $, DASH, duration, el, rounded, plain, significant, toast } from "../base/format.js";
 import { badge, runName } from "../parts/sidebar.js";
-import { MOST_COMPARED } from "./table_page.js";
+import { MOST_COMPARED } from "../lists/table.js";
 import { axis, draw } from "../base/plots.js";
 import { isSeries, OF_RANGE, relativeMisfit, request, spoken } from "../base/labels.js";
 

@@ -2,6 +2,7 @@
 
 import { get, part, postJson } from "../base/api.js";
 import { $, el, plain, plural, significant, size, toast, when } from "../base/format.js";
+import { showNotes } from "../lists/edit.js";
 import { showDrawing } from "../parts/drawing.js";
 import { setUpSimulation, showSimulation } from "../parts/driving.js";
 import { hideSeries, redrawSeries, seriesRecordings, setUpSeries, showSeries } from "../parts/series.js";
@@ -84,6 +85,10 @@ function drawHead() {
   $("dataset-name").textContent = dataset.name;
   const held = { tracks: () => [plural(dataset.markers, "tracked marker")], forces: () => ["forces"],
     series: () => [`series of rig ${dataset.rig.name}`, plural(dataset.rig.channels.length, "channel")] }[dataset.kind]();
+  showNotes($("dataset-name"), "datasets", dataset, (changed) => {
+    dataset = changed;
+    drawHead();
+  });
   $("dataset-about").textContent = [...held,
     plural(dataset.recordings.length, "recording"), size(dataset.size_bytes), when(dataset.created_at)].join(" · ");
   $("dataset-description").textContent = dataset.description;

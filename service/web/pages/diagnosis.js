@@ -1,11 +1,12 @@
 // The selected diagnosis: its progress, then its report as the server draws it.
 
-import { call, follow, get, getText, isFinal, part } from "../base/api.js";
+import { follow, get, getText, isFinal, part } from "../base/api.js";
 import { $, plural, toast, when } from "../base/format.js";
 import { redrawPartial, showPartial } from "../diagnosing/partial.js";
+import { showNotes } from "../lists/edit.js";
 import { showWaiting } from "../parts/driving.js";
 import { badge, setBar, timeLeft } from "../parts/sidebar.js";
-import { remove } from "./submit.js";
+import { cancel, remove } from "./submit.js";
 import { fitBadge, forceSetup, isForces, modelInWords, withEffects } from "../base/labels.js";
 
 let diagnosis = null;
@@ -70,6 +71,10 @@ function update() {
   showPartial(diagnosis);
   $("diagnosis-about").textContent = [modelInWords(diagnosis), withEffects(diagnosis), ...(isForces(diagnosis) ? forceSetup(diagnosis.spec) : []),
     diagnosis.run_id ? "from the best genome of a run" : null, when(diagnosis.created_at)].filter(Boolean).join(" · ");
+  showNotes($("diagnosis-name"), "diagnoses", diagnosis, ({ name, notes }) => {
+    diagnosis = { ...diagnosis, name, notes };
+    update();
+  });
   $("diagnosis-error").hidden = !diagnosis.error;
   $("diagnosis-error").textContent = diagnosis.error ?? "";
   showWaiting($("diagnosis-waiting"), diagnosis);
@@ -114,5 +119,5 @@ async function act(action) {
     if (await remove("diagnoses", diagnosis.id, diagnosis.name)) hooks.onDeleted();
     return;
   }
-  await call("POST", `diagnoses/${part(diagnosis.id)}/${action}`).catch((error) => toast(error.message));
+  if (action === "cancel") await cancel("diagnoses", diagnosis.id, diagnosis.name);
 }

@@ -8,8 +8,9 @@ import { redrawCurves, setUpCurves, showCurves } from "../parts/curves.js";
 import { showWaiting } from "../parts/driving.js";
 import { aboutHistory, drawHistory } from "../parts/history.js";
 import { badge, runName, setBar, timeLeft } from "../parts/sidebar.js";
+import { showNotes } from "../lists/edit.js";
 import { redrawLoads } from "../parts/loads.js";
-import { remove } from "./submit.js";
+import { cancel, remove } from "./submit.js";
 import { drawGenes, drawMisfit, drawNumbers, drawSeriesMisfit } from "../parts/tables.js";
 import { hideWing, redrawWing, setUpViewer, showWing } from "../parts/viewer.js";
 import { showRemarks } from "../base/form_errors.js";
@@ -170,6 +171,10 @@ function drawHead() {
   $("run-fit").textContent = run.state === "SUCCEEDED" ? fitSentence(run) : "";
   placeHistory();
   $("run-about").textContent = [dataset.name, ...setup(run), when(run.created_at)].join(" · ");
+  showNotes($("run-name"), "runs", run, ({ name, notes }) => {
+    run = { ...run, name, notes };
+    drawHead();
+  });
   $("run-error").hidden = !run.error;
   $("run-error").textContent = run.error ?? "";
   showWaiting($("run-waiting"), run);
@@ -210,6 +215,10 @@ function drawFitness() {
 async function act(action) {
   if (action === "delete") {
     if (await remove("runs", run.id, runName(run))) hooks.onDeleted();
+    return;
+  }
+  if (action === "cancel") {
+    await cancel("runs", run.id, runName(run));
     return;
   }
   try {

@@ -1,11 +1,11 @@
-// Forms that start a run and upload a dataset; the server checks them, and its errors are shown at the fields.
+// The form that starts a run, and questions before a job is cancelled or something deleted; the server checks them, and its errors are shown at the fields.
 
 import { ApiError, call, get, part, postJson } from "../base/api.js";
+import { confirmed } from "../base/confirm.js";
 import { copy, curl, python } from "../base/copying.js";
-import { $, el, size, toast } from "../base/format.js";
+import { $, el, toast } from "../base/format.js";
 import { showErrors } from "../base/form_errors.js";
 import { isForces, isSeries, METHODS, MODES, PRESETS, setup, spoken } from "../base/labels.js";
-import { stored } from "../parts/warnings.js";
 
 const TYPED_MS = 350;
 const CHOICES = { ...METHODS, auto: "auto, recommended" };
@@ -19,7 +19,7 @@ let typing = null;
 let checked = 0;
 let checking = Promise.resolve();
 
-export function setUpSubmit({ onSubmitted, onUploaded }) {
+export function setUpSubmit({ onSubmitted }) {
   const form = $("submit-form");
   let sent = null;
   form.addEventListener("submit", async (event) => {
@@ -56,11 +56,9 @@ export function setUpSubmit({ onSubmitted, onUploaded }) {
   });
   $("submit-curl").addEventListener("click", () => copy(curl("runs", values(form))));
   $("submit-python").addEventListener("click", () => copy(python(values(form))));
-  $("pick-file").addEventListener("click", () => $("file").click());
-  $("file").addEventListener("change", () => upload($("file").files[0], onUploaded));
 }
 
-// ``dataset`` is preselected; it may be older than those of the lists. Runs of series start on the page of their dataset.
+// ``dataset`` is preselected; it may be older than ``all``. Runs of series start on the page of their dataset.
 export function openSubmit(all, dataset = all.find((one) => !isSeries(one))) {
   const known = all.filter((one) => !isSeries(one));
   datasets = known.some((one) => one.id === dataset?.id) || !dataset ? known : [dataset, ...known];
@@ -191,29 +189,6 @@ function options(select, words, values) {
 const tick = (value, text, checked, title = "") =>
   el("label", { className: "tick", title }, el("input", { type: "checkbox", value, checked }), ` ${text}`);
 
-async function upload(file, onUploaded) {
-  if (!file) return;
-  const state = $("upload-state");
-  state.className = "quiet";
-  state.textContent = `Uploading ${file.name}, ${size(file.size)}`;
-  $("pick-file").disabled = true;
-  try {
-    const dataset = await send(file, (fraction) => {
-      state.textContent = fraction < 1 ? `Uploading ${file.name}, ${Math.round(100 * fraction)} %` : `Checking ${file.name}`;
-    });
-    state.textContent = "";
-    toast(stored("Uploaded", dataset));
-    onUploaded(dataset);
-  } catch (error) {
-    state.className = "error";
-    state.replaceChildren(el("p", {}, error.message),
-      ...error.errors.map((item) => el("p", {}, `${item.where}: ${item.message}`)));
-  } finally {
-    $("file").value = "";
-    $("pick-file").disabled = false;
-  }
-}
-
 // XMLHttpRequest, because fetch does not report the progress of an upload.
 export function send(file, onFraction) {
   return new Promise((resolve, reject) => {
@@ -234,8 +209,16 @@ export function send(file, onFraction) {
   });
 }
 
+// Ask whether the job is to be cancelled, and let it be; ``kind``: "runs", "diagnoses", "trackings".
+export async function cancel(kind, id, name) {
+  const kept = kind === "runs" ? "The generations that it has finished are kept. It cannot be resumed." : "What it has computed so far is lost. It cannot be resumed.";
+  if (!(await confirmed(`Cancel ${name}?`, kept, "Cancel it"))) return;
+  // The new state arrives as an event; the answer may be older than the last event.
+  await call("POST", `${kind}/${part(id)}/cancel`).catch((error) => toast(error.message));
+}
+
 export async function remove(kind, id, name) {
-  if (!window.confirm(`Delete ${name}? This cannot be undone.`)) return false;
+  if (!(await confirmed(`Delete ${name}?`, "This cannot be undone.", "Delete"))) return false;
   try {
     await call("DELETE", `${kind}/${part(id)}`);
     return true;

@@ -80,6 +80,7 @@ def test_the_commands_are_those_promised() -> None:
         "list",
         "submit",
         "show",
+        "edit",
         "watch",
         "cancel",
         "pause",
@@ -91,11 +92,11 @@ def test_the_commands_are_those_promised() -> None:
         "predict",
         "export",
     ]
-    data = ["list", "upload", "show", "download", "delete", "check"]
+    data = ["list", "upload", "show", "edit", "download", "delete", "check"]
     expected = (
         {"serve", "campaign", "balance", "kinematics", "forces", "simulate", "models", "effects", "diagnose", "drive"}
         | {"import", "import-forces", "align", "wing-template", "wing-drawing"}
-        | {f"diagnoses {c}" for c in ("list", "watch", "cancel", "delete", "export")}
+        | {f"diagnoses {c}" for c in ("list", "watch", "edit", "cancel", "delete", "export")}
         | {f"runs {c}" for c in steer}
         | {f"datasets {c}" for c in data}
         | {"backup", "restore", "rig check", "rig list"}

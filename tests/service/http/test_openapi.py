@@ -135,7 +135,7 @@ def test_every_call_is_in_the_documentation_and_every_documented_one_exists(spec
     text = DOCS.read_text()
     documented = {
         (method, re.sub(r"{\w+}", "{}", path.split("?")[0]))
-        for method, path in re.findall(r"`(GET|POST|PUT|DELETE) (/v1/[^`\s]*)", text)
+        for method, path in re.findall(r"`(GET|POST|PUT|PATCH|DELETE) (/v1/[^`\s]*)", text)
     }
     for action in ("pause", "resume"):
         assert f"(`/{action}`" in text.replace(", `/", "`(`/") or f"/{action}" in text

@@ -81,9 +81,12 @@ def test_a_dataset_is_diagnosed_and_the_finding_shown(seen: Seen, server: Server
     # The report's own style is applied: its policy lets that in, and nothing else.
     assert report.locator(".over").evaluate("(node) => getComputedStyle(node).marginTop") == "0px"
     report.close()
-    seen.wait("document.querySelector('#newest-diagnoses .card').textContent.includes('named')")
-    seen.page.on("dialog", lambda dialog: dialog.accept())
+    seen.page.click("h1 a")
+    seen.wait("document.querySelector('#newest-diagnoses .card')?.textContent.includes('named')")
+    seen.page.click("#newest-diagnoses .card")
+    seen.page.wait_for_selector("#diagnosis-actions [data-action=delete]")
     seen.page.click("#diagnosis-actions [data-action=delete]")
+    seen.page.click("#confirm-yes")
     seen.wait("document.querySelector('#newest-diagnoses .none') && !document.getElementById('empty').hidden")
     assert seen.errors == []
     assert seen.foreign == []
@@ -101,6 +104,7 @@ def test_a_run_is_diagnosed_from_its_best_genome_and_cancelled(seen: Seen, serve
     seen.wait("location.hash.startsWith('#diagnosis=')")
     seen.wait(TEXT.format("diagnosis-about") + ".includes('from the best genome of a run')")
     seen.page.click("#diagnosis-actions [data-action=cancel]")
+    seen.page.click("#confirm-yes")
     seen.wait(TEXT.format("diagnosis-name") + ".includes('cancelled')")
     (found,) = server.api.get(f"/v1/diagnoses?run_id={run}")["items"]
     assert (found["state"], len(found["spec"]["start"])) == ("CANCELLED", 2)

@@ -152,11 +152,11 @@ def test_faults_are_shown_at_the_file_concerned(seen: Seen, api: Api, files: Pat
     seen.page.set_input_files("#film-picked", files / "clip-left.avi")
     seen.wait("document.querySelectorAll('#film-files .badge.good').length === 1")
     assert seen.page.locator("#film-files .error").count() == 0
-    seen.page.once("dialog", lambda dialog: dialog.dismiss())
     seen.page.click("#film-delete")
+    seen.page.keyboard.press("Escape")
     assert api.get(f"/v1/films/{film}")["name"] == "faulty"
-    seen.page.once("dialog", lambda dialog: dialog.accept())
     seen.page.click("#film-delete")
+    seen.page.click("#confirm-yes")
     seen.wait("location.hash === '#films' && !document.getElementById('films-list').hidden")
     assert api.client.get(f"/v1/films/{film}").status_code == 404
 
@@ -247,13 +247,14 @@ def test_a_tracking_is_cancelled_and_deleted(seen: Seen, api: Api, film: str) ->
     ids = [api.client.post("/v1/trackings", json=body | {"name": f"turn {k}"}).json()["id"] for k in range(4)]
     seen.show(f"tracking={ids[-1]}")  # waits for its turn
     seen.page.click("#tracking-actions [data-action=cancel]")
+    seen.page.click("#confirm-yes")
     seen.wait("document.getElementById('tracking-name').textContent === 'turn 3 cancelled'")
     for other in ids[:-1]:
         api.client.post(f"/v1/trackings/{other}/cancel")
     seen.page.click("#tracking-film")
     seen.wait("document.getElementById('film-trackings')?.textContent.includes('turn 3 cancelled')")
     seen.page.click("#film-trackings a:text('turn 3')")
-    seen.page.once("dialog", lambda dialog: dialog.accept())
     seen.page.click("#tracking-actions [data-action=delete]")
+    seen.page.click("#confirm-yes")
     seen.wait("location.hash === '#films' && document.querySelectorAll('#trackings-table tbody tr').length > 0")
     assert api.client.get(f"/v1/trackings/{ids[-1]}").status_code == 404

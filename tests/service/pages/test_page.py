@@ -50,7 +50,10 @@ def _finished(server: ServerProcess, dataset_id: str) -> str:
 def test_an_empty_page_says_what_to_do(seen: Seen) -> None:
     seen.open()
     seen.wait("document.querySelector('#health').textContent.includes('version')")
-    assert seen.page.is_visible("#empty")
+    seen.wait("document.querySelector('#empty-title')?.textContent === 'Start in three steps'")
+    assert seen.page.locator("#home-steps li").count() == 3
+    assert seen.page.is_hidden("#home-lists")
+    assert seen.page.is_hidden("aside"), "nothing is active"
     assert seen.errors == []
     assert seen.foreign == []
 
@@ -76,7 +79,6 @@ def test_a_finished_run_is_shown_in_full(seen: Seen, server: ServerProcess, data
     assert "yes" in seen.page.inner_text("#genes tbody tr:first-child")
     assert "solved to 0.1 mm" in seen.page.inner_text("#run-about")
     assert "144 steps per beat, estimated error 0.02 mm" in seen.page.inner_text("#wing-note")
-    assert seen.page.locator(".cards li.current").count() == 1
     assert seen.errors == []
     assert seen.foreign == []
 
@@ -138,8 +140,14 @@ def test_a_live_run_grows_pauses_and_is_cancelled(seen: Seen, server: ServerProc
     seen.wait("document.querySelector('#run-name .badge').textContent === 'paused'")
     seen.page.click("[data-action=resume]")
     seen.wait("document.querySelector('#run-name .badge').textContent === 'running'")
+    seen.wait(f"document.querySelector('#active-jobs .card[aria-current]')?.hash === '#run={run_id}'")
     seen.page.click("[data-action=cancel]")
+    seen.page.click("#confirm-no")
+    assert server.api.run(run_id)["state"] == "RUNNING"
+    seen.page.click("[data-action=cancel]")
+    seen.page.click("#confirm-yes")
     seen.wait("document.querySelector('#run-name .badge').textContent === 'cancelled'")
+    seen.wait("getComputedStyle(document.querySelector('aside')).display === 'none'")
     assert server.api.run(run_id)["state"] == "CANCELLED"
     assert seen.errors == []
 

@@ -36,8 +36,11 @@ def test_the_page_is_of_use_within_a_second(browser: Browser, stored: tuple[Path
         context = browser.new_context(viewport={"width": 1300, "height": 900})
         seen = Seen.watched(context.new_page(), f"http://127.0.0.1:{server.port}")
         ready = {
-            "": "document.querySelectorAll('#newest-runs .card').length === 50",
+            "": "document.querySelectorAll('#newest-runs .card').length === 5",
             "runs": "document.querySelectorAll('#listing-table tbody tr').length === 100",
+            "runs&sort=fit&order=desc": "document.querySelectorAll('#listing-table tbody tr').length === 100",
+            "runs&sort=dataset&q=copied": "document.querySelectorAll('#listing-table tbody tr').length === 100",
+            "runs&grouped=1": "document.querySelectorAll('#listing-table tbody tr').length > 50",
             f"run={filled.longest}": "!document.getElementById('run').hidden",
         }
         for address, condition in ready.items():

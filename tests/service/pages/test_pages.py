@@ -118,7 +118,8 @@ def test_a_long_list_goes_on_where_it_ended(seen: Seen, server: ServerProcess) -
     made = [server.api.submit(other, max_generations=1, name=f"run {number}")["id"] for number in range(103)]
     seen.show(f"runs&dataset_id={other}")
     seen.wait(f"{ROWS.format('listing-table')} === 100")
-    assert seen.page.inner_text("#listing-note") == "100 newest, newest first"
+    seen.wait("document.getElementById('listing-note').textContent.includes('of')")
+    assert seen.page.inner_text("#listing-note") == "100 of 103, newest first"
     seen.page.click("#listing-more")
     seen.wait(f"{ROWS.format('listing-table')} === 103")
     assert [row[1] for row in seen.rows("listing-table")] == [f"run {number}" for number in reversed(range(103))]
@@ -219,7 +220,7 @@ def test_what_was_deleted_elsewhere_is_not_shown_any_longer(
     assert seen.page.title() == "wingfit"
     for address in ("run=", "compare=", "nothing=1"):
         seen.show(address)
-        seen.wait("document.getElementById('empty-title').textContent === 'Nothing selected'")
+        seen.wait("document.getElementById('empty-title').textContent === 'Newest results'")
 
 
 def test_what_is_copied_as_python_runs(seen: Seen, server: ServerProcess, runs: list[str]) -> None:
@@ -244,10 +245,13 @@ def test_the_page_is_used_by_keyboard(seen: Seen, runs: list[str]) -> None:
     assert seen.page.evaluate("document.activeElement.id") == "detail", "the address stays the page's"
     assert seen.page.url.endswith("#runs")
     reached = []
-    for _ in range(12):
+    for _ in range(24):
         seen.page.keyboard.press("Tab")
         reached.append(seen.page.evaluate("document.activeElement.id || document.activeElement.dataset.key || ''"))
-    assert reached[:2] == ["listing-state", "listing-dataset"]
+    assert reached[:6] == [
+        "listing-run", "listing-q", "listing-state", "listing-dataset", "listing-badge", "listing-grouped"
+    ]  # fmt: skip
+    assert "sort-residual_over_noise" in reached
     assert any(name.startswith("choose-") for name in reached)
     outline = seen.page.evaluate("getComputedStyle(document.activeElement).outlineStyle")
     assert outline != "none", "one sees where one is"
@@ -265,6 +269,8 @@ def test_nothing_stands_in_anyones_way(
         "": "document.querySelector('#newest-runs .card')",
         f"run={runs[0]}": DRAWN.format("beat", 1),
         "runs": f"{ROWS.format('listing-table')} > 0",
+        "runs&grouped=1": "document.querySelector('#listing-table .group')",
+        "datasets": f"{ROWS.format('listing-table')} > 0",
         f"dataset={dataset['id']}": DRAWN.format("conditions", 1),
         f"diagnosis={diagnosis}": "document.getElementById('report').shadowRoot?.querySelector('h1')",
         f"compare={','.join(runs)}": DRAWN.format("compare-plot", 1),
@@ -278,7 +284,8 @@ def test_nothing_stands_in_anyones_way(
         told = [(one["id"], [node["target"] for node in one["nodes"]][:3]) for one in found]
         if told:
             wrong[address.split("=")[0]] = told
-    seen.page.click("[data-key^=run-]")
+    seen.show("")
+    seen.page.click("[data-key^=run-ds]")
     seen.wait("document.getElementById('submit-dialog').open")
     wrong |= {"form": told} if (told := [one["id"] for one in axe.Axe().run(seen.page).response["violations"]]) else {}
     context.close()

@@ -257,6 +257,7 @@ def test_a_driven_run_is_followed_to_its_end(seen: Seen, api: Api, decay: str) -
     assert [text.casefold() for text in remarks] == [f"{remark}.".casefold() for remark in result["remarks"]]
     assert any(text.startswith("charge0[from-3]: ") for text in remarks), "names of genes stay as they are"
     assert "leak.size" in [row[0] for row in seen.rows("genes")]
+    seen.page.click("h1 a")
     card = seen.page.inner_text(f"[data-key={made}]")
     assert "% of range" in card
 
@@ -305,8 +306,8 @@ def test_lists_and_comparisons_have_the_units_of_series(
     seen.show(f"runs&dataset_id={decay}")
     seen.wait(f"{TEXT.format('listing-table')}.includes('driven here')")
     row = next(row for row in seen.rows("listing-table") if row[1] == "driven here")
-    assert row[4].endswith(" % of range")
-    assert row[5:7] == ["decay with leak", "auto, joint"]
+    assert row[7].endswith(" % of range")
+    assert row[8:10] == ["decay with leak", "auto, joint"]
     assert "mm" not in seen.page.inner_text("#listing-table")
     other = str(api.submit(decay, rig="decay", **SHORT | {"effects": []})["id"])
     api.finish(other, 60)
@@ -326,7 +327,7 @@ def test_lists_and_comparisons_have_the_units_of_series(
 def test_the_form_of_new_runs_has_no_series(seen: Seen, decay: str, vehicle: str) -> None:
     seen.show("")
     seen.wait(f"document.querySelector('[data-key=run-{vehicle}]')")
-    seen.page.click("#new-run")
+    seen.page.click("#home-run")
     seen.wait("document.getElementById('submit-dialog').open")
     options = seen.page.locator("[name=dataset_id] option").evaluate_all("(all) => all.map((one) => one.value)")
     assert vehicle in options

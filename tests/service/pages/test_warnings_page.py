@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import zipfile
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -46,7 +47,10 @@ def test_a_likely_mistake_is_shown_after_the_upload(browser: Browser, api: Api, 
     context = browser.new_context(viewport={"width": 1280, "height": 800}, color_scheme="light")
     seen = Seen.watched(context.new_page(), str(api.client.base_url).rstrip("/"))
     seen.show("")
-    seen.page.set_input_files("#file", wrong)
+    folder = wrong.with_name("thin")
+    with zipfile.ZipFile(wrong) as archive:
+        archive.extractall(folder)
+    seen.page.set_input_files("#folder", folder)  # the page makes an archive of it
     seen.wait(SHOWN)
     assert "it has 1 likely mistake" in seen.page.inner_text("#toast")
     assert not seen.page.is_visible("#submit-dialog"), "nothing is started before the mistake has been looked at"

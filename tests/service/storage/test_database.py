@@ -29,7 +29,7 @@ def test_migrations_from_nothing_give_the_tables_that_the_code_means(tmp_path: P
     with engine.connect() as connection:
         context = MigrationContext.configure(connection, opts={"compare_type": True})
         assert compare_metadata(context, Table.metadata) == []
-        assert context.get_current_revision() == "0009"
+        assert context.get_current_revision() == "0010"
     engine.dispose()
 
 
@@ -146,6 +146,7 @@ def test_what_the_first_schema_stored_is_all_there(tmp_path: Path) -> None:
         dataset = valid(Dataset, api.get("/v1/datasets/ds_1"))
         assert (dataset.kind, dataset.markers, dataset.recordings[0].channels) == ("tracks", 2, [])
         done = valid(Run, api.run("run_1"))
+        assert (dataset.notes, done.notes, done.name) == ("", "", "old")
         assert (done.kind, done.best_mm, done.best_mn) == ("tracks", 1.5, None)
         assert (done.spec.mode, done.spec.method, done.spec.finish, done.spec.seed) == ("staged", "genetic", False, 4)
         result = valid(Result, api.get("/v1/runs/run_1/result"))

@@ -40,7 +40,8 @@ def test_convergence_and_outcome_are_in_millinewtons(seen: Seen, api: Api, local
     assert "low-pass at 3.2 × flap frequency" in about
     assert "mm" not in about
     assert not seen.page.is_visible("#tracks-part")
-    assert "mN" in seen.page.inner_text("#newest-runs")
+    seen.page.click("h1 a")
+    seen.wait("document.getElementById('newest-runs').textContent.includes('mN')")
     assert "6 recordings of forces, 1 held out" in seen.page.inner_text("#newest-datasets")
     assert seen.errors == []
 
