@@ -191,7 +191,6 @@ setUpImport({
   },
 });
 setUpFilms({ onAway: setAway, onMissing });
-setUpListing();
 setUpDiagnoseForm({ onSubmitted: onDiagnosisSubmitted });
 setUpCompare();
 setUpSubmit({

@@ -24,6 +24,7 @@ let groups = []; // {id, name, count, open, items, cursor}; without groups a sin
 let more = false; // whether there are more groups than these
 let total = null;
 let names = new Map(); // of datasets, by id
+let complete = false; // whether the datasets of all jobs are among them
 let chosen = new Set();
 let request = 0;
 let typing = null;
@@ -75,7 +76,7 @@ export async function showListing(next, parameters) {
   $("listing").hidden = !kind;
   if (!kind) return;
   if (other) {
-    [chosen, names] = [new Set(), new Map()];
+    [chosen, names, complete] = [new Set(), new Map(), false];
     clear();
   }
   document.title = `${title()} · wingfit`;
@@ -102,7 +103,9 @@ async function show(parameters) {
   drawHead();
   if (grouped) await loadGroups(mine);
   else await Promise.all([load(groups[0], mine), kind === "datasets" ? null : count(mine)]);
-  if (mine === request && kind !== "datasets") await loadNames(mine);
+  if (mine !== request || kind === "datasets") return;
+  if (!complete) await loadNames(mine);
+  else fillFilters();
 }
 
 const group = (id, name, jobs = null) => ({ id, name, count: jobs, open: id === null, items: [], cursor: null, loaded: false });
@@ -111,20 +114,23 @@ const query = (values) => new URLSearchParams(Object.entries(values).filter(([, 
 
 // The datasets among which can be chosen; their jobs are counted without the filters.
 async function loadNames(mine) {
-  if (!names.size) {
-    const page = await get(`${kind}/groups`).catch(() => null); // the filter then lists ids; loading the table reports the error
-    if (mine !== request || !page) return;
-    names = new Map(page.items.map((one) => [one.dataset_id, one.dataset_name]));
-  }
+  const page = await get(`${kind}/groups`).catch(() => null); // the filter then lists ids; loading the table reports the error
+  if (mine !== request || !page) return;
+  for (const one of page.items) names.set(one.dataset_id, one.dataset_name);
+  complete = true;
   fillFilters();
-  draw();
+}
+
+function learn(page) {
+  for (const one of page.items) names.set(one.dataset_id, one.dataset_name);
+  complete ||= !Object.keys(filters).length;
+  total = page.next_cursor ? null : page.items.reduce((sum, one) => sum + one.count, 0);
 }
 
 async function count(mine) {
   const page = await get(`${kind}/groups?${query(filters)}`).catch(() => null);
   if (mine !== request || !page) return;
-  for (const one of page.items) names.set(one.dataset_id, one.dataset_name);
-  total = page.next_cursor ? null : page.items.reduce((sum, one) => sum + one.count, 0);
+  learn(page);
   draw();
 }
 
@@ -132,10 +138,9 @@ async function loadGroups(mine) {
   try {
     const page = await get(`${kind}/groups?${query(filters)}`);
     if (mine !== request) return;
-    for (const one of page.items) names.set(one.dataset_id, one.dataset_name);
+    learn(page);
     groups = page.items.map((one) => group(one.dataset_id, one.dataset_name, one.count));
     more = page.next_cursor !== null;
-    total = more ? null : page.items.reduce((sum, one) => sum + one.count, 0);
   } catch (error) {
     if (mine === request) toast(error.text);
     return;
