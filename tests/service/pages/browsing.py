@@ -90,7 +90,8 @@ class Seen:
         try:
             return bool(self.page.evaluate(condition))
         except Error as error:
-            if "Execution context was destroyed" in str(error):  # the page is being loaded anew
+            # The page is being loaded anew, or a part of it is not there yet.
+            if "Execution context was destroyed" in str(error) or "Cannot read properties of null" in str(error):
                 return False
             raise
 
