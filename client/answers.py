@@ -160,19 +160,6 @@ class Dataset(TypedDict):
     warnings: list[DatasetWarning]
 
 
-class SeriesValues(TypedDict):
-    """One recording of a rig of the user's own: the values of its channels and inputs, in the dataset's units.
-
-    Of a long recording only every ``stride``-th sample is sent; null where a value was not recorded.
-    """
-
-    recording: str
-    time_s: list[float]
-    channels: dict[str, list[float | None]]
-    inputs: dict[str, list[float | None]]
-    stride: int
-
-
 class JobSpec(TypedDict):
     """The settings that runs and diagnoses have in common; settings that the request omitted have their defaults.
 

@@ -27,7 +27,7 @@ function theme() {
   const colour = (name) => style.getPropertyValue(`--${name}`).trim();
   return {
     ink: colour("ink"), quiet: colour("quiet"), faint: colour("faint"), line: colour("line"),
-    series: [1, 2, 3, 4, 5, 6].map((k) => colour(`series-${k}`)), accent: colour("accent"), ground: colour("ground"), surface: colour("surface"),
+    series: [1, 2, 3, 4, 5, 6].map((k) => colour(`series-${k}`)), accent: colour("accent"), bad: colour("bad"), ground: colour("ground"), surface: colour("surface"),
     font: { family: getComputedStyle(document.body).fontFamily, size: 12, color: colour("quiet") },
   };
 }
