@@ -61,14 +61,24 @@ def note(text: str) -> None:
     err().print(Text(_shown(text)))
 
 
+def next_step(text: str) -> None:
+    """Print the command that comes next, with which every command ends, to standard error: a pipe gets results only."""
+    note(f"next: {text}")
+
+
 def print_json(value: Any) -> None:
     """Print ``value`` as indented JSON."""
     sys.stdout.write(json.dumps(value, indent=2, ensure_ascii=False) + "\n")
 
 
-def emit(answer: Any, show: Callable[[Any], None], *, as_json: bool) -> None:
-    """Print an answer of the server as JSON or, by calling ``show``, as text."""
-    print_json(answer) if as_json else show(answer)
+def emit(answer: Any, show: Callable[[Any], None], *, as_json: bool, then: str = "") -> None:
+    """Print an answer of the server as JSON; or, by calling ``show``, as text, with the next step ``then``, if any."""
+    if as_json:
+        print_json(answer)
+        return
+    show(answer)
+    if then:
+        next_step(then)
 
 
 def remarks(lines: Iterable[str], label: str = "note") -> None:
