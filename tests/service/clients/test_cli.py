@@ -88,12 +88,14 @@ def test_the_commands_are_those_promised() -> None:
         "forces",
         "predict",
         "export",
+        "history",
+        "residual",
     ]
     data = ["list", "upload", "show", "download", "delete", "check"]
     expected = (
         {"serve", "campaign", "balance", "kinematics", "forces", "simulate", "models", "effects", "diagnose", "drive"}
         | {"import", "import-forces", "align", "wing-template", "wing-drawing"}
-        | {f"diagnoses {c}" for c in ("list", "watch", "cancel", "delete", "export")}
+        | {f"diagnoses {c}" for c in ("list", "watch", "cancel", "delete", "export", "residual")}
         | {f"runs {c}" for c in steer}
         | {f"datasets {c}" for c in data}
         | {"backup", "restore", "rig check", "rig list"}
@@ -181,6 +183,24 @@ def test_upload_submit_watch_fetch(wingfit: Wingfit, dataset_id: str, tmp_path: 
     assert float(rows[3]["simulated_x_mm"]) > 0
 
 
+def test_history_and_residual_are_drawn_and_saved(wingfit: Wingfit, dataset_id: str, tmp_path: Path) -> None:
+    run_id = json.loads(wingfit("runs", "submit", dataset_id, "--max-generations", "3", "--json")[1])["id"]
+    wingfit("runs", "watch", run_id)
+    figure = tmp_path / "figure.html"
+    code, out, err = wingfit("runs", "history", run_id, "--plot", str(figure))
+    assert code == 0, err
+    assert out.startswith("fitness by generation: best ")
+    assert "* best   o mean" in out
+    assert [line.split()[:2] for line in out.splitlines()[-2:]] == [["structural", "3"], ["aerodynamic", "3"]]
+    assert "plotly" in figure.read_text()
+    assert f"next: open {figure}" in err
+    assert len(json.loads(wingfit("runs", "history", run_id, "--json")[1])) == 6
+    code, out, _ = wingfit("runs", "residual", run_id, "--genome", "nominal", "--recording", "fast")
+    assert (code, out.splitlines()[0]) == (0, "distance between recorded and simulated markers, fast")
+    (misfit,) = json.loads(wingfit("runs", "residual", run_id, "--json")[1])
+    assert (misfit["unit"], len(misfit["x"])) == ("mm", len(misfit["lines"]["largest"]))
+
+
 def test_reading_commands_speak_json(wingfit: Wingfit, dataset_id: str) -> None:
     run_id = json.loads(wingfit("runs", "submit", dataset_id, "--max-generations", "1", "--json")[1])["id"]
     assert json.loads(wingfit("runs", "watch", run_id, "--json")[1])["state"] == "SUCCEEDED"
@@ -214,6 +234,8 @@ def test_a_command_ends_with_the_next_step(wingfit: Wingfit, dataset_id: str, tm
         ("runs", "genome", run_id),
         ("runs", "genome", run_id, "-o", best),
         ("runs", "result", run_id),
+        ("runs", "history", run_id),
+        ("runs", "residual", run_id),
         ("runs", "export", run_id, "--format", "csv", "-o", str(tmp_path / "run.csv")),
         ("simulate", "--dataset", dataset_id),
         ("diagnoses", "list"),
