@@ -174,7 +174,7 @@ def _dots(
         for k in range(steps + 1):
             column = round(start[0] + (here[0] - start[0]) * k / steps)
             row = round(start[1] + (here[1] - start[1]) * k / steps)
-            if dash == 0 or (dash == 1 and column % 6 < 3) or column % 4 == 0:
+            if dash == 0 or (dash == 1 and column % 6 < 3) or (dash > 1 and column % 4 == 0):
                 yield column, row
         before = here
 
