@@ -10,7 +10,7 @@ import typer
 from wingfit.cli.base import options as o
 from wingfit.cli.base.files import new_file, write_text
 from wingfit.cli.base.output import emit, note, progress
-from wingfit.cli.curves import finding_residual
+from wingfit.cli.charts.commands import finding_residual
 from wingfit.cli.driving import drive_job, rig_here, rig_setting
 from wingfit.cli.findings import print_finding
 from wingfit.cli.jobs import INTERRUPTED, JobKind, check_ended_well, commands, dataset_id, follow

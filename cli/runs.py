@@ -14,7 +14,7 @@ from wingfit.cli.base import options as o
 from wingfit.cli.base.files import new_file, write_text
 from wingfit.cli.base.output import duration, emit, moment, next_step, note, number, percent, progress, say, table
 from wingfit.cli.base.rounding import with_unit
-from wingfit.cli.curves import history, residual
+from wingfit.cli.charts.commands import history, residual
 from wingfit.cli.driving import drive_job, rig_here, rig_setting
 from wingfit.cli.forces.runs import forces, predict
 from wingfit.cli.jobs import (

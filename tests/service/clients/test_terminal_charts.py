@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from wingfit.cli.base.chart import BRAILLE, Chart, Line, drawn, show_chart
+from wingfit.cli.charts.chart import BRAILLE, Chart, Line, drawn, show_chart
 
 X = [k / 20 for k in range(21)]
 RAMP = Line("ramp", X, X)

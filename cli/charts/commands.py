@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from wingfit.cli.base.chart import Chart, Line, show_chart
 from wingfit.cli.base.files import new_file, write_text
 from wingfit.cli.base.options import AsJson, JobId, Url
 from wingfit.cli.base.output import emit, number, say, table
+from wingfit.cli.charts.chart import Chart, Line, show_chart
 from wingfit.client import answers as a
 from wingfit.client.client import DEFAULT_URL, Client, WingfitError
 
