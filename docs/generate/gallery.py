@@ -2,7 +2,7 @@
 
 Every finding comes from a whole diagnosis of a dataset of ``examples/``, or of recordings that a plant of the
 benchmarks simulates, which shares no code with what diagnoses them. For each the command writes the finding
-(NAME.json), its report (NAME.html) and a small figure (NAME.svg), then the list in docs/gallery.md. ``--render``
+(NAME.json), its report (NAME.html) and a figure (NAME.svg), then the list in docs/gallery.md. ``--render``
 diagnoses nothing: it writes reports, figures and list again from the findings. The command takes a few minutes on
 two cores.
 """
@@ -102,16 +102,16 @@ ENTRIES = {
     ),
     "wing-fault": Entry(
         "A wing: the cameras are at fault",
-        "The physics of the model is complete, but the calibration of the cameras has a wrong scale: all lengths are 2 % "
-        "too large. The diagnosis names this fault of the measurement, and no physics.",
+        "The physics of the model is complete, but the calibration of the cameras has a wrong scale: all lengths are "
+        "2 % too large. The diagnosis names this fault of the measurement, and no physics.",
         "measurement fault",
         _filmed("rescaled", {"scale_error": {"strength": 0.02}}),
         _wing("4"),
     ),
     "wing-unnamed": Entry(
         "A wing: the cause is not in the library",
-        "The wing touches an elastic obstacle above it, which no effect of the library describes. The diagnosis says "
-        "that physics is missing and that it knows no name for it; it shows where on the wing and when in the beat.",
+        "At 70 % of the span and half of the chord, the wing touches an elastic obstacle above it, which no effect of "
+        "the library describes. The diagnosis says that physics is missing, where and when, and that it has no name.",
         "unnamed",
         _filmed("obstacle", {"stop": {"strength": 60.0, "span": 0.7, "chord": 0.5, "stroke": 0.85}}),
         _wing("4"),
@@ -173,18 +173,27 @@ def stored(name: str) -> Finding:
 
 
 def figure(finding: Finding) -> str:
-    """Draw, as SVG, the curve on which model and recording differ most: recorded, nominal, with the named effects."""
+    """Draw, as SVG, the curve on which model and recording differ most, and the difference, before and after."""
     overlay = max(finding.overlays, key=lambda one: _distance(one.before, one.recorded))
-    unit = overlay.unit or finding.unit
-    scale = scale_for([max(map(abs, overlay.recorded))], unit)
     x = np.array(overlay.times or overlay.phase)
     order = np.argsort(x, kind="stable")
-    curves = {"recorded": overlay.recorded, "nominal model": overlay.before}
+    recorded, before, after = (np.array(one)[order] for one in (overlay.recorded, overlay.before, overlay.after))
+    models = {"nominal model": before}
     if finding.added_effects:
-        curves["with the effects named"] = overlay.after
-    lines = tuple(Line(label, x[order], scale.factor * np.array(y)[order]) for label, y in curves.items())
-    label = "time, s" if overlay.times else "part of the beat"
-    return svg([Panel(overlay.recording, label, f"{overlay.channel}, {scale.unit}", lines)])
+        models["with the named effects" if finding.named else "with the closest effect"] = after
+    label, unit = "time, s" if overlay.times else "part of the beat", overlay.unit or finding.unit
+    whole = scale_for([float(np.abs(recorded).max())], unit)
+    rest = scale_for([float(np.abs(recorded - before).max())], unit)
+    curves = [Line("recorded", x[order], whole.factor * recorded)]
+    curves += [Line(name, x[order], whole.factor * values) for name, values in models.items()]
+    residuals = [Line("zero", x[order], np.zeros_like(recorded))]
+    residuals += [Line(name, x[order], rest.factor * (recorded - values)) for name, values in models.items()]
+    return svg(
+        [
+            Panel(overlay.recording, label, f"{overlay.channel}, {whole.unit}", tuple(curves)),
+            Panel("recorded - simulated", label, f"{overlay.channel}, {rest.unit}", tuple(residuals)),
+        ]
+    )
 
 
 def _distance(one: Iterable[float], other: Iterable[float]) -> float:
@@ -196,6 +205,7 @@ def gallery() -> str:
     parts = []
     for name, entry in ENTRIES.items():
         finding = stored(name)
+        where = f" Where: {finding.where.words}." if finding.where else ""
         share = percent(finding.probabilities.get(finding.verdict, 0.0))
         parts += [
             f"### {entry.title}",
@@ -204,7 +214,8 @@ def gallery() -> str:
             "",
             entry.words,
             "",
-            f"**{headline(finding)}.** Verdict: *{finding.verdict}* ({share}). "
+            f"**{headline(finding)}.** Verdict: *{finding.verdict}* ({share}).{where}",
+            "",
             f"[Open the report](gallery/{name}.html), or [its numbers](gallery/{name}.json).",
             "",
         ]

@@ -16,6 +16,7 @@ from docs.generate.effect_pages import ROOT
 
 # Pages that the navigation shows below another page, which links to them in its text.
 BELOW = {"docs/effects": "effects/*", "docs/README": "decisions/*"}
+_FILES = "linked files"  # of a page, in the metadata that Sphinx keeps
 
 
 class LinkedFiles(SphinxTransform):
@@ -30,23 +31,18 @@ class LinkedFiles(SphinxTransform):
             if place is None:
                 continue
             if (ROOT / place).is_file():
-                link = nodes.reference("", "", refuri=self._copied(place), internal=True)
+                self.env.metadata[self.env.docname].setdefault(_FILES, []).append(place)
+                uri = relative_uri(f"{self.env.docname}.html", place.as_posix())
+                link = nodes.reference("", "", refuri=uri, internal=True)
                 link += node.children
                 node.replace_self(link)
             else:  # a folder: there is nothing to open
                 node.replace_self(node.children)
 
-    def _copied(self, place: PurePosixPath) -> str:
-        """Copy the file at ``place`` of the repository to the same place of the manual, and return its address."""
-        copy = Path(self.app.outdir) / place
-        copy.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copy2(ROOT / place, copy)
-        return relative_uri(self.app.builder.get_target_uri(self.env.docname), place.as_posix())
-
 
 def _is_link(node: nodes.Node) -> bool:
     if isinstance(node, addnodes.pending_xref):
-        return node.get("reftype") == "myst" and node.get("refdomain") != "doc"  # "doc": MyST knows that it is a page
+        return bool(node.get("reftype") == "myst" and node.get("refdomain") != "doc")  # "doc": known to be a page
     return isinstance(node, addnodes.download_reference)
 
 
@@ -55,10 +51,21 @@ def place_of(docname: str, target: str) -> PurePosixPath | None:
 
     None for pages, for what does not exist, and for generated pages, which are not in the repository.
     """
-    path = ((ROOT / docname).parent / target.partition("#")[0]).resolve()
-    if not target or path.suffix == ".md" or not path.exists() or not path.is_relative_to(ROOT) or path == ROOT:
+    name = target.partition("#")[0]
+    path = ((ROOT / docname).parent / name).resolve()
+    is_anchor = path.is_dir() and "/" not in name  # a heading of the page, called like a folder
+    if not name or is_anchor or path.suffix == ".md" or not path.exists() or ROOT not in path.parents:
         return None
     return PurePosixPath(path.relative_to(ROOT).as_posix())
+
+
+def copy_linked(app: Sphinx, error: Exception | None) -> None:
+    """Copy the files that pages link to, to the same places of the manual."""
+    places = {place for one in app.env.metadata.values() for place in one.get(_FILES, [])} if error is None else set()
+    for place in places:
+        copy = Path(app.outdir) / place
+        copy.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy2(ROOT / place, copy)
 
 
 def with_pages_below(_: Sphinx, docname: str, source: list[str]) -> None:
@@ -77,6 +84,7 @@ def with_levels(_app: Sphinx, _page: str, _template: str, context: dict[str, Any
 def setup(app: Sphinx) -> dict[str, bool]:
     """Add all this to the application of Sphinx, as it requires of an extension."""
     app.add_transform(LinkedFiles)
+    app.connect("build-finished", copy_linked)
     app.connect("source-read", with_pages_below)
     app.connect("html-page-context", with_levels, priority=900)  # after the theme
     return {"parallel_read_safe": False, "parallel_write_safe": True}

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+import wingfit
+from docs.generate.effect_pages import ROOT
 from docs.manual import __main__ as manual
 from docs.manual import python
 from docs.manual.additions import place_of
@@ -16,6 +18,8 @@ from tests.service.pages.browsing import chromium
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
 
+# of the theme and of MyST, for a Sphinx that we do not admit yet
+pytestmark = pytest.mark.filterwarnings("ignore::sphinx.deprecation.RemovedInSphinx11Warning")
 PAGES = (
     "index.html",
     "docs/gallery.html",
@@ -40,22 +44,25 @@ def browser() -> Iterator[Browser]:
 
 
 def test_every_page_of_the_documents_is_in_the_manual(built: Path) -> None:
-    documents = [path.relative_to(manual.ROOT) for path in (manual.ROOT / "docs").rglob("*.md")]
+    documents = [path.relative_to(ROOT) for path in (ROOT / "docs").rglob("*.md")]
     missing = [str(path) for path in documents if not (built / path.with_suffix(".html")).is_file()]
     assert not missing
 
 
 def test_links_to_files_open_them_and_anchors_are_those_of_code_hosts(built: Path) -> None:
-    assert (built / "docs" / "gallery" / "wing-named.html").read_text().startswith("<!doctype html>")
-    assert 'href="gallery/wing-named.html"' in (built / "docs" / "gallery.html").read_text()
-    assert 'href="../README.html#from-a-file-to-a-dataset"' in (built / "docs" / "start.html").read_text()
-    assert 'href="../deploy/slurm/wingfit.sbatch"' in (built / "docs" / "deployment.html").read_text()
+    rendered = (ROOT / "docs" / "gallery" / "wing-named.html").read_text(encoding="utf-8")
+    assert (built / "docs" / "gallery" / "wing-named.html").read_text(encoding="utf-8") == rendered
+    assert 'href="gallery/wing-named.html"' in (built / "docs" / "gallery.html").read_text(encoding="utf-8")
+    assert 'href="../README.html#from-a-file-to-a-dataset"' in (built / "docs" / "start.html").read_text(
+        encoding="utf-8"
+    )
+    assert 'href="../deploy/slurm/wingfit.sbatch"' in (built / "docs" / "deployment.html").read_text(encoding="utf-8")
 
 
 def test_the_references_name_commands_calls_and_python(built: Path) -> None:
     for page, words in {
         "reference/commands.html": "wingfit diagnose [OPTIONS]",
-        "reference/rest.html": "POST /v1/diagnoses",
+        "reference/rest.html": 'id="post-v1-diagnoses"',
         "reference/python/diagnosing.html": 'id="wingfit.diagnose"',
         "reference/glossary.html": "nominal model",
     }.items():
@@ -63,7 +70,7 @@ def test_the_references_name_commands_calls_and_python(built: Path) -> None:
 
 
 def test_a_public_name_on_no_page_fails(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("wingfit.__all__", [*python.wingfit.__all__, "unlisted"])
+    monkeypatch.setattr("wingfit.__all__", [*wingfit.__all__, "unlisted"])
     with pytest.raises(ValueError, match=r"one page of the manual.*'unlisted'"):
         python.pages()
 
@@ -78,6 +85,7 @@ def test_a_public_name_on_no_page_fails(monkeypatch: pytest.MonkeyPatch) -> None
         ("no-such-file.csv", None),
         ("../../../etc", None),
         ("#heading", None),
+        ("figures", None),
     ],
 )
 def test_only_files_of_the_repository_are_linked(target: str, place: str | None) -> None:
