@@ -6,13 +6,16 @@ BIN := $(VENV)/bin
 RUNS := $(VENV)/runs
 INSTALLED := $(VENV)/installed
 
-.PHONY: demo proof test test-service test-pages test-programs test-rest check check-wheel serve format lock install pin-image check-image clean
+.PHONY: demo docs proof test test-service test-pages test-programs test-rest check check-wheel serve format lock install pin-image check-image clean
 
 demo: $(RUNS)  ## start the service, calibrate the example campaign, print what came out
 	@$(BIN)/python -m examples.demo
 
 proof: $(RUNS)  ## play three stories on concealed data, each ending with a report; under 15 minutes
 	@$(BIN)/python -m benchmarks.proof --json
+
+docs: $(INSTALLED)  ## build the manual, with a search that needs no server: build/manual/index.html
+	@$(BIN)/python -m docs.manual
 
 serve: $(RUNS)  ## start the service and stay
 	@$(BIN)/wingfit serve

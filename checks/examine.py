@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 
 from wingfit.checks.axes import check_shape
@@ -13,12 +13,67 @@ from wingfit.checks.forces import check_forces
 from wingfit.checks.frequency import check_frequency
 from wingfit.checks.guard import guarded
 from wingfit.checks.markers import check_markers
-from wingfit.checks.mistake import Mistake, together
+from wingfit.checks.mistake import Kind, Mistake, together
 from wingfit.checks.recordings import check_recordings
 from wingfit.checks.tracked import Tracked
 from wingfit.checks.zeros import check_zero_forces
 from wingfit.records import AnyDataset, Dataset, Recording, Wing
 from wingfit.records.blas_threads import one_blas_thread
+from wingfit.records.dataset import AnyKind
+
+
+@dataclass(frozen=True)
+class Check:
+    """One of the checks that :func:`examine` carries out.
+
+    Attributes:
+        name: what it looks at.
+        question: what it answers.
+        finds: kinds of the mistakes that it finds; a mistake of a condition may also be found from the forces.
+        of: kinds of datasets that it examines.
+    """
+
+    name: str
+    question: str
+    finds: tuple[Kind, ...]
+    of: tuple[AnyKind, ...]
+
+
+_WING: tuple[AnyKind, ...] = ("tracks",)
+_VEHICLE: tuple[AnyKind, ...] = ("forces",)
+_BEAT: tuple[AnyKind, ...] = ("tracks", "forces")
+_ALL: tuple[AnyKind, ...] = ("tracks", "forces", "series")
+
+CHECKS: tuple[Check, ...] = (
+    Check("copies", "Does a recording hold exactly the samples of another one?", ("duplicate",), _ALL),
+    Check("constant columns", "Does a column have one value throughout?", ("constant channel",), _ALL),
+    Check("steadiness", "Does the rig flap evenly, for a beat at least?", ("unsteady", "cut"), _BEAT),
+    Check(
+        "conditions", "Are pressure, temperature and airspeed those of an experiment?",
+        ("air pressure", "air temperature", "airspeed", "pressure and rig"), _BEAT,
+    ),
+    Check("masses", "Are densities, thickness and masses those of a wing?", ("density", "thickness", "mass"), _BEAT),
+    Check("placeholders", "Is one value written where a sample is missing?", ("placeholders",), _BEAT),
+    Check("unit of length", "Are markers as far apart as at rest?", ("length unit", "scale"), _WING),
+    Check(
+        "axes", "Do the rest positions, turned about the hinge, come near the tracks?",
+        ("axes", "side", "origin", "tilt"), _WING,
+    ),
+    Check("frequency", "Do the samples repeat at the stated flap frequency?", ("frequency", "time unit"), _BEAT),
+    Check(
+        "single markers", "Does each marker move, without jumps, at the place of its name?",
+        ("frozen marker", "swapped markers", "jumps"), _WING,
+    ),
+    Check(
+        "drive", "Do amplitude, mean angle, sign and lag of the drive agree with the tracks?",
+        ("amplitude", "mean angle", "vertical sign", "phase lag"), _WING,
+    ),
+    Check(
+        "forces", "Can the described wings and motion cause the forces, and does their mean carry the weight?",
+        ("force axes", "force unit", "force phase", "motion", "body pitch", "weight"), _VEHICLE,
+    ),
+)  # fmt: skip
+"""The checks, in the order in which they are carried out."""
 
 
 @one_blas_thread

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from wingfit.cli.base.options import Url
-from wingfit.cli.base.output import moment, note, progress, say, size, table
+from wingfit.cli.base.output import moment, next_step, note, progress, say, size, table
 from wingfit.client.client import DEFAULT_URL, Client, WingfitError
 
 if TYPE_CHECKING:
@@ -45,7 +45,8 @@ def backup(
         raise WingfitError("no backup was made", str(error)) from None
     except OSError as error:
         raise WingfitError("no backup was made", f"cannot write {file}: {error.strerror}") from error
-    note(f"{file}, {size(file.stat().st_size)}, complete and checked; restore it: wingfit restore {file} --data FOLDER")
+    note(f"{file}, {size(file.stat().st_size)}, complete and checked")
+    next_step(f"wingfit restore {file} --data FOLDER")
 
 
 def restore(
@@ -72,7 +73,8 @@ def restore(
     note(_about_keys(len(brought.keys), data, keep_keys))
     if films := sum(one.films for one in brought.owners):
         note(f"{films} film(s) came without their videos, which no backup has: copy the folder films of the old server")
-    note(f"restored into {data}; start it: wingfit serve --data {data}")
+    note(f"restored into {data}")
+    next_step(f"wingfit serve --data {data}")
 
 
 def _list(brought: Contents) -> None:

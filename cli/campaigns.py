@@ -11,7 +11,7 @@ from typing import Annotated
 import typer
 
 from wingfit.cli.base.files import refused
-from wingfit.cli.base.output import progress, say
+from wingfit.cli.base.output import next_step, progress, say
 from wingfit.client.client import WingfitError
 
 
@@ -60,4 +60,4 @@ def _writing(out: Path) -> Iterator[None]:
     with refused("no campaign written"):
         yield
     say(f"campaign written to {out}")
-    say(f"next: wingfit datasets upload {shlex.quote(str(out))}")
+    next_step(f"wingfit datasets upload {shlex.quote(str(out))}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
@@ -10,7 +11,18 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from wingfit.cli.base.options import AsJson, Url
-from wingfit.cli.base.output import Columns, emit, moment, number, progress, records, remarks, say, size
+from wingfit.cli.base.output import (
+    Columns,
+    emit,
+    moment,
+    next_step,
+    number,
+    progress,
+    records,
+    remarks,
+    say,
+    size,
+)
 from wingfit.cli.jobs import NewName, NewNotes, changes, edited
 from wingfit.cli.jobs import upload as upload_dataset
 from wingfit.client import answers as a
@@ -33,7 +45,9 @@ def list_(url: Url = DEFAULT_URL, as_json: AsJson = False) -> None:
     Example: wingfit datasets list
     """
     with Client(url) as client:
-        emit(client.datasets(), _list, as_json=as_json)
+        datasets = client.datasets()
+    then = f"wingfit datasets show {datasets[0]['id']}" if datasets else "wingfit datasets upload FOLDER"
+    emit(datasets, _list, as_json=as_json, then=then)
 
 
 @app.command()
@@ -48,7 +62,8 @@ def upload(
     Example: wingfit datasets upload examples/robird
     """
     with Client(url) as client:
-        emit(upload_dataset(client, path, name), partial(_uploaded, url=url), as_json=as_json)
+        dataset = upload_dataset(client, path, name)
+    emit(dataset, partial(_uploaded, url=url), as_json=as_json, then=_next(dataset))
 
 
 @app.command()
@@ -58,7 +73,8 @@ def show(dataset_id: DatasetId, url: Url = DEFAULT_URL, as_json: AsJson = False)
     Example: wingfit datasets show ID
     """
     with Client(url) as client:
-        emit(client.dataset(dataset_id), _show, as_json=as_json)
+        dataset = client.dataset(dataset_id)
+    emit(dataset, _show, as_json=as_json, then=_next(dataset))
 
 
 @app.command()
@@ -74,6 +90,7 @@ def download(
     with Client(url) as client, progress("downloading") as report:
         target = client.download(dataset_id, output, on_bytes=lambda got, total: report(got / total if total else None))
     say(str(target))
+    next_step(f"wingfit datasets check {shlex.quote(str(target))}")
 
 
 @app.command()
@@ -95,6 +112,7 @@ def delete(dataset_id: DatasetId, url: Url = DEFAULT_URL) -> None:
     with Client(url) as client:
         client.delete_dataset(dataset_id)
     say(f"dataset {dataset_id} deleted")
+    next_step("wingfit datasets list")
 
 
 @app.command()
@@ -130,6 +148,7 @@ def check(
         hint = f"; for a corrected copy: wingfit datasets check {path} --fix NEW_FOLDER" if fixable else ""
         raise WingfitError(f"{path} has mistakes", f"{len(certain)} errors{hint}", errors=certain)
     _valid(path, dataset)
+    next_step(f"wingfit datasets upload {shlex.quote(str(path))}")
 
 
 def _refused(title: str, error: ValueError) -> WingfitError:
@@ -155,6 +174,7 @@ def _fix(path: Path, target: Path, mistakes: Sequence[Mistake]) -> None:
     left = check_dataset(target).mistakes
     remarks((str(one) for one in left), "left")
     say(f"{target}: {len(edits)} changes; {path} is as it was" + ("" if left else "; the copy passes all checks"))
+    next_step(f"wingfit datasets {'check' if left else 'upload'} {shlex.quote(str(target))}")
 
 
 def _valid(path: Path, dataset: AnyDataset) -> None:
@@ -199,7 +219,7 @@ def _list(datasets: list[a.Dataset]) -> None:
         ">size": lambda d: size(d["size_bytes"]),
         "uploaded": lambda d: moment(d["created_at"]),
     }
-    records(datasets, columns, "no datasets; upload one: wingfit datasets upload FOLDER")
+    records(datasets, columns, "no datasets")
 
 
 def _warned(dataset: a.Dataset) -> None:
@@ -212,11 +232,14 @@ def _warned(dataset: a.Dataset) -> None:
 def _uploaded(dataset: a.Dataset, url: str) -> None:
     _warned(dataset)
     say(f"dataset {dataset['id']} '{dataset['name']}' with {len(dataset['recordings'])} recordings")
-    if dataset["kind"] == "series":
-        say(f"next: wingfit diagnose {dataset['id']} --rig my_rig.py")
-    else:
-        say(f"next: wingfit runs submit {dataset['id']} --watch")
     say(f"its page: {url.rstrip('/')}/#dataset={dataset['id']}")
+
+
+def _next(dataset: a.Dataset) -> str:
+    """Return what comes after the upload of a dataset: a calibration, or the diagnosis of a rig of the user's own."""
+    if dataset["kind"] == "series":
+        return f"wingfit diagnose {dataset['id']} --rig my_rig.py"
+    return f"wingfit runs submit {dataset['id']} --watch"
 
 
 def _show(dataset: a.Dataset) -> None:

@@ -10,6 +10,7 @@ import typer
 from wingfit.cli.base import options as o
 from wingfit.cli.base.files import new_file, write_text
 from wingfit.cli.base.output import emit, note, progress
+from wingfit.cli.charts.commands import finding_residual
 from wingfit.cli.driving import drive_job, rig_here, rig_setting
 from wingfit.cli.findings import print_finding
 from wingfit.cli.jobs import INTERRUPTED, JobKind, check_ended_well, commands, dataset_id, follow
@@ -31,6 +32,7 @@ DIAGNOSES = JobKind(
     help="List, follow, export, cancel and delete diagnoses.",
     work="diagnosing",
     submit="wingfit diagnose DATASET",
+    read="watch",
     outcome="verdict",
     outcome_of=lambda one: one["verdict"] or "–",
     stage_of=_stage,
@@ -44,6 +46,7 @@ DIAGNOSES = JobKind(
     update=Client.update_diagnosis,
 )
 app = commands(DIAGNOSES)
+app.command("residual")(finding_residual)
 
 
 def diagnose(
@@ -133,7 +136,10 @@ def _print_when_done(client: Client, diagnosis_id: str, report: Path | None, *, 
     check_ended_well(DIAGNOSES, follow(client, DIAGNOSES, diagnosis_id))
     if report:
         write_text(report, client.report(diagnosis_id), "report")
-    emit(client.finding(diagnosis_id), print_finding, as_json=as_json)
+    then = f"wingfit diagnoses watch {diagnosis_id} --report finding.html"
+    if report:
+        then = f"open {report} in a browser, or: wingfit diagnoses export {diagnosis_id} --format csv -o ranking.csv"
+    emit(client.finding(diagnosis_id), print_finding, as_json=as_json, then=then)
 
 
 def _diagnose_here(
@@ -163,4 +169,5 @@ def _diagnose_here(
         raise typer.Exit(INTERRUPTED) from None
     if report:
         write_text(report, html(finding), "report")
-    emit(finding_json(finding), print_finding, as_json=as_json)
+    words = f"open {report} in a browser" if report else "the same command with --report finding.html draws the finding"
+    emit(finding_json(finding), print_finding, as_json=as_json, then=words)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from wingfit.cli.base import options as o
-from wingfit.cli.base.output import note, progress
+from wingfit.cli.base.output import next_step, note, progress
 from wingfit.cli.jobs import INTERRUPTED
 from wingfit.client.client import DEFAULT_URL, Client, WingfitError
 from wingfit.service.limits import MOST_WORKERS
@@ -36,6 +36,8 @@ def drive(job_id: o.JobId, reference: Reference, workers: Workers = 1, url: o.Ur
     note(f"{job_id} is {work['state']}" + (f": {work['error']}" if work["error"] else ""))
     if work["state"] != "SUCCEEDED":
         raise typer.Exit(1)
+    group = "diagnoses watch" if job_id.startswith("dx_") else "runs result"
+    next_step(f"wingfit {group} {job_id}")
 
 
 def drive_job(client: Client, job_id: str, rig: Rig, reference: str, workers: int, what: str) -> Work:

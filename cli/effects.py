@@ -6,9 +6,9 @@ from typing import Annotated
 
 import typer
 
-from wingfit.cli.base.options import AsJson, Url
+from wingfit.cli.base.options import AsJson
 from wingfit.cli.base.output import Columns, emit, interval, number, records, say, table
-from wingfit.client.client import DEFAULT_URL, Client
+from wingfit.client.client import WingfitError
 from wingfit.client.effect_answers import Effect, EffectParameter
 
 MEASURES = {"span": "span", "chord": "mean chord", "mass": "mass of the wing"}
@@ -16,18 +16,23 @@ MEASURES = {"span": "span", "chord": "mean chord", "mass": "mass of the wing"}
 
 def effects(
     name: Annotated[str | None, typer.Argument(help="An effect, for its details; default: list all.")] = None,
-    url: Url = DEFAULT_URL,
     as_json: AsJson = False,
 ) -> None:
-    """List the effects that a run or a simulation can include with --with, or describe one of them.
+    """List the effects that a run or a simulation can include with --with, or describe one of them; needs no server.
 
     Example: wingfit effects hinge_offset
     """
-    with Client(url) as client:
-        if name:
-            emit(client.effect(name), _describe, as_json=as_json)
-        else:
-            emit(client.effects(), _list, as_json=as_json)
+    from wingfit.service.effect_views import effect_view  # imported late: other commands start faster
+    from wingfit.sim.effects.registry import EFFECTS
+
+    if name is None:
+        emit([effect_view(one) for one in EFFECTS.values()], _list, as_json=as_json, then="wingfit effects NAME")
+        return
+    key = name.replace("-", "_")
+    if key not in EFFECTS:
+        raise WingfitError(f"there is no effect {name!r}", f"there are {', '.join(EFFECTS)}")
+    then = f"wingfit runs submit DATASET --with {key}; this estimates its genes"
+    emit(effect_view(EFFECTS[key]), _describe, as_json=as_json, then=then)
 
 
 def _list(effects: list[Effect]) -> None:
@@ -66,7 +71,6 @@ def _describe(effect: Effect) -> None:
     for of, unit in dict.fromkeys((p["relative_to"], p["unit"]) for p in effect["parameters"] if p["relative_to"]):
         say(f"'x {of}': multiples of the {MEASURES[of]}; in genomes and results the gene is in {unit}")
     say("the effect is off where all genes marked 'size' are zero")
-    say(f"estimate its genes: wingfit runs submit ID --with {effect['name']}")
 
 
 def _role(one: EffectParameter) -> str:

@@ -15,13 +15,14 @@ import typer
 
 from wingfit.cli.base.files import check_file
 from wingfit.cli.base.options import AsJson, JobId, Url
-from wingfit.cli.base.output import duration, emit, moment, note, percent, progress, say, size, table
+from wingfit.cli.base.output import duration, emit, moment, next_step, note, percent, progress, say, size, table
 from wingfit.client.client import DEFAULT_URL, Client, WingfitError
 from wingfit.client.export_answers import Format
 from wingfit.client.transport import ENDINGS
 
 START_SECONDS = 1.0  # between two looks at a server that starts
 ACTIVE = "QUEUED", "RUNNING"  # states of a job that waits for the server's start
+WISHES: dict[str | None, str] = {"PAUSE": "pausing", "CANCEL": "cancelling"}  # the words of the web page
 INTERRUPTED = 130  # exit code after Ctrl-C
 STANDARD_OUTPUT = Path("-")
 FormatName = Annotated[
@@ -37,8 +38,9 @@ class JobKind:
     """Texts and client methods in which the commands for runs and for diagnoses differ.
 
     ``stage_of`` and ``outcome_of`` return the stage and the outcome of a job as text; ``outcome`` is the heading of the
-    column of outcomes, ``work`` the title of the progress bar, ``submit`` an example command, ``exported`` the help on
-    export formats. ``find`` lists the jobs, ``fetch`` returns one, ``update`` changes name and notes.
+    column of outcomes, ``work`` the title of the progress bar, ``submit`` an example command, ``read`` the command that
+    shows what a job has found, ``exported`` the help on export formats. ``find`` lists the jobs, ``fetch`` returns one,
+    ``update`` changes name and notes.
     """
 
     name: str
@@ -46,6 +48,7 @@ class JobKind:
     help: str
     work: str
     submit: str
+    read: str
     outcome: str
     outcome_of: Callable[[Any], str]
     stage_of: Callable[[Any], str]
@@ -77,8 +80,9 @@ def commands(kind: JobKind) -> typer.Typer:
         with Client(url) as client:
             jobs = kind.find(client, dataset_id=dataset, state=state.upper() if state else None)
         columns = ["id", "name", "state", ">progress", ">left", kind.outcome, "submitted"]
-        empty = f"no {kind.plural}; submit one: {kind.submit}"
-        emit(jobs, lambda jobs: table(columns, [_row(kind, job) for job in jobs], empty), as_json=as_json)
+        then = next_of(kind, jobs[0]) if jobs else kind.submit
+        rows = [_row(kind, job) for job in jobs]
+        emit(jobs, lambda _: table(columns, rows, f"no {kind.plural}"), as_json=as_json, then=then)
 
     @command("edit", f"Change the name or the notes of a {kind.name}.", "ID --notes 'after the repair'")
     def edit(job_id: JobId, name: NewName = None, notes: NewNotes = None, url: Url = DEFAULT_URL) -> None:
@@ -89,12 +93,14 @@ def commands(kind: JobKind) -> typer.Typer:
     def cancel(job_id: JobId, url: Url = DEFAULT_URL) -> None:
         with Client(url) as client:
             say(state_of(kind, kind.cancel(client, job_id)))
+        next_step(f"{group} delete {job_id}, or keep it for its history")
 
     @command("delete", f"Delete a {kind.name} that has ended, with its results.", "ID")
     def delete(job_id: JobId, url: Url = DEFAULT_URL) -> None:
         with Client(url) as client:
             kind.delete(client, job_id)
         say(f"{kind.name} {job_id} deleted")
+        next_step(f"{group} list")
 
     @command("export", f"Write a {kind.name} to a file: {kind.exported}.", f"ID --format csv -o {kind.name}.csv")
     def export(
@@ -107,7 +113,12 @@ def commands(kind: JobKind) -> typer.Typer:
 
 def _row(kind: JobKind, job: Any) -> list[object]:
     progress = percent(job["progress"]), duration(job["eta_seconds"])
-    return [job["id"], job["name"] or "", job["state"], *progress, kind.outcome_of(job), moment(job["created_at"])]
+    return [job["id"], job["name"] or "", state_word(job), *progress, kind.outcome_of(job), moment(job["created_at"])]
+
+
+def state_word(job: Any) -> str:
+    """Return the state of a job, or what it is about to do: pausing, or cancelling."""
+    return WISHES.get(job["pending_action"]) or str(job["state"])
 
 
 def changes(name: str | None, notes: str | None) -> dict[str, str | None]:
@@ -124,7 +135,20 @@ def edited(what: str, answer: Any) -> str:
 
 def state_of(kind: JobKind, job: Any) -> str:
     """Return kind, id and state of a job as one line of text."""
-    return f"{kind.name} {job['id']} {job['state']}"
+    return f"{kind.name} {job['id']} {state_word(job)}"
+
+
+def next_of(kind: JobKind, job: Any) -> str:
+    """Return the command that comes next for a job, by its state."""
+    group = f"wingfit {kind.plural}"
+    match job["state"]:
+        case "SUCCEEDED":
+            return f"{group} {kind.read} {job['id']}"
+        case "PAUSED":
+            return f"{group} resume {job['id']}"
+        case "FAILED" | "CANCELLED":
+            return f"{kind.submit}, or {group} delete {job['id']}"
+    return f"{group} watch {job['id']}"
 
 
 def follow(client: Client, kind: JobKind, job_id: str) -> Any:
@@ -185,6 +209,10 @@ def _export(kind: JobKind, job_id: str, format_name: str, output: Path, url: str
         if output != STANDARD_OUTPUT:
             kind.export(client, job_id, format_name, output)
             note(f"{output}, {size(output.stat().st_size)}")
+            if format_name == "netcdf":
+                next_step(f"read {output} with h5netcdf, xarray or netCDF4")
+            else:
+                next_step(f"wingfit {kind.plural} export {job_id} --format netcdf -o {output.with_suffix('.nc')}")
             return
         with TemporaryDirectory(prefix="wingfit-") as scratch:
             path = kind.export(client, job_id, format_name, Path(scratch) / "export")

@@ -9,7 +9,7 @@ from typing import Annotated, cast
 import typer
 
 from wingfit.cli.base.options import AsJson, Url
-from wingfit.cli.base.output import Columns, emit, moment, note, records, say
+from wingfit.cli.base.output import Columns, emit, moment, next_step, note, records, say
 from wingfit.client.client import DEFAULT_URL, Client, WingfitError
 from wingfit.client.key_answers import Key, NewKey
 
@@ -49,7 +49,7 @@ def create(
     else:
         with Client(url) as client:
             made = client.create_key(name, owner=owner, scopes=scopes)
-    emit(made, _created, as_json=as_json)
+    emit(made, _created, as_json=as_json, then="export WINGFIT_API_KEY=...")
 
 
 @app.command("list")
@@ -59,7 +59,7 @@ def list_(url: Url = DEFAULT_URL, as_json: AsJson = False) -> None:
     Example: wingfit keys list
     """
     with Client(url) as client:
-        emit(client.keys(), _list, as_json=as_json)
+        emit(client.keys(), _list, as_json=as_json, then="wingfit keys create NAME, or wingfit keys revoke KEY_ID")
 
 
 @app.command()
@@ -71,13 +71,14 @@ def revoke(key_id: Annotated[str, typer.Argument(help="From 'wingfit keys list'.
     with Client(url) as client:
         key = client.revoke_key(key_id)
     say(f"key {key['id']} revoked at {moment(key['revoked_at'])}")
+    next_step("wingfit keys list")
 
 
 def _created(key: NewKey) -> None:
     say(key["secret"])
     note(
         f"key {key['id']} of {key['owner']!r}, scopes {', '.join(key['scopes'])}; the secret is not shown again. "
-        "Use it: export WINGFIT_API_KEY=..., or paste it into the page"
+        "Paste it into the page, or use it in the shell"
     )
 
 

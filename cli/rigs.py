@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from wingfit.cli.base.output import note
+from wingfit.cli.base.output import next_step, note
 from wingfit.client.client import WingfitError
 
 app = typer.Typer(no_args_is_help=True, help="Check a rig with a simulation of your own, and list those installed.")
@@ -44,7 +44,7 @@ def check(
     if failed:
         note(f"{failed} checks failed")
         raise typer.Exit(1)
-    note(f"next: wingfit diagnose {dataset} --local --rig {reference}")
+    next_step(f"wingfit diagnose {dataset} --local --rig {reference}")
 
 
 @app.command("list")
@@ -60,3 +60,4 @@ def list_rigs() -> None:
         typer.echo(name)
     if not names:
         note("no rig is installed; give the path of a Python file instead")
+    next_step(f"wingfit rig check {names[0] if names else 'my_rig.py'} --dataset FOLDER")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
@@ -11,17 +12,30 @@ import typer
 
 from wingfit.cli.base import options as o
 from wingfit.cli.base.files import new_file, write_text
-from wingfit.cli.base.output import duration, emit, moment, note, number, percent, say, table
+from wingfit.cli.base.output import duration, emit, moment, next_step, note, number, percent, progress, say, table
 from wingfit.cli.base.rounding import with_unit
+from wingfit.cli.charts.commands import history, residual
 from wingfit.cli.driving import drive_job, rig_here, rig_setting
 from wingfit.cli.forces.runs import forces, predict
-from wingfit.cli.jobs import JobKind, check_ended_well, commands, dataset_id, follow, state_of
+from wingfit.cli.jobs import (
+    INTERRUPTED,
+    JobKind,
+    check_ended_well,
+    commands,
+    dataset_id,
+    follow,
+    next_of,
+    state_of,
+    state_word,
+)
 from wingfit.cli.results import print_genes, print_result
 from wingfit.client import answers as a
 from wingfit.client.client import DEFAULT_URL, Client
 from wingfit.service.limits import MOST_WORKERS
 from wingfit.service.runs.spec_fields_by_kind import IDLE, VEHICLE_ONLY, WING_ONLY
 from wingfit.service.units import MN
+
+PAUSING_SECONDS = 0.2  # between two looks at a run that is about to pause
 
 
 def best(run: a.Run) -> str:
@@ -44,6 +58,7 @@ RUNS = JobKind(
     help="Submit, follow, control and export calibrations, and print their results.",
     work="calibrating",
     submit="wingfit runs submit DATASET",
+    read="result",
     outcome=">best",
     outcome_of=best,
     stage_of=_stage,
@@ -59,6 +74,8 @@ RUNS = JobKind(
 app = commands(RUNS)
 app.command()(forces)
 app.command()(predict)
+app.command()(history)
+app.command()(residual)
 
 
 @app.command()
@@ -117,7 +134,7 @@ def submit(
             drive_job(client, run["id"], own, rig, workers, "calibrating")
         if stays:
             run = follow(client, RUNS, run["id"])
-    emit(run, _ended if stays else _submitted, as_json=as_json)
+    emit(run, _ended if stays else _submitted, as_json=as_json, then=next_of(RUNS, run))
     check_ended_well(RUNS, run)
 
 
@@ -128,7 +145,8 @@ def show(run_id: o.JobId, url: o.Url = DEFAULT_URL, as_json: o.AsJson = False) -
     Example: wingfit runs show ID --json
     """
     with Client(url) as client:
-        emit(client.run(run_id), _show, as_json=as_json)
+        run = client.run(run_id)
+    emit(run, _show, as_json=as_json, then=next_of(RUNS, run))
 
 
 @app.command()
@@ -139,19 +157,43 @@ def watch(run_id: o.JobId, url: o.Url = DEFAULT_URL, as_json: o.AsJson = False) 
     """
     with Client(url) as client:
         run = follow(client, RUNS, run_id)
-    emit(run, _ended, as_json=as_json)
+    emit(run, _ended, as_json=as_json, then=next_of(RUNS, run))
     check_ended_well(RUNS, run)
 
 
-def _control(name: str, text: str, act: Callable[[Client, str], a.Run]) -> None:
-    @app.command(name, help=f"{text}\n\nExample: wingfit runs {name} ID")
-    def control(run_id: o.JobId, url: o.Url = DEFAULT_URL) -> None:
-        with Client(url) as client:
-            say(state_of(RUNS, act(client, run_id)))
+@app.command()
+def pause(run_id: o.JobId, url: o.Url = DEFAULT_URL) -> None:
+    """Stop a run after its current generation, and wait until it is paused; it can be resumed.
+
+    Ctrl-C ends this command; the run pauses all the same.
+
+    Example: wingfit runs pause ID
+    """
+    with Client(url) as client:
+        run = client.pause(run_id)
+        try:
+            with progress("pausing") as report:
+                while run["pending_action"] == "PAUSE":
+                    report(None, note=_stage(run))
+                    time.sleep(PAUSING_SECONDS)
+                    run = client.run(run_id)
+        except KeyboardInterrupt:
+            note(f"\nrun {run_id} pauses after its current generation; look: 'wingfit runs show {run_id}'")
+            raise typer.Exit(INTERRUPTED) from None
+    say(state_of(RUNS, run))
+    next_step(next_of(RUNS, run))
 
 
-_control("pause", "Stop a run after its current generation; it can be resumed.", Client.pause)
-_control("resume", "Continue a paused run, with the same numbers as without the pause.", Client.resume)
+@app.command()
+def resume(run_id: o.JobId, url: o.Url = DEFAULT_URL) -> None:
+    """Continue a paused run, with the same numbers as without the pause.
+
+    Example: wingfit runs resume ID
+    """
+    with Client(url) as client:
+        run = client.resume(run_id)
+    say(state_of(RUNS, run))
+    next_step(next_of(RUNS, run))
 
 
 @app.command()
@@ -172,9 +214,13 @@ def genome(
     if output:
         values = {gene["name"]: gene["best"] for gene in answer["genes"]}
         write_text(output, json.dumps(values, indent=2) + "\n", "genome")
-    emit(answer, lambda answer: print_genes(answer["genes"]), as_json=as_json)
     if not as_json and not answer["final"]:
         note("the run has not ended; these are the best values so far")
+    if output:
+        then = f"wingfit simulate --dataset DATASET_ID --genome {output}"
+    else:
+        then = f"wingfit runs genome {run_id} -o best.json" if answer["final"] else f"wingfit runs watch {run_id}"
+    emit(answer, lambda answer: print_genes(answer["genes"]), as_json=as_json, then=then)
 
 
 @app.command()
@@ -184,7 +230,9 @@ def result(run_id: o.JobId, url: o.Url = DEFAULT_URL, as_json: o.AsJson = False)
     Example: wingfit runs result ID
     """
     with Client(url) as client:
-        emit(client.result(run_id), print_result, as_json=as_json)
+        result = client.result(run_id)
+    then = f"wingfit diagnose --run {run_id}" + (" --rig my_rig.py" if result["kind"] == "series" else "")
+    emit(result, print_result, as_json=as_json, then=then)
 
 
 def _show(run: a.Run) -> None:
@@ -192,7 +240,7 @@ def _show(run: a.Run) -> None:
         ["run", f"{run['id']} {run['name'] or ''}"],
         ["dataset", run["dataset_id"]],
         *([["notes", run["notes"]]] if run["notes"] else []),
-        ["state", f"{run['state']}{', stage ' + run['stage'] if run['stage'] else ''}"],
+        ["state", f"{state_word(run)}{', stage ' + run['stage'] if run['stage'] else ''}"],
         ["progress", f"{percent(run['progress'])}, {duration(run['eta_seconds'])} left"],
         ["generations", f"{run['generations']} ({run['evaluations']} evaluations)"],
         ["best", f"{best(run)} {'per marker' if run['kind'] == 'tracks' else 'RMS'}"],
@@ -218,10 +266,7 @@ def _settings(run: a.Run) -> list[str]:
 
 def _submitted(run: a.Run) -> None:
     say(state_of(RUNS, run))
-    say(f"next: wingfit runs watch {run['id']}")
 
 
 def _ended(run: a.Run) -> None:
     say(f"{state_of(RUNS, run)}, best {best(run)} after {run['generations']} generations")
-    if run["state"] == "SUCCEEDED":
-        say(f"next: wingfit runs result {run['id']}")

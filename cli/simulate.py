@@ -84,7 +84,7 @@ def simulate(
             given |= {"low_pass_hz": low_pass_hz, "peel_width_beats": peel_width_beats or 0.0}
             forces = client.simulate_forces(dataset, name, **given)
             write_forces(forces, output, plot)
-            emit(forces, force_simulation, as_json=as_json)
+            emit(forces, force_simulation, as_json=as_json, then=_next(dataset, plot))
             return
         o.refuse(of_vehicles, "the dataset describes a wing, and this is for vehicles")
         given |= {"division": division or "11", "accuracy_mm": accuracy_mm}
@@ -102,7 +102,11 @@ def simulate(
         write_tracks(answer, output)
     if loads:
         write_loads(answer["outputs"], loads)
-    emit(answer, lambda answer: _show(answer, name), as_json=as_json)
+    emit(answer, lambda answer: _show(answer, name), as_json=as_json, then=_next(dataset, plot))
+
+
+def _next(dataset: str, plot: Path | None) -> str:
+    return f"open {plot} in a browser" if plot else f"wingfit runs submit {dataset}, which estimates the genes"
 
 
 def _show(answer: a.Simulation | Loads, recording: str) -> None:

@@ -16,6 +16,7 @@ from wingfit.client.load_answers import Outputs
 
 State = Literal["QUEUED", "RUNNING", "PAUSED", "SUCCEEDED", "FAILED", "CANCELLED"]
 Kind = Literal["tracks", "forces", "series"]
+FitBadge = Literal["good", "doubtful", "wrong"]
 FINAL: frozenset[str] = frozenset({"SUCCEEDED", "FAILED", "CANCELLED"})
 Point = Annotated[list[float | None], Len(3, 3)]
 Item = TypeVar("Item")
@@ -65,9 +66,8 @@ class Problem(TypedDict):
 class Health(TypedDict):
     """Status of the service; ``detail``: the cause if ``status`` is "degraded", or what a "starting" service does.
 
-    ``evaluator`` says how simulations are run: ray, processes or in_process. ``runs_active``,
-    ``diagnoses_active`` and ``trackings_active`` count jobs that have not ended; they are null if the database does not
-    answer.
+    ``evaluator`` says how simulations are run: ray, processes or in_process. ``runs_active``, ``diagnoses_active`` and
+    ``trackings_active`` count jobs that have not ended; they are null if the database does not answer.
     """
 
     status: Literal["starting", "ok", "degraded"]
@@ -160,19 +160,6 @@ class Dataset(TypedDict):
     warnings: list[DatasetWarning]
 
 
-class SeriesValues(TypedDict):
-    """One recording of a rig of the user's own: the values of its channels and inputs, in the dataset's units.
-
-    Of a long recording only every ``stride``-th sample is sent; null where a value was not recorded.
-    """
-
-    recording: str
-    time_s: list[float]
-    channels: dict[str, list[float | None]]
-    inputs: dict[str, list[float | None]]
-    stride: int
-
-
 class JobSpec(TypedDict):
     """The settings that runs and diagnoses have in common; settings that the request omitted have their defaults.
 
@@ -219,7 +206,8 @@ class Job(TypedDict):
     ``stage`` names the present step, null before the first; ``progress`` lies in [0, 1]; ``eta_seconds`` estimates the
     remaining time; ``evaluations`` counts evaluated individuals (of equal ones each counts, and one is simulated);
     ``error`` says why the job failed, else null. Of a job on series, ``rig`` names the simulation, and ``driven`` says
-    whether its user simulates it ('wingfit drive'); such a job is QUEUED while no driver serves it.
+    whether its user simulates it ('wingfit drive'), QUEUED while no driver serves it. ``fit_badge`` of a success rates
+    its misfits as multiples of the noise: ``good`` up to 1.3, ``doubtful`` up to 3, else ``wrong``.
     """
 
     id: str
@@ -238,6 +226,9 @@ class Job(TypedDict):
     rig: str | None
     driven: bool
     notes: str
+    residual_over_noise: float | None
+    held_out_over_noise: float | None
+    fit_badge: FitBadge | None
 
 
 class Run(Job):

@@ -43,6 +43,48 @@ class Diagnosis(Job):
     summary: str | None
 
 
+class PlaceMisfit(TypedDict):
+    """Misfit of the nominal model at a marker, in a force axis or in a channel, in ``unit``, noise subtracted.
+
+    ``x`` and ``y``: its place on the wing in m; null without one.
+    """
+
+    name: str
+    unit: str
+    misfit: float
+    x: float | None
+    y: float | None
+
+
+class Lead(TypedDict):
+    """Effects that may be missing, and the fraction of the misfit beyond the noise that they explain.
+
+    ``refitted``: they were added to the model and fitted; else a score test predicts the fraction.
+    """
+
+    effects: list[str]
+    title: str
+    explained: float
+    refitted: bool
+
+
+class PartialFinding(TypedDict):
+    """What a running diagnosis knows so far; it can still change, and gives no probabilities.
+
+    ``noise`` and ``misfit`` of the nominal model are root mean squares in ``unit`` (m, N, or 1 for series); ``places``
+    say where it lies; ``outline`` of the wing in m; ``tested`` of ``suspects`` effects were score-tested.
+    """
+
+    unit: Literal["m", "N", "1"]
+    noise: float
+    misfit: float
+    places: list[PlaceMisfit]
+    outline: list[tuple[float, float]]
+    leads: list[Lead]
+    tested: int
+    suspects: int
+
+
 class StepEvent(TypedDict):
     """The data of the server-sent event ``step``, a report on the progress of a diagnosis.
 

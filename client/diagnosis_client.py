@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from wingfit.client import answers as a
-from wingfit.client.diagnosis_answers import Diagnosis
+from wingfit.client.diagnosis_answers import Diagnosis, PartialFinding
 from wingfit.client.export_answers import Format
 from wingfit.client.follow_job import Watching
 from wingfit.client.transport import OnBytes, given, part
@@ -38,6 +38,10 @@ class DiagnosisCalls(Watching):
     def finding(self, diagnosis_id: str) -> dict[str, Any]:
         """Fetch the finding (result) of a diagnosis; its JSON schema is at /v1/schemas/finding."""
         return cast(dict[str, Any], self._json("GET", f"{_path(diagnosis_id)}/finding"))
+
+    def partial_finding(self, diagnosis_id: str) -> PartialFinding | None:
+        """Fetch what a running diagnosis knows so far; None before its nominal model is fitted, and after its end."""
+        return cast(PartialFinding | None, self._json("GET", f"{_path(diagnosis_id)}/partial"))
 
     def export_diagnosis(
         self,

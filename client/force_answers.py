@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, NotRequired
 
 from annotated_types import Len
 from typing_extensions import TypedDict
@@ -101,7 +101,8 @@ class ForceResult(TypedDict):
 
     ``before_mn`` (nominal coefficients) and ``after_mn`` (estimated ones) are RMS differences between modelled and
     recorded forces on the fitted axes. ``agreements`` compare each recording with the model for every source of
-    coefficients; in ``leave_one_out`` the global model was fitted without the recording that it predicts.
+    coefficients; in ``leave_one_out`` the global model was fitted without the recording that it predicts. ``noise_mn``
+    is the RMS of what differs from beat to beat on these axes; null with too few beats, and in results of before.
     """
 
     kind: Literal["forces"]
@@ -109,6 +110,7 @@ class ForceResult(TypedDict):
     after_mn: float | None
     held_out_before_mn: float | None
     held_out_after_mn: float | None
+    noise_mn: NotRequired[float | None]
     remarks: list[str]
     genes: list[GeneInfo]
     estimates: list[Estimate]

@@ -17,6 +17,7 @@ from wingfit.diagnosis.finding import Finding
 from wingfit.diagnosis.rig_subject import RigSubject
 from wingfit.diagnosis.rigs import subject_of
 from wingfit.diagnosis.search import run_search
+from wingfit.diagnosis.search_report import PartialFindings
 from wingfit.diagnosis.search_state import CountingEvaluator, SearchState
 from wingfit.diagnosis.spec import DiagnosisSpec, Progress
 from wingfit.diagnosis.subject import Subject, select_suspects
@@ -116,10 +117,11 @@ def diagnose_subject(
     context = FitContext(subject, WhitenedData.of(fitted, axes, spec.policy, series), counted)
     genes, refuted, done = free or tuple(subject.model.searched), tuple[str, ...](), 0.0
     for tried in (frame, None) if frame else (None,):
-        state = SearchState(context, spec, frame_error=tried)
+        state, known = SearchState(context, spec, frame_error=tried), PartialFindings()
         until = STATED_FRAME if tried else 1.0
         for fraction, stage in run_search(state, genes):
-            yield Progress(SEARCH_FRACTION * (done + (until - done) * fraction), stage, counted.evaluations)
+            part = SEARCH_FRACTION * (done + (until - done) * fraction)
+            yield Progress(part, stage, counted.evaluations, partial=known.of(state))
         done, beyond = until, frame_refuted(state)
         if beyond is None:
             break

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from wingfit.calibration.spec import CalibrationSpec
 from wingfit.diagnosis.finding import Finding
+from wingfit.diagnosis.partial_finding import PartialFinding
 from wingfit.diagnosis.policy import POLICY, Policy
 from wingfit.records.name_lists import refuse_text
 
@@ -47,10 +48,12 @@ class Progress:
     """A report of a running diagnosis.
 
     ``fraction`` of the work done (0 to 1), present ``stage`` in words, number of individuals simulated so far
-    (``evaluations``), and the ``finding``, None in all reports but the last.
+    (``evaluations``), and the ``finding``, None in all reports but the last. ``partial``: what the search knows so far,
+    None before the nominal model has been fitted and after the search.
     """
 
     fraction: float
     stage: str
     evaluations: int
     finding: Finding | None = None
+    partial: PartialFinding | None = None

@@ -64,6 +64,9 @@ _JOB: Job = {
     "error": None,
     "rig": None,
     "driven": False,
+    "residual_over_noise": None,
+    "held_out_over_noise": None,
+    "fit_badge": None,
     "notes": "",
 }
 _RUN: Run = {

@@ -43,6 +43,11 @@ def test_client_and_command_line_load_nothing_heavy(code: str) -> None:
     assert loaded(f"{code}; import numpy") == {"numpy"}
 
 
+def test_figures_are_part_of_the_package_and_load_plotly_when_they_are_drawn() -> None:
+    assert "plotly" not in loaded("import wingfit; wingfit.plot.history; from wingfit.plot import wing")
+    assert "plotly" in loaded("import wingfit; wingfit.plot.forces({'phase': [0.0], 'lift_n': [1.0]})")
+
+
 def test_the_help_of_every_command_loads_nothing_that_computes() -> None:
     program = "from typer.testing import CliRunner; from wingfit.cli.main import app; "
     program += "assert CliRunner().invoke(app, ['kinematics', '--help']).exit_code == 0; "
@@ -88,6 +93,7 @@ def test_the_wheel_holds_one_package() -> None:
         "client",
         "diagnosis",
         "importers",
+        "plot",
         "records",
         "report",
         "rigs",

@@ -17,6 +17,7 @@ physics the model is missing.
 - :func:`drive` simulates a rig of the user's own for a job on a server, which knows only its :func:`declaration`.
 - :class:`Rig` is a rig with a simulation of the user's own; :class:`Suspect` an effect that it may be missing,
 :class:`Port` a place where laws may act, :class:`Run` what its simulation computes.
+- :mod:`wingfit.plot` draws runs, findings and datasets with plotly.
 
 ``import wingfit`` is fast: modules are imported when one of their names is first used.
 """
@@ -27,6 +28,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from wingfit import plot
     from wingfit._align import align_recordings, align_tracks
     from wingfit._drive import drive
     from wingfit._film import track_film
@@ -116,6 +118,7 @@ __all__ = [
     "import_tracks",
     "load_dataset",
     "marker_noise",
+    "plot",
     "save_dataset",
     "track_film",
     "wing_drawing",
@@ -168,6 +171,8 @@ _MODULE_OF = {name: module for module, names in _MODULES.items() for name in nam
 
 def __getattr__(name: str) -> object:
     """Import a public name when it is first used (PEP 562)."""
+    if name == "plot":
+        return import_module("wingfit.plot")  # which then is an attribute
     if name not in _MODULE_OF:
         raise AttributeError(f"module 'wingfit' has no attribute {name!r}; it has {', '.join(__all__)}")
     found: object = getattr(import_module(_MODULE_OF[name]), name)

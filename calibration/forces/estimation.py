@@ -12,9 +12,10 @@ from wingfit.calibration.effects import absent, is_measured
 from wingfit.calibration.estimates.drift_remark import drift_remark
 from wingfit.calibration.estimates.likelihood import STEP, at_bounds, iterate
 from wingfit.calibration.estimates.linearised import free_genes
-from wingfit.calibration.estimates.uncertainty import Standing, Uncertainty, uncertainty
+from wingfit.calibration.estimates.uncertainty import IDENTIFIABLE, Standing, Uncertainty, uncertainty
 from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.forces.agreement import POINTS, agreements, comparison, quantities
+from wingfit.calibration.forces.disagreement import disagreement_remarks, disagreements
 from wingfit.calibration.forces.global_model import at, average, fit_global
 from wingfit.calibration.forces.result import (
     Agreement,
@@ -103,7 +104,8 @@ def summarise_forces(
         remarks = (*remarks, *warnings)
     misfits = [_misfit_remark(one, everywhere) for one in judged]
     drift = drift_remark((as_fitted(spec, recording) for recording in dataset.recordings), spec.axes)
-    remarks = (*remarks, *(remark for remark in misfits if remark), *drift, *_filtered_before(spec, dataset))
+    apart = disagreement_remarks([one.estimate for one in judged])
+    remarks = (*apart, *remarks, *(remark for remark in misfits if remark), *drift, *_filtered_before(spec, dataset))
     names = {name for one in judged for name in one.estimate.recordings}
     left_out, warnings = _left_out(model, spec, dataset, nominal, [one.estimate for one in judged]) if law else ((), ())
     fitted = [one for one in everywhere if one.recording.name in names]
@@ -119,6 +121,7 @@ def summarise_forces(
         after=_rms(fitted, ("local", "joint")) or np.nan,
         held_out_before=_rms(held_out, ("nominal",)),
         held_out_after=_rms(held_out, ("global", "joint", "average")),
+        noise=_noise(everywhere),
         remarks=tuple(dict.fromkeys((*remarks, *warnings))),
     )
 
@@ -278,7 +281,7 @@ def _misfit_remark(judged: _Judged, everywhere: list[_Compared]) -> str | None:
     left = _rms(mine, ("local", "joint"))
     if left is None:
         return None
-    noise = np.sqrt(np.average([(c.scatter or 0.0) ** 2 for c in mine], weights=[c.samples for c in mine]))
+    noise = _noise(mine) or 0.0
     if left <= ADEQUATE * noise:
         return None
     ratio = f"{left / noise:.2g} times the scatter from beat to beat" if noise > 0 else "with no scatter between beats"
@@ -287,6 +290,14 @@ def _misfit_remark(judged: _Judged, everywhere: list[_Compared]) -> str | None:
         f"its motion misses physics ('wingfit effects' lists what can be added), or the search was cut short. Standard "
         f"errors assume at most {ADEQUATE:g} times the scatter, so no coefficient counts as identifiable"
     )
+
+
+def _noise(some: list[_Compared]) -> float | None:
+    """Return the RMS (N) of the noise over all samples of the recordings ``some``; None if it is known of none."""
+    known = [(one.scatter, one.samples) for one in some if one.scatter is not None and one.samples]
+    if not known:
+        return None
+    return float(np.sqrt(np.sum([scatter**2 * count for scatter, count in known]) / sum(count for _, count in known)))
 
 
 def _rms(some: list[_Compared], order: tuple[Source, ...]) -> float | None:
@@ -339,8 +350,10 @@ def _filtered_before(spec: CalibrationSpec, dataset: Dataset) -> tuple[str, ...]
 def _genes(model: BladeElementWing, nominal: Genome, judged: list[_Judged], adequate: bool) -> tuple[GeneResult, ...]:
     """Summarise each gene over all estimates: mean value, largest standard error, whether identifiable in all of them.
 
+    Where the estimates of a gene disagree (:func:`disagreements`), its error is at least their standard deviation.
     ``adequate``: noise explains the residual of every estimate; otherwise no gene counts as identifiable.
     """
+    apart = disagreements([one.estimate for one in judged])
     best = nominal.replace(average([one.estimate for one in judged]))
     results = []
     for gene in model.genes:
@@ -351,5 +364,8 @@ def _genes(model: BladeElementWing, nominal: Genome, judged: list[_Judged], adeq
             identifiable = adequate and all(s.identifiable for s in standings) and inside
             largest, absolute = max(s.standard_error for s in standings), max(s.absolute for s in standings)
             worst = Standing(largest, identifiable, absolute)
+            if gene.name in apart and absolute < apart[gene.name]:
+                relative = largest * apart[gene.name] / absolute
+                worst = Standing(relative, identifiable and relative <= IDENTIFIABLE, apart[gene.name])
         results.append(GeneResult.of(gene, nominal[gene.name], best[gene.name], worst))
     return tuple(results)

@@ -128,6 +128,7 @@ class ForceResult:
     ``left_out`` has, for each fitted recording, agreements of a global model that was fitted without it. ``held_out``
     names the recordings that were never fitted. ``before`` (nominal genome) and ``after`` are RMS differences in N of
     the fitted axes on the fitted recordings, ``held_out_before`` and ``held_out_after`` on the held-out ones (or None).
+    ``noise`` is the RMS, over all recordings, of what differs from beat to beat on these axes; None with too few beats.
     """
 
     genes: tuple[GeneResult, ...]
@@ -140,6 +141,7 @@ class ForceResult:
     after: float
     held_out_before: float | None
     held_out_after: float | None
+    noise: float | None = None
     remarks: tuple[str, ...] = ()
 
 

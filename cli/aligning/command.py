@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from wingfit.cli.base.files import check_file, write_text
-from wingfit.cli.base.output import late_progress, note, print_json
+from wingfit.cli.base.output import late_progress, next_step, print_json
 from wingfit.client.transport import WingfitError
 
 if TYPE_CHECKING:
@@ -121,8 +121,10 @@ def align(
         return
     for found in every:
         results.show(found, poses, is_true=flap_frequency_hz is not None)
-    if not targets:
-        note("nothing was written; to write the tracks, add: --output FILE.csv")
+    if targets:
+        next_step("list them under recordings: of dataset.yaml, then: wingfit datasets check FOLDER")
+    else:
+        next_step("nothing was written; to write the tracks, add: --output FILE.csv")
 
 
 def _poses(file: Path | None) -> tuple[CameraPose, ...]:

@@ -38,7 +38,7 @@ def err() -> Console:
     return Console(stderr=True, highlight=False, soft_wrap=True)
 
 
-def _shown(text: str, *, lines: bool = True) -> str:
+def printable(text: str, *, lines: bool = True) -> str:
     """Return ``text`` with control characters replaced, by which a dataset's name could manipulate the terminal.
 
     ``lines``: keep line feeds and tabs.
@@ -53,12 +53,17 @@ def _is_control(character: str) -> bool:
 
 def say(text: str) -> None:
     """Print ``text``, part of the result, to standard output."""
-    out().print(Text(_shown(text)), soft_wrap=True)
+    out().print(Text(printable(text)), soft_wrap=True)
 
 
 def note(text: str) -> None:
     """Print ``text``, a message that is not part of the result, to standard error."""
-    err().print(Text(_shown(text)))
+    err().print(Text(printable(text)))
+
+
+def next_step(text: str) -> None:
+    """Print the command that comes next, with which every command ends, to standard error: a pipe gets results only."""
+    note(f"next: {text}")
 
 
 def print_json(value: Any) -> None:
@@ -66,9 +71,14 @@ def print_json(value: Any) -> None:
     sys.stdout.write(json.dumps(value, indent=2, ensure_ascii=False) + "\n")
 
 
-def emit(answer: Any, show: Callable[[Any], None], *, as_json: bool) -> None:
-    """Print an answer of the server as JSON or, by calling ``show``, as text."""
-    print_json(answer) if as_json else show(answer)
+def emit(answer: Any, show: Callable[[Any], None], *, as_json: bool, then: str = "") -> None:
+    """Print an answer of the server as JSON; or, by calling ``show``, as text, with the next step ``then``, if any."""
+    if as_json:
+        print_json(answer)
+        return
+    show(answer)
+    if then:
+        next_step(then)
 
 
 def remarks(lines: Iterable[str], label: str = "note") -> None:
@@ -89,7 +99,7 @@ def table(columns: Sequence[str], rows: Sequence[Sequence[object]], empty: str =
     for index, name in enumerate(columns):
         grid.add_column(name.removeprefix(">"), justify="right" if name.startswith(">") else "left", no_wrap=index == 0)
     for row in rows:
-        grid.add_row(*(Text(_shown(_cell(value), lines=False)) for value in row))
+        grid.add_row(*(Text(printable(_cell(value), lines=False)) for value in row))
     out().print(grid)
 
 

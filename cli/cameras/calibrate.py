@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from wingfit.cli.base.files import new_file, read_bytes, write_text
-from wingfit.cli.base.output import late_progress, note
+from wingfit.cli.base.output import late_progress, next_step, note
 from wingfit.client.transport import WingfitError
 
 if TYPE_CHECKING:
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 app = typer.Typer(no_args_is_help=True, help="Calibrate cameras, and read calibrations of other programs.")
 Unit = Literal["m", "cm", "mm"]
+FILM = "describe the films in film.yaml (docs/cameras.md), then: wingfit track film.yaml -o tracks.csv"
 
 
 @app.command()
@@ -133,7 +134,7 @@ def _finish(found: Calibration, output: Path, report: Path | None) -> None:
     note(f"cameras written to {output}")
     if report:
         write_text(report, calibration_report(found), "report of the calibration")
-    note("next: describe the films in film.yaml (docs/cameras.md), then: wingfit track film.yaml -o tracks.csv")
+    next_step(FILM)
 
 
 @app.command()
@@ -171,6 +172,7 @@ def convert(
     for remark in found.notes:
         note(f"remark: {remark}")
     note(f"cameras written to {output}")
+    next_step(FILM)
 
 
 def _show(found: Calibration) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from wingfit.cli.base.files import new_file, write_text
-from wingfit.cli.base.output import late_progress, note, print_json
+from wingfit.cli.base.output import late_progress, next_step, note, print_json
 from wingfit.client.transport import WingfitError
 
 if TYPE_CHECKING:
@@ -66,9 +66,9 @@ def track(
         return
     _show(found)
     if output:
-        note(f"next: wingfit align {output} --wing dataset.yaml -o aligned.csv")
+        next_step(f"wingfit align {output} --wing dataset.yaml -o aligned.csv")
     else:
-        note("nothing was written; to write the tracks, add: --output FILE.csv")
+        next_step("nothing was written; to write the tracks, add: --output FILE.csv")
 
 
 def _show(found: TrackedFilm) -> None:

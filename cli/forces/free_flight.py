@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from wingfit.cli.base.files import new_file, refused
+from wingfit.cli.base.output import next_step
 
 
 def forces(
@@ -57,3 +58,4 @@ def forces(
         results.write_plot(flight, plot, f"Forces in free flight, {tracks.name}")
     results.report(flight)
     results.entry(recording, starts_at_beat=beat_start_s is not None)
+    next_step("put the recording into a dataset, then: wingfit datasets check FOLDER")

@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 import typer
 
 from wingfit.cli.base.files import new_file, refused
+from wingfit.cli.base.output import next_step
 
 Wing = Literal["upper-right", "upper-left", "lower-right", "lower-left"]
 
@@ -68,3 +69,4 @@ def kinematics(
     if plot:
         results.write_plot(motion, plot, f"Motion of the wing, {file.name}")
     results.report(motion)
+    next_step("put the motion into dataset.yaml, then: wingfit datasets check FOLDER")

@@ -40,7 +40,10 @@ def forces(
     with Client(url) as client:
         answer = client.forces(run_id, recording, cast("f.Source | None", source))
     write_forces(answer, output, plot)
-    emit(answer, force_beats, as_json=as_json)
+    then = f"wingfit runs forces {run_id} --plot forces.html"
+    if plot:
+        then = f"open {plot} in a browser"
+    emit(answer, force_beats, as_json=as_json, then=then)
 
 
 def predict(
@@ -71,7 +74,8 @@ def predict(
         series = {name: answer[name] for name in ("phase", "x_n", "z_n", "lift_n", "drag_n")}
         write_csv(output, series, zip(*series.values(), strict=True), "forces")
     remarks(answer["warnings"], "warning")
-    emit(answer, _prediction, as_json=as_json)
+    then = "the same command with -o beat.csv" if output is None else f"wingfit diagnose --run {run_id}"
+    emit(answer, _prediction, as_json=as_json, then=then)
 
 
 def models(url: Url = DEFAULT_URL, as_json: AsJson = False) -> None:
@@ -80,7 +84,7 @@ def models(url: Url = DEFAULT_URL, as_json: AsJson = False) -> None:
     Example: wingfit models
     """
     with Client(url) as client:
-        emit(client.models(), _models, as_json=as_json)
+        emit(client.models(), _models, as_json=as_json, then="wingfit runs submit DATASET --preset NAME")
 
 
 def _prediction(answer: f.Prediction) -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from wingfit.cli.base.output import note, print_json
+from wingfit.cli.base.output import next_step, print_json
 from wingfit.client.transport import WingfitError
 
 if TYPE_CHECKING:
@@ -116,8 +116,12 @@ def import_(
         results.show(tracks)
     if started is not None and dataset is not None:
         start.show(started, dataset, found[0].frame)
-    elif not targets:
-        note("nothing was written; to write the tracks, add: --output FILE.csv; to write a dataset: --dataset FOLDER")
+    elif targets:
+        next_step(f"wingfit align {targets[0]} --wing dataset.yaml, or list them in a dataset.yaml (docs/formats.md)")
+    else:
+        next_step(
+            "nothing was written; to write the tracks, add: --output FILE.csv; to write a dataset: --dataset FOLDER"
+        )
 
 
 def _targets(files: list[Path], output: Path | None, *, force: bool) -> list[Path]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from wingfit.cli.base.files import check_file, new_file, write_text
-from wingfit.cli.base.output import note, number, print_json, remarks, say, table
+from wingfit.cli.base.output import next_step, number, print_json, remarks, say, table
 from wingfit.cli.base.rounding import force_unit
 from wingfit.client.transport import WingfitError
 
@@ -73,7 +73,9 @@ def import_forces(
         return
     _show(found)
     if output is None:
-        note("nothing was written; to write the forces, add: --output FILE.csv")
+        next_step("nothing was written; to write the forces, add: --output FILE.csv")
+    else:
+        next_step("list it under recordings: of dataset.yaml, then: wingfit datasets check FOLDER")
 
 
 def _check_target(path: Path | None, source: Path, *, force: bool) -> None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from wingfit.cli.base.output import note, say, table
+from wingfit.cli.base.output import next_step, note, say, table
 from wingfit.client.transport import WingfitError
 
 if TYPE_CHECKING:
@@ -82,7 +82,6 @@ def show(start: Start, dataset: Path, frame: str) -> None:
     else:
         note("for a dataset of a wing, say where the axes of the file point: --axes 'x aft, y out, z up'")
     folder = shlex.quote(str(dataset))
-    say(
-        f"next: wingfit datasets check {folder}; then, with a server ('wingfit serve'): "
-        f"wingfit datasets upload {folder}"
+    next_step(
+        f"wingfit datasets check {folder}; then, with a server ('wingfit serve'): wingfit datasets upload {folder}"
     )

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from wingfit.cli.base.files import check_file, new_file, read_bytes, write_text
-from wingfit.cli.base.output import note, number, print_json, remarks, say, table
+from wingfit.cli.base.output import next_step, number, print_json, remarks, say, table
 from wingfit.client.transport import WingfitError
 
 if TYPE_CHECKING:
@@ -98,7 +98,9 @@ def wing_template(
         return
     _show(found)
     if output is None:
-        note("nothing was written; to write the description, add: --output FILE.yaml")
+        next_step("nothing was written; to write the description, add: --output FILE.yaml")
+    else:
+        next_step(f"fill in {output}, then: wingfit wing-drawing {output} -o wing.svg")
 
 
 def wing_drawing(
@@ -121,6 +123,7 @@ def wing_drawing(
     except DatasetError as error:
         raise _refused(f"{wing} cannot be drawn", error) from None
     write_text(output, text, "drawing")
+    next_step(f"open {output} in a browser, correct {wing}, then: wingfit datasets check FOLDER")
 
 
 def _plan(path: Path) -> WingPlan:

@@ -97,7 +97,7 @@ def _refitted_hypothesis(
     own = {gene.name for suspect in suspects for gene in suspect.genes}
     predicted = None
     if refit.predicted is not None and nominal.predicted is not None:
-        predicted = _explained_fraction(refit.predicted, nominal.predicted)
+        predicted = explained_fraction(refit.predicted, nominal.predicted)
     return Hypothesis(
         effects=refit.names,
         title=" and ".join(s.title for s in suspects) or "No missing physics",
@@ -108,7 +108,7 @@ def _refitted_hypothesis(
         evidence=float(weights.evidence[k]),
         score=sum(gains[s.name].gain for s in suspects if s.name in gains),
         freedom=refit.freedom,
-        explained=_explained_fraction(refit.excess, nominal.excess),
+        explained=explained_fraction(refit.excess, nominal.excess),
         predicted=predicted,
         misfit=float(np.sqrt(max(refit.excess, 0.0) + data.noise**2)),
         refitted=True,
@@ -116,17 +116,20 @@ def _refitted_hypothesis(
     )
 
 
-def _explained_fraction(remaining: float, before: float) -> float:
+def explained_fraction(remaining: float, before: float) -> float:
     """Return the fraction of the excess ``before`` that is removed; zero where there was none."""
     return float(np.clip(1.0 - max(remaining, 0.0) / before, -1.0, 1.0)) if before > 0.0 else 0.0
 
 
-def _screened_hypothesis(trial: Trial, start: float, data: WhitenedData) -> Hypothesis:
-    suspect, samples = trial.suspect, len(data.scale)
+def explained_in_score_test(trial: Trial, data: WhitenedData) -> float:
+    """Return the fraction of the excess that the suspect of ``trial`` would explain, as its score test predicts."""
+    samples = len(data.scale)
     by_chance = np.sqrt(2.0 * samples)  # of chi-squared
-    explained = float(
-        np.clip(trial.gain / max(trial.gain + trial.remaining_chi_squared - samples, by_chance), 0.0, 1.0)
-    )
+    return float(np.clip(trial.gain / max(trial.gain + trial.remaining_chi_squared - samples, by_chance), 0.0, 1.0))
+
+
+def _screened_hypothesis(trial: Trial, start: float, data: WhitenedData) -> Hypothesis:
+    suspect, explained = trial.suspect, explained_in_score_test(trial, data)
     remaining = max(start * (1.0 - explained), 0.0)
     return Hypothesis(
         (suspect.name,),

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import asdict
 from typing import Any
 
+from sqlalchemy import delete
 from sqlalchemy.orm import Session
 
 from wingfit.calibration.evaluator import Evaluator
@@ -16,9 +18,10 @@ from wingfit.service.datasets.parsed_datasets import Datasets
 from wingfit.service.diagnoses import views
 from wingfit.service.diagnoses.diagnoser import Diagnoser
 from wingfit.service.jobs.job_kind import JobKind, Points, Step
+from wingfit.service.outcomes import fit_quality
 from wingfit.service.rigs.stored_rig import rig_of
 from wingfit.service.storage.database import Database
-from wingfit.service.storage.tables import DiagnosisRow, FindingRow, StepRow
+from wingfit.service.storage.tables import DiagnosisRow, FindingRow, PartialRow, StepRow
 from wingfit.workers import jobs
 
 # Progress is stored at most this often within a stage: each transaction waits for the disk.
@@ -38,12 +41,13 @@ class Diagnosing(JobKind):
         """Return the JSON answer that describes the diagnosis stored in ``row``."""
         return views.diagnosis(row)
 
-    def begin(self, _session: Session, row: DiagnosisRow) -> Points:
+    def begin(self, session: Session, row: DiagnosisRow) -> Points:
         """Reset the progress in ``row``; return no steps, because a diagnosis always starts from the beginning.
 
         The sequence numbers of steps continue, so that event streams miss none.
         """
         row.stage, row.progress, row.evaluations, row.elapsed_seconds = None, 0.0, 0, 0.0
+        _forget_partial(session, row)
         return []
 
     def steps(self, row: DiagnosisRow, evaluator: Evaluator, _interrupted: Callable[[], bool]) -> Iterator[Step]:
@@ -68,6 +72,8 @@ def _step(progress: Progress) -> Step:
         step = StepRow(job_id=row.id, sequence=row.generations, stage=row.stage, progress=row.progress)
         step.evaluations, step.elapsed_seconds, step.eta_seconds = row.evaluations, row.elapsed_seconds, eta
         session.add(step)
+        if progress.partial is not None:
+            session.merge(PartialRow(diagnosis_id=row.id, body=asdict(progress.partial)))
 
     return Step(min(max(progress.fraction, 0.0), 1.0), store_step, resumable=False)
 
@@ -76,6 +82,13 @@ def _finding(progress: Progress, finding: Finding, stored: dict[str, Any]) -> St
     def store_step(session: Session, row: DiagnosisRow, _eta: float | None) -> None:
         row.stage, row.evaluations = progress.stage, progress.evaluations
         row.verdict, row.summary = finding.verdict, finding.summary
+        fit = fit_quality.of_finding(finding)
+        row.residual_over_noise, row.held_out_over_noise = fit.residual, fit.held_out
         session.merge(FindingRow(diagnosis_id=row.id, body=stored))
+        _forget_partial(session, row)
 
     return Step(1.0, store_step, last=True)
+
+
+def _forget_partial(session: Session, row: DiagnosisRow) -> None:
+    session.execute(delete(PartialRow).where(PartialRow.diagnosis_id == row.id))

@@ -14,6 +14,7 @@ from starlette.responses import Response, StreamingResponse
 
 from wingfit.checks import Mistake
 from wingfit.client import answers as a
+from wingfit.client.recorded.answers import SeriesValues
 from wingfit.records import AnyDataset, SeriesDataset
 from wingfit.records.files.confined import ReaderError
 from wingfit.report.wing_drawing import wing_drawing
@@ -155,7 +156,7 @@ async def _pieces(database: Database, dataset_id: str, size: int) -> AsyncIterat
 
 @router.get(
     "/{dataset_id}/series",
-    response_model=a.SeriesValues,
+    response_model=SeriesValues,
     responses=http.errors(404, 409),
     summary="Fetch the values of a recording of series",
 )

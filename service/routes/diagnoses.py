@@ -9,8 +9,9 @@ from fastapi import APIRouter, Query, Request
 from starlette.responses import HTMLResponse, Response
 
 from wingfit.client.answers import Page
-from wingfit.client.diagnosis_answers import Diagnosis
+from wingfit.client.diagnosis_answers import Diagnosis, PartialFinding
 from wingfit.records import SeriesDataset, wing_or_vehicle
+from wingfit.service.answers import checked
 from wingfit.service.container import DOWNLOAD_SLOT, Service, ServiceDep
 from wingfit.service.diagnoses import checks, views
 from wingfit.service.diagnoses.requests import DiagnosisIn
@@ -114,6 +115,17 @@ def list_diagnoses(
 def finding(service: ServiceDep, diagnosis_id: str, if_none_match: http.IfNoneMatch = None) -> Response:
     """Return the finding (result) of a diagnosis that has succeeded; see /v1/schemas/finding."""
     return http.marked(json.dumps(finding_of(service, diagnosis_id)).encode(), http.JSON, if_none_match)
+
+
+@router.get("/{diagnosis_id}/partial", responses=http.errors(404), summary="Partial finding")
+def partial(service: ServiceDep, diagnosis_id: str) -> PartialFinding | None:
+    """Return what a diagnosis without a finding knows: the misfit of the nominal model, and the leading hypotheses.
+
+    Null before its nominal model has been fitted, and once it has a finding.
+    """
+    with service.database.read() as session:
+        known = store.partial_finding(session, diagnosis_id)
+    return None if known is None else checked(PartialFinding, known)
 
 
 @router.get(

@@ -15,7 +15,7 @@ from wingfit.records import SeriesDataset, wing_or_vehicle
 from wingfit.rigs.rig import Rig
 from wingfit.service.datasets.parsed_datasets import Datasets
 from wingfit.service.jobs.job_kind import JobKind, Points, Step
-from wingfit.service.outcomes import force_views
+from wingfit.service.outcomes import fit_quality, force_views
 from wingfit.service.rigs import rig_runs
 from wingfit.service.rigs.stored_rig import rig_of
 from wingfit.service.runs import views
@@ -95,6 +95,8 @@ def _step(generation: Generation) -> Step:
 def _result(outcome: Mapping[str, Any]) -> Step:
     def store_step(_session: Session, row: RunRow, _eta: float | None) -> None:
         row.result = dict(outcome)
+        fit = fit_quality.of_result(row.kind, outcome)
+        row.residual_over_noise, row.held_out_over_noise = fit.residual, fit.held_out
         # While the run is running, the best of the current stage; in the end, the misfit to all fitted recordings.
         if row.kind != "series":  # of series the result is relative to noise, and the misfit of the search stays
             row.best_mm, row.best_mn = outcome.get("after_mm"), outcome.get("after_mn")

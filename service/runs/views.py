@@ -13,9 +13,12 @@ from wingfit.calibration import result as tracks_result
 from wingfit.checks import Mistake
 from wingfit.client import answers as a
 from wingfit.client.answers import Comparison, Numerics
+from wingfit.client.recorded.answers import SeriesValues
 from wingfit.records import AnyDataset, Recording, Series, SeriesDataset
 from wingfit.records.array_types import Array, Mask
 from wingfit.service.answers import answer, checked
+from wingfit.service.datasets.gaps import missing
+from wingfit.service.outcomes import fit_quality
 from wingfit.service.runs.spec_views import run_settings
 from wingfit.service.storage import store
 from wingfit.service.storage.tables import DatasetRow, RunRow
@@ -80,7 +83,7 @@ def _series(record: Series, held_out: bool) -> a.RecordingInfo:
     }
 
 
-def series_values(record: Series) -> a.SeriesValues:
+def series_values(record: Series) -> SeriesValues:
     """Return the values of a recording of series as the JSON answer; of a long one every ``stride``-th sample."""
     stride = max(1, -(-(record.values.size + len(record.inputs) * len(record.times)) // MOST_SERIES_VALUES))
     return {
@@ -89,6 +92,9 @@ def series_values(record: Series) -> a.SeriesValues:
         "channels": {name: _nulls(record.values[::stride, k]) for k, name in enumerate(record.channels)},
         "inputs": {name: _nulls(values[::stride]) for name, values in record.inputs.items()},
         "stride": stride,
+        "period_s": record.period,
+        "noise": {one.name: one.standard_deviation for one in record.quantities},
+        "missing": {name: missing(record.values[:, k], record.times) for k, name in enumerate(record.channels)},
     }
 
 
@@ -133,7 +139,8 @@ def job_of(shape: type[T], values: Mapping[str, Any], spec: object) -> T:
     ``values``: its database row, column name to value; ``spec``: its settings as the answer contains them.
     """
     action = None if values["wish"] == Wish.NONE else values["wish"]
-    shown = {"rig": values["rig_name"], "driven": bool(values["driven"])}
+    shown: dict[str, Any] = {"rig": values["rig_name"], "driven": bool(values["driven"])}
+    shown["fit_badge"] = fit_quality.badge(values["residual_over_noise"], values["held_out_over_noise"])
     return checked(shape, {**values, **shown, "pending_action": action, "steps": values["generations"], "spec": spec})
 
 

@@ -32,6 +32,7 @@ from wingfit.service.storage.tables import (
     KeyRow,
     OwnedRow,
     ParsedRow,
+    PartialRow,
     RunRow,
     SimulatedRow,
     StepOfJob,
@@ -183,6 +184,15 @@ def finding(session: Session, diagnosis_id: str) -> dict[str, Any]:
         message = f"diagnosis {diagnosis_id} is {row.state}; it has a finding when it has SUCCEEDED"
         raise conflict(message, state=row.state)
     return body
+
+
+def partial_finding(session: Session, diagnosis_id: str) -> dict[str, Any] | None:
+    """Return what a diagnosis without a finding knows so far, as JSON; raise a 404 if there is no such diagnosis.
+
+    None before its nominal model has been fitted, and once it has a finding.
+    """
+    one(session, DiagnosisRow, diagnosis_id)
+    return session.scalar(select(PartialRow.body).where(PartialRow.diagnosis_id == diagnosis_id))
 
 
 def admitted(session: Session, row: JobRow, most: int) -> str | None:

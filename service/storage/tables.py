@@ -218,6 +218,15 @@ class FindingRow(Table):
     body: Mapped[dict[str, Any]]
 
 
+class PartialRow(Table):
+    """What the diagnosis knew at its last stored step (a partial finding as JSON); deleted when it has its finding."""
+
+    __tablename__ = "partial"
+
+    diagnosis_id: Mapped[str] = mapped_column(ForeignKey("diagnosis.id", ondelete="CASCADE"), primary_key=True)
+    body: Mapped[dict[str, Any]]
+
+
 class StepOfJob:
     """The columns that the steps of all jobs share: the progress of the job at that step.
 

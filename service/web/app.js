@@ -1,10 +1,11 @@
 // Entry point: side column, state of the server, and the page that the address after # names.
 
 import { askForKey, isRefused, setUpAccess } from "./parts/access.js";
-import { get, isFinal } from "./base/api.js";
+import { get, isFinal, postJson } from "./base/api.js";
 import { redrawComparison, setUpCompare, showComparison } from "./pages/compare.js";
 import { redrawDataset, selectDataset, setUpDataset, simulate } from "./pages/dataset.js";
-import { diagnose, selectDiagnosis, setUpDiagnosis } from "./pages/diagnosis.js";
+import { openDiagnoseForm, setUpDiagnoseForm } from "./diagnosing/form.js";
+import { redrawDiagnosis, selectDiagnosis, setUpDiagnosis } from "./pages/diagnosis.js";
 import { showEffects } from "./pages/effects.js";
 import { FILM_PAGES, redrawFilms, setUpFilms, showFilms } from "./films/page.js";
 import { $, plural, toast } from "./base/format.js";
@@ -17,7 +18,7 @@ import { setUpUpload } from "./lists/upload.js";
 import { drawActive } from "./parts/sidebar.js";
 import { stored } from "./parts/warnings.js";
 import { redraw, selectRun, setUpRun } from "./pages/run.js";
-import { openSubmit, remove, setUpSubmit } from "./pages/submit.js";
+import { openSubmit, randomKey, remove, setUpSubmit } from "./pages/submit.js";
 
 const POLL_MS = 2500;
 const MOST_ACTIVE = 20;
@@ -41,7 +42,7 @@ const isHome = () => pageOf(parameters()) === null || !$("empty").hidden;
 // Series need a simulation: their page has the ways to give one.
 const starting = {
   onRun: (dataset) => (isSeries(dataset) ? simulate(dataset.id) : newRun(dataset)),
-  onDiagnose: (dataset) => (isSeries(dataset) ? simulate(dataset.id) : startDiagnosis({ dataset_id: dataset.id })),
+  onDiagnose: (dataset) => (isSeries(dataset) ? simulate(dataset.id) : openDiagnoseForm(dataset)),
 };
 
 // The form of a run, with the datasets among which can be chosen.
@@ -135,9 +136,20 @@ function go(id, kind = "run") {
   location.hash = id ? `${kind}=${encodeURIComponent(id)}` : "";
 }
 
-async function startDiagnosis(body) {
-  const diagnosis = await diagnose(body);
-  if (!diagnosis) return;
+// A run of series has its simulation, and no settings to choose.
+async function diagnoseRun(run, dataset) {
+  if (!isSeries(run)) {
+    openDiagnoseForm(dataset, run);
+    return;
+  }
+  try {
+    onDiagnosisSubmitted(await postJson("diagnoses", { run_id: run.id }, { "Idempotency-Key": randomKey() }));
+  } catch (error) {
+    toast(error.text);
+  }
+}
+
+function onDiagnosisSubmitted(diagnosis) {
   go(diagnosis.id, "diagnosis");
   poll();
 }
@@ -158,10 +170,11 @@ function redrawAll() {
   redrawDataset();
   redrawComparison();
   redrawFilms();
+  redrawDiagnosis();
 }
 
 const common = (page) => ({ currentId: () => current(page), onAway: setAway, onDeleted, onMissing });
-setUpRun({ ...common("run"), onChange: onChange("runs"), onDiagnose: (run) => startDiagnosis({ run_id: run.id }) });
+setUpRun({ ...common("run"), onChange: onChange("runs"), onDiagnose: diagnoseRun });
 setUpDiagnosis({ ...common("diagnosis"), onChange: onChange("diagnoses") });
 setUpDataset({
   ...common("dataset"), ...starting,
@@ -178,6 +191,7 @@ setUpImport({
   },
 });
 setUpFilms({ onAway: setAway, onMissing });
+setUpDiagnoseForm({ onSubmitted: onDiagnosisSubmitted });
 setUpCompare();
 setUpSubmit({
   onSubmitted(run) {

@@ -78,6 +78,23 @@ def test_a_concealed_effect_is_named_and_validated(truth: dict[str, float], verd
     assert found.proof.after.value < 1.1 < 1.1 * found.proof.before.value
 
 
+def test_progress_shows_where_the_nominal_model_misses_and_what_leads() -> None:
+    fitted = recorded({**NOMINAL, "friction.torque": 2e-3}, noise=5e-4, seed=1)
+    steps = list(diagnose_subject(PendulumRig(), "pendulum", fitted, (), DiagnosisSpec(), InProcessEvaluator()))
+    known = [step.partial for step in steps]
+    assert known[0] is None
+    assert known[-1] is None  # the finding is there
+    shown = [one for one in known if one is not None]
+    assert [one.tested for one in shown] == sorted(one.tested for one in shown)
+    last, found = shown[-1], steps[-1].finding
+    assert found is not None
+    assert (last.leads[0].effects, last.leads[0].refitted) == (("friction",), True)
+    assert last.leads[0].explained > 0.95
+    assert last.suspects == len(PendulumRig().suspects)
+    assert last.misfit > 1.2 * last.noise
+    assert [(one.name, one.misfit) for one in last.places] == [(one.name, one.before) for one in found.markers]
+
+
 @pytest.mark.parametrize("fails", [(3.0,), HELD_OUT])
 def test_unpredicted_recordings_do_not_validate(monkeypatch: pytest.MonkeyPatch, fails: tuple[float, ...]) -> None:
     """With the effect added, the model finds no motion under some, or all, held-out conditions."""

@@ -29,6 +29,7 @@ class Session:
         self.url = url
         self.ids: dict[str, str] = {}
         self.output = ""
+        self.steps = ""
         self.skipped: list[str] = []
         (folder / "examples").symlink_to(ROOT / "examples")
         (folder / ".venv").symlink_to(sys.prefix)
@@ -66,7 +67,8 @@ class Session:
                 self._printed(block, ["bash", "-c", "wingfit datasets upload examples/robird"])
                 command = re.sub(r"(runs submit \S+)(.*)", rf"\1\2 {SMALL_SEARCH}", _uncommented(command))
             failures += self._printed(block, ["bash", "-ec", "set -o pipefail\n" + self._with_ids(command)])
-            if shown and (wrong := difference(shown, self.output)):
+            seen = self.output + (self.steps if "\nnext: " in f"\n{shown}" else "")
+            if shown and (wrong := difference(shown, seen)):
                 failures.append(f"{block.place}: $ {command}\n{wrong}")
         return failures
 
@@ -76,7 +78,10 @@ class Session:
         done = subprocess.run(
             command, cwd=self.folder, env=env, capture_output=True, text=True, timeout=TIMEOUT_S, check=False
         )
+        # A terminal shows results and, below them, the next step; other messages differ from run to run.
+        steps = [line for line in done.stderr.splitlines(keepends=True) if line.startswith("next: ")]
         self.output = done.stdout.replace(self.url, SERVED)
+        self.steps = "".join(steps).replace(self.url, SERVED)
         for kind, name in IDS.items():
             if found := re.findall(rf"\b{kind}_[0-9a-f]{{16}}\b", self.output):
                 self.ids[name] = found[0]

@@ -97,7 +97,7 @@ def test_a_whole_dataset_is_written(wingfit: Wingfit, tmp_path: Path) -> None:
     code, out, err = wingfit(*words, "--markers", "in,mid,tip", "--airspeed-m-s", 4)
     assert code == 0, err
     assert "assumed: a rectangle around the markers" in out
-    assert f"next: wingfit datasets check {tmp_path / 'wing'}" in " ".join(out.split())
+    assert f"next: wingfit datasets check {tmp_path / 'wing'}" in " ".join(err.split())
     assert "replace what is assumed" in err
     dataset = package.load_dataset(tmp_path / "wing")
     assert isinstance(dataset, package.Dataset)

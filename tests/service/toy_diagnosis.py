@@ -32,6 +32,7 @@ from wingfit.diagnosis.finding import (
     RecordingMisfit,
     Where,
 )
+from wingfit.diagnosis.partial_finding import Lead, PartialFinding, PlaceMisfit
 from wingfit.diagnosis.spec import DiagnosisSpec, Progress
 from wingfit.records import AnyDataset, Dataset, wing_or_vehicle
 from wingfit.rigs.rig import Rig
@@ -70,7 +71,8 @@ class ToyDiagnoser(Diagnoser):
             time.sleep(self.seconds)
             if spec.calibration.seed == UNLUCKY and done == 2:
                 raise ArithmeticError("the thirteenth seed breaks")
-            yield Progress((done + 1) / (total + 1), f"{STAGES[done // STEPS]}, part {done % STEPS + 1}", 10 * done)
+            stage, known = f"{STAGES[done // STEPS]}, part {done % STEPS + 1}", partial(done) if done >= STEPS else None
+            yield Progress((done + 1) / (total + 1), stage, 10 * done, partial=known)
         if self.gate:
             self.gate(total)
         yield Progress(1.0, "done", 10 * total, finding(spec, wing_or_vehicle(dataset)))
@@ -80,6 +82,18 @@ class ToyDiagnoser(Diagnoser):
 
     def html(self, stored: dict[str, Any]) -> str:
         return report.html(report.finding_from_json(stored))
+
+
+def partial(done: int) -> PartialFinding:
+    """Made up; hypotheses lead after ``done`` steps once the strongest are refitted."""
+    refitted = done >= 2 * STEPS
+    leads = (
+        Lead(("hinge_offset",), "Hinge off its place", 0.9 if refitted else 0.7, refitted),
+        Lead(("camera_shift",), "Camera shifted", 0.2, refitted=False),
+    )
+    places = (PlaceMisfit("1", "m", 1e-3, 0.02, 0.2), PlaceMisfit("2", "m", 3e-3, 0.08, 0.45))
+    outline = ((-0.05, 0.0), (-0.05, 0.5), (0.1, 0.5), (0.1, 0.0))
+    return PartialFinding("m", 0.5e-3, 2e-3, places, outline, leads, min(done - STEPS + 1, len(KNOWN)), len(KNOWN))
 
 
 def finding(spec: DiagnosisSpec, dataset: Dataset) -> Finding:

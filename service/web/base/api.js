@@ -21,6 +21,13 @@ export class ApiError extends Error {
   }
 }
 
+// Fill ``node`` with a fragment of this page, an HTML file beside its scripts, which has nothing of a user in it.
+export async function fill(node, file) {
+  const answer = await fetch(file).catch(() => null);
+  if (!answer?.ok) throw new ApiError("The page could not be loaded; reload it.");
+  node.innerHTML = await answer.text();
+}
+
 export const isFinal = (job) => FINAL.has(job.state);
 
 export async function call(method, path, { body, headers = {}, as = "json" } = {}) {

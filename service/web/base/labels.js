@@ -41,13 +41,13 @@ export function modelOf(run) {
   return isForces(run) ? SHORT[run.spec.preset] ?? spoken(run.spec.preset) : `${run.spec.division} bodies`;
 }
 
-// How the model of a job fits: "good 1.1", with the larger one of its misfits as multiples of the noise; null if not known.
+// How the model of a job fits: "good 1.1×", with the larger one of its misfits as multiples of the noise; null if not known.
 export function fitBadge(job) {
   const { fit_badge: fit = null, residual_over_noise: fitted = null, held_out_over_noise: heldOut = null } = job;
   if (fit === null) return null;
   const worst = Math.max(fitted ?? 0, heldOut ?? 0);
   const title = `Residual ${rounded(fitted, 2)} times the noise${heldOut === null ? "" : `, held out ${rounded(heldOut, 2)} times`}`;
-  return el("span", { className: `badge fit-${fit}`, title }, worst ? `${fit} ${rounded(worst, 2)}` : fit);
+  return el("span", { className: `badge fit-${fit}`, title }, `${fit} ${rounded(worst, 2)}×`);
 }
 
 export const modelInWords = (job) => (isSeries(job) ? `rig ${job.rig}` : modelOf(job));
@@ -65,6 +65,18 @@ export function misfit(run) {
 export const relativeMisfit = ({ relative_to: relativeTo }, value) => (relativeTo === "noise"
   ? { value: rounded(value), unit: "× noise" }
   : { value: rounded(value === null ? null : 100 * value), unit: OF_RANGE });
+
+// What the fit of a finished job means, in a sentence.
+export function fitSentence(job) {
+  if (!job.fit_badge) return "The noise of the recordings is not known, so the residual cannot be judged: record at least two beats, or state the noise.";
+  const [fitted, held] = [job.residual_over_noise, job.held_out_over_noise];
+  const both = `The residual is ${rounded(fitted, 2)} times the noise on the fitted recordings`
+    + (held === null ? "; none was held out, so no prediction is tested." : `, and ${rounded(held, 2)} times on those held out.`);
+  if (job.fit_badge === "good") return `${both} Noise explains it.`;
+  const held_out_only = held !== null && fitted <= 1.3;
+  if (held_out_only) return `${both} The model fits, and does not predict: physics is missing, or the genes absorbed noise.`;
+  return `${both} ${job.fit_badge === "doubtful" ? "Physics may be missing" : "Physics is missing, or the input is wrong"}: diagnose it.`;
+}
 
 export const newtons = (mn) => (mn === null || mn === undefined ? null : mn / 1e3);
 

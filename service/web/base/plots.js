@@ -27,7 +27,7 @@ function theme() {
   const colour = (name) => style.getPropertyValue(`--${name}`).trim();
   return {
     ink: colour("ink"), quiet: colour("quiet"), faint: colour("faint"), line: colour("line"),
-    series: [1, 2, 3, 4, 5, 6].map((k) => colour(`series-${k}`)), accent: colour("accent"), ground: colour("ground"), surface: colour("surface"),
+    series: [1, 2, 3, 4, 5, 6].map((k) => colour(`series-${k}`)), accent: colour("accent"), bad: colour("bad"), ground: colour("ground"), surface: colour("surface"),
     font: { family: getComputedStyle(document.body).fontFamily, size: 12, color: colour("quiet") },
   };
 }
@@ -37,8 +37,8 @@ export const axis = (look, title, extra = {}) => ({
 });
 
 // An axis on which zero is marked.
-export const zeroAxis = (look, title) =>
-  axis(look, title, { zeroline: true, zerolinecolor: look.faint, zerolinewidth: 1, nticks: 6 });
+export const zeroAxis = (look, title, extra = {}) =>
+  axis(look, title, { zeroline: true, zerolinecolor: look.faint, zerolinewidth: 1, nticks: 6, ...extra });
 
 // Draw a chart into ``node``. ``build`` takes the theme; it returns the traces and what differs from the common layout.
 export async function draw(node, build) {
@@ -64,3 +64,19 @@ export const lines = (node, x, series, { unit, x: xTitle = "phase of the beat", 
   }),
   showlegend: true, hovermode: "x unified", xaxis: axis(look, xTitle, { showgrid: false, ...(dots ? {} : PHASE) }), yaxis: zeroAxis(look, unit),
 }));
+
+// A chart in two panels over one x axis: ``traces`` above, and below them ``residual`` (y2), recorded minus simulated.
+export function withResidual(look, { traces, residual, x, unit, residualUnit = unit, y = {} }) {
+  return {
+    traces: [...traces, ...residual.map((trace) => ({ showlegend: false, ...trace, yaxis: "y2" }))], showlegend: true, hovermode: "x unified",
+    margin: { l: 10, r: 8, t: 30, b: 34 },
+    xaxis: { ...x, anchor: "y2" }, yaxis: { ...zeroAxis(look, unit), domain: [0.34, 1], ...y },
+    yaxis2: { ...zeroAxis(look, `residual${residualUnit ? `, ${residualUnit}` : ""}`), domain: [0, 0.26], nticks: 4 },
+  };
+}
+
+// The line of recorded minus simulated values.
+export const residualLine = (look, x, recorded, simulated, name, more = {}) => ({
+  x, y: recorded.map((value, i) => (value === null || simulated[i] === null ? null : value - simulated[i])), name: `residual, ${name}`,
+  type: "scatter", mode: "lines", line: { color: look.accent, width: 1.5, simplify: false }, hovertemplate: `%{y:.3~s}<extra>residual, ${name}</extra>`, ...more,
+});

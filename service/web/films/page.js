@@ -1,6 +1,6 @@
 // The pages of films (#films, #film=ID, #tracking=ID): films are uploaded, looked at and tracked.
 
-import { ApiError } from "../base/api.js";
+import { fill } from "../base/api.js";
 import { $, toast } from "../base/format.js";
 import { setUpFilm, showFilm } from "./film.js";
 import { setUpList, showList } from "./list.js";
@@ -33,9 +33,7 @@ export async function showFilms(page, id) {
 }
 
 async function build() {
-  const answer = await fetch("films/page.html").catch(() => null);
-  if (!answer?.ok) throw new ApiError("The page could not be loaded; reload it.");
-  $("films-page").innerHTML = await answer.text(); // a file of this page, without anything of a user
+  await fill($("films-page"), "films/page.html");
   setUpFilm(hooks);
   setUpTracking(hooks);
   setUpList({

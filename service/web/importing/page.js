@@ -1,6 +1,6 @@
 // The page that imports files of tracking systems (#import): file, options, what was understood, and a dataset of them.
 
-import { ApiError, call } from "../base/api.js";
+import { ApiError, call, fill } from "../base/api.js";
 import { save } from "../base/download.js";
 import { $, el, size, toast } from "../base/format.js";
 import { setUpDataset } from "./dataset.js";
@@ -46,9 +46,7 @@ export async function showImport(shown) {
 }
 
 async function build() {
-  const answer = await fetch("importing/page.html").catch(() => null);
-  if (!answer?.ok) throw new ApiError("The page could not be loaded; reload it.");
-  $("import-page").innerHTML = await answer.text(); // a file of this page, without anything of a user
+  await fill($("import-page"), "importing/page.html");
   setUpForm(read);
   setUpUnderstood(downloadTable);
   setUpPreview();

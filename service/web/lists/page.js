@@ -1,12 +1,10 @@
 // The part of the page with the start page, the tables and the upload of datasets.
 
-import { ApiError } from "../base/api.js";
+import { fill } from "../base/api.js";
 import { $ } from "../base/format.js";
 
 export async function buildLists() {
-  const answer = await fetch("lists/page.html").catch(() => null);
-  if (!answer?.ok) throw new ApiError("The page could not be loaded; reload it.");
-  $("lists").innerHTML = await answer.text(); // a file of this page, without anything of a user
+  await fill($("lists"), "lists/page.html");
   $("empty").append($("home"));
   $("home-below").append($("upload"));
 }

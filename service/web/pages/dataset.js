@@ -1,30 +1,35 @@
-// The selected dataset: recordings, conditions or values over time, and its runs and diagnoses.
+// The selected dataset: what was recorded, what the checks say, conditions, and its runs and diagnoses.
 
-import { get, part, postJson } from "../base/api.js";
-import { $, el, plain, plural, significant, size, toast, when } from "../base/format.js";
+import { fill, get, part, postJson } from "../base/api.js";
+import { $, el, plural, size, toast, when } from "../base/format.js";
+import { isSeries, misfit } from "../base/labels.js";
+import { showChecks, showMarkerNoise } from "../dataset/checks.js";
+import { hideForces, redrawForces, setUpForces, showForces } from "../dataset/forces.js";
+import { drawConditions, listRecordings } from "../dataset/recordings.js";
+import { hideTracks, redrawTracks, setUpTracks, showTracks } from "../dataset/tracks.js";
 import { showNotes } from "../lists/edit.js";
 import { showDrawing } from "../parts/drawing.js";
 import { setUpSimulation, showSimulation } from "../parts/driving.js";
-import { hideSeries, redrawSeries, seriesRecordings, setUpSeries, showSeries } from "../parts/series.js";
+import { hideSeries, redrawSeries, setUpSeries, showSeries } from "../parts/series.js";
 import { badge, runName } from "../parts/sidebar.js";
-import { showWarnings } from "../parts/warnings.js";
-import { axis, draw } from "../base/plots.js";
 import { randomKey, remove } from "./submit.js";
-import { isForces, isSeries, misfit } from "../base/labels.js";
 
 const LISTED = 10;
-const WAYS = [
-  ["phase_lag_deg", "phase lag, deg"], ["pressure_mbar", "pressure, mbar"], ["airspeed_m_s", "airspeed, m/s"],
-  ["angle_of_attack_deg", "angle of attack, deg"],
-];
 
+let ready = null;
 let dataset = null;
 let hooks = {};
 let simulating = null; // id of the dataset whose ways to simulate are to be shown
 
 export function setUpDataset(given) {
   hooks = given;
+}
+
+async function build() {
+  await fill($("dataset"), "dataset/page.html");
   setUpSeries();
+  setUpForces();
+  setUpTracks({ onNoise: showMarkerNoise });
   setUpSimulation(async (kind, rig) => {
     const body = { dataset_id: dataset.id, rig };
     hooks.onStarted(kind, await postJson(kind, body, { "Idempotency-Key": randomKey() }));
@@ -39,26 +44,31 @@ export function setUpDataset(given) {
 export async function selectDataset(id) {
   dataset = null;
   $("dataset").hidden = true;
-  hideSeries();
   if (simulating !== id) simulating = null;
-  if (!id) return;
+  if (!id && !ready) return;
+  ready ??= build();
   try {
+    await ready;
+    for (const hide of [hideSeries, hideForces, hideTracks]) hide();
+    if (!id || hooks.currentId() !== id) return;
     const found = await get(`datasets/${part(id)}`);
     if (hooks.currentId() !== id) return;
     dataset = found;
   } catch (error) {
+    if (!$("dataset").firstChild) ready = null;
     if (hooks.currentId() === id) hooks.onMissing(error, () => !dataset && selectDataset(id));
     return;
   }
   $("dataset").hidden = false;
   drawHead();
-  showWarnings(dataset);
-  drawRecordings();
+  listRecordings(dataset);
   const series = isSeries(dataset);
-  $("series-part").hidden = !series;
-  $("conditions-part").hidden = series;
+  const parts = { "tracks-view": "tracks", "samples-part": "tracks", "distances-part": "tracks", "forces-view": "forces", "force-axes-part": "forces", "series-part": "series", "values-part": "series" };
+  for (const [name, kind] of Object.entries(parts)) $(name).hidden = kind !== dataset.kind;
   $("drawing-part").hidden = series;
-  await Promise.all([...(series ? [showRig()] : [drawConditions(), showDrawing(dataset)]), listWork(id)]);
+  const shown = dataset;
+  const charts = { tracks: () => [showTracks(shown), showDrawing(shown)], forces: () => [showForces(shown), showDrawing(shown)], series: () => [showRig()] }[dataset.kind]();
+  await Promise.all([...charts, showChecks(shown, () => dataset === shown), drawConditions(shown), listWork(id)]);
 }
 
 async function showRig() {
@@ -96,50 +106,10 @@ function drawHead() {
   $("dataset-archive").href = `v1/datasets/${part(dataset.id)}/archive`;
 }
 
-function drawRecordings() {
-  if (isSeries(dataset)) {
-    const { head, rows } = seriesRecordings(dataset);
-    $("recordings").tHead.replaceChildren(head);
-    $("recordings").tBodies[0].replaceChildren(...rows);
-    return;
-  }
-  const forces = isForces(dataset);
-  const heads = ["Recording", "Use", forces ? "Samples" : "Frames", forces ? "Channels" : "Markers", "Missing, %", "Flap, Hz", "Lag, °", "Pressure, mbar",
-    "Temperature, °C", "Airspeed, m/s", "Angle of attack, °"];
-  const text = new Set(["Recording", "Use", "Channels"]);
-  $("recordings").tHead.replaceChildren(el("tr", {}, ...heads.map((head) => el("th", { scope: "col", className: text.has(head) ? "" : "n" }, head))));
-  const number = (value) => el("td", { className: "n" }, significant(value));
-  const count = (value) => el("td", { className: "n" }, value.toLocaleString("en"));
-  $("recordings").tBodies[0].replaceChildren(...dataset.recordings.map((one) => el("tr", {},
-    el("td", {}, one.name), el("td", {}, el("span", { className: one.held_out ? "badge held" : "badge" }, one.held_out ? "held out" : "to fit")),
-    count(one.frames), forces ? el("td", {}, one.channels.map((name) => name.replace("force_", "")).join(", ")) : count(one.markers),
-    number(one.missing_percent), number(one.flap_frequency_hz), number(one.phase_lag_deg), number(one.pressure_mbar),
-    number(one.temperature_c), number(one.airspeed_m_s), number(one.angle_of_attack_deg))));
-}
-
 export function redrawDataset() {
   if (!dataset) return;
-  if (isSeries(dataset)) redrawSeries();
-  else drawConditions();
-}
-
-// Chart of the conditions: flap frequency against the other quantity with the most values.
-async function drawConditions() {
-  const shown = dataset;
-  const varied = WAYS.map(([name, title]) => ({ name, title, count: new Set(shown.recordings.map((one) => one[name])).size }));
-  const { name, title } = varied.reduce((most, one) => (one.count > most.count ? one : most));
-  const dots = (look, held, label, symbol) => {
-    const those = shown.recordings.filter((one) => one.held_out === held);
-    return {
-      type: "scatter", mode: "markers", name: label, x: those.map((one) => one.flap_frequency_hz), y: those.map((one) => one[name]),
-      text: those.map((one) => plain(one.name)), marker: { size: 11, symbol, color: held ? look.series[1] : look.accent, line: { width: 2 } },
-      hovertemplate: `%{text}<br>%{x:.4g} Hz, ${title} %{y:.4g}<extra>${label}</extra>`,
-    };
-  };
-  await draw($("conditions"), (look) => ({
-    traces: [dots(look, false, "to fit", "circle"), dots(look, true, "held out", "circle-open")],
-    showlegend: true, xaxis: axis(look, "flap frequency, Hz"), yaxis: axis(look, title),
-  })).catch((error) => toast(error.message));
+  ({ tracks: redrawTracks, forces: redrawForces, series: redrawSeries })[dataset.kind]();
+  drawConditions(dataset);
 }
 
 async function listWork(id) {

@@ -1,12 +1,13 @@
 // The selected diagnosis: its progress, then its report as the server draws it.
 
-import { follow, get, getText, isFinal, part, postJson } from "../base/api.js";
+import { follow, get, getText, isFinal, part } from "../base/api.js";
 import { $, plural, toast, when } from "../base/format.js";
+import { redrawPartial, showPartial } from "../diagnosing/partial.js";
 import { showNotes } from "../lists/edit.js";
 import { showWaiting } from "../parts/driving.js";
 import { badge, setBar, timeLeft } from "../parts/sidebar.js";
-import { cancel, randomKey, remove } from "./submit.js";
-import { forceSetup, isForces, modelInWords, withEffects } from "../base/labels.js";
+import { cancel, remove } from "./submit.js";
+import { fitBadge, forceSetup, isForces, modelInWords, withEffects } from "../base/labels.js";
 
 let diagnosis = null;
 let stopFollowing = () => {};
@@ -21,15 +22,7 @@ export function setUpDiagnosis(given) {
   });
 }
 
-// Submit a diagnosis of a dataset ({dataset_id}) or of a run ({run_id}); null, after an error message, if it is refused.
-export async function diagnose(body) {
-  try {
-    return await postJson("diagnoses", body, { "Idempotency-Key": randomKey() });
-  } catch (error) {
-    toast(error.text);
-    return null;
-  }
-}
+export const redrawDiagnosis = () => redrawPartial();
 
 export async function selectDiagnosis(id) {
   stopFollowing();
@@ -37,6 +30,7 @@ export async function selectDiagnosis(id) {
   [diagnosis, fetched] = [null, false];
   $("diagnosis").hidden = true;
   showReport(null);
+  showPartial(null);
   if (!id) return;
   try {
     const found = await get(`diagnoses/${part(id)}`);
@@ -73,7 +67,8 @@ function update() {
   const path = `v1/diagnoses/${part(diagnosis.id)}`;
   const done = diagnosis.state === "SUCCEEDED";
   document.title = `${diagnosis.name} · wingfit`;
-  $("diagnosis-name").replaceChildren(diagnosis.name, " ", badge(diagnosis));
+  $("diagnosis-name").replaceChildren(diagnosis.name, " ", fitBadge(diagnosis) ?? badge(diagnosis));
+  showPartial(diagnosis);
   $("diagnosis-about").textContent = [modelInWords(diagnosis), withEffects(diagnosis), ...(isForces(diagnosis) ? forceSetup(diagnosis.spec) : []),
     diagnosis.run_id ? "from the best genome of a run" : null, when(diagnosis.created_at)].filter(Boolean).join(" · ");
   showNotes($("diagnosis-name"), "diagnoses", diagnosis, ({ name, notes }) => {

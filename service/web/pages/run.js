@@ -14,7 +14,7 @@ import { cancel, remove } from "./submit.js";
 import { drawGenes, drawMisfit, drawNumbers, drawSeriesMisfit } from "../parts/tables.js";
 import { hideWing, redrawWing, setUpViewer, showWing } from "../parts/viewer.js";
 import { showRemarks } from "../base/form_errors.js";
-import { isForces, isSeries, request, setup } from "../base/labels.js";
+import { fitBadge, fitSentence, isForces, isSeries, request, setup } from "../base/labels.js";
 
 const ALLOWED = {
   pause: ["QUEUED", "RUNNING"], resume: ["PAUSED"], cancel: ["QUEUED", "RUNNING", "PAUSED"],
@@ -40,7 +40,7 @@ export function setUpRun(given) {
     const action = event.target.dataset?.action;
     if (action) act(action);
   });
-  $("diagnose-run").addEventListener("click", () => hooks.onDiagnose(run));
+  $("diagnose-run").addEventListener("click", () => hooks.onDiagnose(run, dataset));
   $("copy-curl").addEventListener("click", () => copy(curl("runs", again())));
   $("copy-python").addEventListener("click", () => copy(python(again())));
 }
@@ -91,6 +91,7 @@ function showSections() {
   if (!tracks) hideWing();
   if (!isForces(run)) hideForces();
   $("tracks-part").hidden = !tracks;
+  $("loads-section").hidden = !tracks;
   $("forces-part").hidden = !isForces(run);
   showRemarks($("remarks"), []);
   $("history-about").textContent = aboutHistory(run.kind);
@@ -165,7 +166,10 @@ function showResult() {
 
 function drawHead() {
   document.title = `${runName(run)} · wingfit`;
-  $("run-name").replaceChildren(runName(run), " ", badge(run));
+  $("run-name").replaceChildren(runName(run), " ", ...[fitBadge(run) ?? badge(run)]);
+  $("run-fit").hidden = run.state !== "SUCCEEDED";
+  $("run-fit").textContent = run.state === "SUCCEEDED" ? fitSentence(run) : "";
+  placeHistory();
   $("run-about").textContent = [dataset.name, ...setup(run), when(run.created_at)].join(" · ");
   showNotes($("run-name"), "runs", run, ({ name, notes }) => {
     run = { ...run, name, notes };
@@ -190,6 +194,12 @@ function drawHead() {
     button.disabled = Boolean(run.pending_action);
   }
   drawNumbers(run, result);
+}
+
+// Convergence is watched while a run on markers or series goes on; afterwards, and beside forces, the result comes first.
+function placeHistory() {
+  const [section, anchor] = [$("history-section"), isFinal(run) || isForces(run) ? $("loads-section") : $("numbers")];
+  if (anchor.nextElementSibling !== section) anchor.after(section);
 }
 
 function drawFitness() {

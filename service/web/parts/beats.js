@@ -1,7 +1,7 @@
 // Forces over the beat, recorded and modelled, and their power spectra.
 
 import { $, forceUnit, significant } from "../base/format.js";
-import { axis, draw, PHASE, zeroAxis } from "../base/plots.js";
+import { axis, draw, PHASE, residualLine, withResidual } from "../base/plots.js";
 import { QUANTITIES, SOURCES } from "../base/labels.js";
 
 const HARMONICS = 8;
@@ -44,21 +44,22 @@ function beat(look, forces, name) {
   const x = [...forces.phase, forces.phase[0] + 1];
   const recorded = closed(forces.recorded_n[name]);
   const spread = forces.standard_deviation_n[name] && closed(forces.standard_deviation_n[name]);
-  const edge = (sign, extra) => ({
-    x, y: recorded.map((value, i) => value + sign * spread[i]), type: "scatter", mode: "lines", line: { width: 0 },
+  const modelled = closed(forces.modelled_n[name]);
+  const label = SOURCES[forces.source].toLowerCase();
+  const edge = (centre, sign, extra) => ({
+    x, y: centre.map((value, i) => value + sign * spread[i]), type: "scatter", mode: "lines", line: { width: 0 },
     hoverinfo: "skip", showlegend: false, ...extra,
   });
   const curve = (label, y, line) => ({
     x, y, name: label, type: "scatter", mode: "lines", line: { simplify: false, ...line }, hovertemplate: `%{y:.3~s}N<extra>${label}</extra>`,
   });
-  const traces = [
-    ...(spread ? [edge(-1, {}), edge(1, { fill: "tonexty", fillcolor: `${look.faint}59` })] : []),
-    curve(SOURCES[forces.source].toLowerCase(), closed(forces.modelled_n[name]), { color: look.accent, width: 3.5 }),
-    curve("recorded", recorded, { color: look.ink, width: 1.25 }),
-  ];
-  return {
-    traces, hovermode: "x unified", showlegend: true, xaxis: axis(look, "t*, beats; 0: wings closest", { showgrid: false, ...PHASE }), yaxis: zeroAxis(look, "N"),
-  };
+  const band = (centre) => (spread ? [edge(centre, -1, {}), edge(centre, 1, { fill: "tonexty", fillcolor: `${look.faint}59` })] : []);
+  return withResidual(look, {
+    traces: [...band(recorded), curve("recorded", recorded, { color: look.ink, width: 1.5 }),
+      curve(label, modelled, { color: look.accent, width: 2, dash: "dash" })],
+    residual: [...band(recorded.map(() => 0)), residualLine(look, x, recorded, modelled, label)],
+    x: axis(look, "t*, beats; 0: wings closest", { showgrid: false, ...PHASE }), unit: "N",
+  });
 }
 
 // The model is periodic: all its power is at harmonics of the flap frequency, drawn as dots.

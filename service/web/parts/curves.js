@@ -1,7 +1,7 @@
 // A finished run on series: recorded and simulated values of one channel over time.
 
 import { $, plain, plural, toast } from "../base/format.js";
-import { axis, draw, zeroAxis } from "../base/plots.js";
+import { axis, draw, residualLine, withResidual } from "../base/plots.js";
 
 let curves = [];
 
@@ -31,15 +31,14 @@ export function redrawCurves() {
 function chart(look, { unit, time_s: time, recorded, nominal, best }) {
   const shown = [
     ["recorded", recorded, { color: look.ink, width: 1.5 }], ["nominal genome", nominal, { color: look.faint, width: 1.5, dash: "dot" }],
-    ["best genome", best, { color: look.accent, width: 1.5 }],
+    ["best genome", best, { color: look.accent, width: 1.75, dash: "dash" }],
   ];
-  return {
+  const residual = [["nominal genome", nominal, { line: { color: look.faint, width: 1.25, dash: "dot" } }], ["best genome", best, {}]];
+  return withResidual(look, {
     traces: shown.filter(([, y]) => y).map(([name, y, line]) => ({
       x: time, y, name, type: "scatter", mode: "lines", line, hovertemplate: `%{y:.4g}<extra>${name}</extra>`,
     })),
-    showlegend: true,
-    hovermode: "x unified",
-    xaxis: axis(look, "time, s", { showgrid: false, range: [time[0], time.at(-1)] }),
-    yaxis: zeroAxis(look, unit === "1" ? "" : plain(unit)),
-  };
+    residual: residual.filter(([, y]) => y).map(([name, y, more]) => residualLine(look, time, recorded, y, name, more)),
+    x: axis(look, "time, s", { showgrid: false, range: [time[0], time.at(-1)] }), unit: unit === "1" ? "" : plain(unit),
+  });
 }

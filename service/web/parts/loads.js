@@ -7,6 +7,7 @@ import { lines } from "../base/plots.js";
 const OUTPUTS = ["motors", "air", "strips", "sections", "power", "energy", "averages"];
 
 const CUTS_SHOWN = 6;
+const SETTLED_MS = 400;
 
 let wanted = null;
 let shown = "";
@@ -14,12 +15,14 @@ let request = 0;
 let loads = null;
 let visible = false;
 
-// Loads are simulated only when their section is visible.
+// Loads are simulated only when their section stays visible: sections above it appear one after the other.
 export function setUpLoads() {
+  let settling = null;
   new IntersectionObserver((entries) => {
     visible = entries.at(-1).isIntersecting;
-    load();
-  }, { rootMargin: "200px" }).observe($("loads-section"));
+    clearTimeout(settling);
+    if (visible) settling = setTimeout(load, SETTLED_MS);
+  }).observe($("loads-section"));
 }
 
 // Show the loads of a run under a recording's condition; ``version`` changes when the genome may have changed.

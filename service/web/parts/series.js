@@ -3,7 +3,9 @@
 import { get, part } from "../base/api.js";
 import { $, DASH, el, plain, significant, toast } from "../base/format.js";
 import { recordingOptions } from "../base/labels.js";
-import { axis, draw, zeroAxis } from "../base/plots.js";
+import { axis, draw, PHASE, zeroAxis } from "../base/plots.js";
+import { showSeriesNoise } from "../dataset/checks.js";
+import { shades } from "../dataset/samples.js";
 
 const PANELS = 6; // that are drawn at once
 const FEW = 40; // samples up to which each has a dot
@@ -17,6 +19,7 @@ const withUnit = ({ name, unit }) => (unit === "1" ? name : `${name}, ${unit}`);
 export function setUpSeries() {
   $("series-recording").addEventListener("change", load);
   $("series-shown").addEventListener("change", drawPanels);
+  for (const input of document.querySelectorAll("input[name=series-over]")) input.addEventListener("change", drawPanels);
 }
 
 export function hideSeries() {
@@ -67,6 +70,8 @@ async function load() {
     return;
   }
   fillShown();
+  $("series-over").hidden = !values.period_s;
+  showSeriesNoise(dataset.rig.channels, values.noise);
   await drawPanels();
 }
 
@@ -83,8 +88,18 @@ function fillShown() {
     new Option(group.length > 1 ? `${group[0].name} to ${group.at(-1).name}` : group[0].name, String(k))));
   $("series-shown").value = String(Math.min(chosen, groups.length - 1));
   $("series-shown").parentElement.hidden = groups.length < 2;
-  const samples = dataset.recordings.find((one) => one.name === values.recording)?.frames;
-  $("series-note").textContent = values.stride > 1 ? `One in ${values.stride} of the ${samples.toLocaleString("en")} samples is shown.` : "";
+  $("series-note").textContent = note();
+}
+
+const overBeat = () => Boolean(values.period_s) && document.querySelector("input[name=series-over]:checked").value === "beat";
+
+// What is missing, in which channels, and how many samples are shown.
+function note() {
+  const { frames } = dataset.recordings.find((one) => one.name === values.recording);
+  const some = values.stride > 1 ? `One in ${values.stride} of the ${frames.toLocaleString("en")} samples is shown.` : "";
+  const counts = Object.entries(values.missing).filter(([, gaps]) => gaps.samples);
+  const lost = counts.map(([name, gaps]) => `${gaps.samples.toLocaleString("en")} of ${name}`);
+  return [lost.length ? `Missing samples: ${lost.slice(0, PANELS).join(", ")}${lost.length > PANELS ? ", …" : ""}; gaps are shaded.` : "No sample is missing.", some].join(" ");
 }
 
 async function drawPanels() {
@@ -100,15 +115,27 @@ async function drawPanels() {
 
 export const redrawSeries = drawPanels;
 
-function chart(look, { y, unit }, time) {
+// Samples over the phase of the period, with a gap between one beat and the next.
+function folded(y, time) {
+  const phase = time.map((value) => (value - time[0]) / values.period_s);
+  const points = phase.flatMap((value, k) => [...(k && Math.floor(value) !== Math.floor(phase[k - 1]) ? [[null, null]] : []), [value % 1, y[k]]]);
+  return { x: points.map((point) => point[0]), y: points.map((point) => point[1]) };
+}
+
+function chart(look, { name, y, unit }, time) {
+  const beat = overBeat();
   // A sample between two that are missing is on no line.
   const alone = y.map((value, k) => (value !== null && (y[k - 1] ?? null) === null && (y[k + 1] ?? null) === null ? value : null));
-  const trace = { x: time, type: "scatter", line: { color: look.accent, width: 1.5 }, marker: { color: look.accent, size: 4 }, hovertemplate: "%{y:.4g} at %{x:.4g} s<extra></extra>" };
+  const at = beat ? "of the beat" : "s";
+  const trace = { x: time, type: "scatter", line: { color: look.accent, width: beat ? 1 : 1.5 }, marker: { color: look.accent, size: 4 }, hovertemplate: `%{y:.4g} at %{x:.4g} ${at}<extra></extra>` };
+  const drawn = (column) => (beat ? folded(column, time) : { y: column });
+  const half = time.length > 1 ? (time.at(-1) - time[0]) / (time.length - 1) / values.stride / 2 : 0;
   return {
-    traces: [{ ...trace, y, mode: y.length <= FEW ? "lines+markers" : "lines" },
-      ...(alone.some((value) => value !== null) ? [{ ...trace, y: alone, mode: "markers" }] : [])],
+    traces: [{ ...trace, ...drawn(y), mode: y.length <= FEW ? "lines+markers" : "lines", opacity: beat ? 0.6 : 1 },
+      ...(alone.some((value) => value !== null) ? [{ ...trace, ...drawn(alone), mode: "markers" }] : [])],
+    shapes: beat ? [] : shades(look, values.missing[name]?.gaps ?? [], half, "y domain"),
     margin: { l: 10, r: 8, t: 8, b: 10 },
-    xaxis: axis(look, "time, s", { showgrid: false, range: [time[0], time.at(-1)] }),
+    xaxis: beat ? axis(look, "phase of the beat, from the first sample", { showgrid: false, ...PHASE }) : axis(look, "time, s", { showgrid: false, range: [time[0], time.at(-1)] }),
     yaxis: zeroAxis(look, unit === "1" ? "" : plain(unit)),
   };
 }

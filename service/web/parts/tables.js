@@ -16,7 +16,6 @@ export function drawNumbers(run, result) {
 }
 
 function outcome(result) {
-  const judged = result.held_out_after_mm ?? result.after_mm;
   const cells = [
     keyNumber("before, fitted recordings", mm(result.before_mm), "mm"),
     keyNumber("after, fitted recordings", mm(result.after_mm), "mm", true),
@@ -27,7 +26,6 @@ function outcome(result) {
   }
   if (result.noise_mm) {
     cells.push(keyNumber("floor: tracking noise alone", mm(result.noise_mm), "mm"));
-    cells.push(keyNumber("after, relative to the floor", `${significant(judged / result.noise_mm, 3)}×`));
   }
   return cells;
 }
@@ -44,6 +42,7 @@ function forceOutcome(result) {
     cells.push(keyNumber("before, held out", show(heldBefore), unit));
     cells.push(keyNumber("after, held out, predicted", show(heldAfter), unit, true));
   }
+  if (result.noise_mn) cells.push(keyNumber("noise: differs from beat to beat", show(newtons(result.noise_mn)), unit));
   return cells;
 }
 
@@ -131,7 +130,7 @@ export function drawGenes(genome, means = false) {
   const note = genome.final
     ? `${known.length} of ${plural(searched.length, "estimated gene")} are identifiable; hollow dots: not identifiable.`
     : "Best so far; identifiability is computed at the end.";
-  $("genes-note").textContent = `${note} The grey tick is the nominal value.`;
+  $("genes-note").textContent = `${note} Bars are 95 % intervals; the grey tick is the nominal value.`;
 }
 
 function geneRow(gene) {
@@ -147,10 +146,17 @@ function boundsBar(gene) {
   const bar = el("div", { className: "span", title: `${significant(gene.lower)} to ${significant(gene.upper)} ${gene.unit}` });
   const place = (tag, value) => {
     const mark = el(tag);
-    mark.style.left = `${100 * Math.min(1, Math.max(0, position(gene, value)))}%`;
+    mark.style.left = `${100 * inBounds(gene, value)}%`;
     bar.append(mark);
   };
   place("i", gene.nominal);
+  if (gene.standard_error) {
+    const [low, high] = [-1, 1].map((sign) => inBounds(gene, gene.best + sign * INTERVAL_95 * gene.standard_error));
+    const whisker = el("u", { title: "95 % interval" });
+    whisker.style.left = `${100 * low}%`;
+    whisker.style.width = `${100 * (high - low)}%`;
+    bar.append(whisker);
+  }
   if (gene.searched) place("b", gene.best);
   return bar;
 }
@@ -161,6 +167,12 @@ function position({ lower, upper }, value) {
   return (f(value) - f(lower)) / (f(upper) - f(lower));
 }
 
+// A value below the bounds can be negative, which has no place on a logarithmic scale.
+function inBounds(gene, value) {
+  return Math.min(1, Math.max(0, position(gene, Math.max(value, gene.lower))));
+}
+
+const INTERVAL_95 = 1.96; // standard errors on either side
 const SIGNIFICANT = 2; // standard errors from which a value differs from zero, as on the command line (cli/results.py)
 
 function identifiable(gene) {

@@ -20,7 +20,7 @@ export function showWarnings(dataset) {
   $("warnings-title").textContent = `${count(dataset)} in this dataset`;
   $("warnings-part").hidden = !warnings.length;
   $("warnings").replaceChildren(
-    el("p", {}, "Found by the checks of the upload; the dataset was stored all the same. Compare it with the experiment before you calibrate."),
+    el("p", {}, "The dataset was stored all the same. Compare it with the experiment before you calibrate."),
     el("ul", { className: "plain" }, ...warnings.map(card)),
     el("p", {}, "Change the folder by hand, or let this command write a corrected copy, and upload that as a new dataset:"),
     copyable(FIX, "command that writes a corrected copy"));

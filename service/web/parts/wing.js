@@ -1,9 +1,9 @@
 // Recorded and simulated markers: in 3-D at one phase, and their height over the beat.
 
 import { plain, significant } from "../base/format.js";
-import { axis, draw, PHASE } from "../base/plots.js";
+import { axis, draw, PHASE, zeroAxis } from "../base/plots.js";
 
-const SHOWN = 4;
+const SHOWN = 3;
 const AXES = ["x aft, mm", "y span, mm", "z up, mm"];
 
 // Frames in order of phase: a stroboscopic recording takes them from many beats.
@@ -113,17 +113,23 @@ function beat(look, tracks, frame) {
   markers.forEach((m, row) => {
     const suffix = row ? row + 1 : "";
     const top = 1 - row / markers.length;
-    const domain = [top - 1 / markers.length + 0.035, top - 0.045];
+    const bottom = top - 1 / markers.length;
+    const below = `y${markers.length + row + 1}`; // the residual
+    const split = bottom + 0.3 / markers.length;
     const height = (frames) => frames.map((points) => points[m][2]);
     const common = { x: tracks.phase, xaxis: "x", yaxis: `y${suffix}`, type: "scatter" };
+    const rest = height(tracks.recorded_mm).map((value, i) => (value === null ? null : value - tracks.simulated_mm[i][m][2]));
     traces.push(
       { ...common, y: height(tracks.recorded_mm), mode: "markers", name: "recorded",
         marker: { size: 5, symbol: "circle-open", color: look.ink, line: { width: 1 } },
         hovertemplate: "%{y:.1f} mm<extra>recorded</extra>" },
       { ...common, y: height(tracks.simulated_mm), mode: "lines", name: "simulated",
         line: { color: look.accent, width: 2 }, hovertemplate: "%{y:.1f} mm<extra>simulated</extra>" },
+      { ...common, yaxis: below, y: rest, mode: "lines", name: "recorded minus simulated",
+        line: { color: look.series[1], width: 1.5 }, hovertemplate: "%{y:.2f} mm<extra>recorded minus simulated</extra>" },
     );
-    axes[`yaxis${suffix}`] = axis(look, "z, mm", { domain, nticks: 4 });
+    axes[`yaxis${suffix}`] = axis(look, "z, mm", { domain: [split + 0.02, top - 0.045], nticks: 4 });
+    axes[`yaxis${below.slice(1)}`] = zeroAxis(look, "Δz", { domain: [bottom + 0.035, split - 0.01], nticks: 3 });
     annotations.push({
       text: `marker ${plain(tracks.markers[m])}, ${significant(tracks.simulated_mm[0][m][1], 3)} mm along the span`,
       xref: "paper", yref: "paper", x: 0, y: top - 0.045, xanchor: "left", yanchor: "bottom", showarrow: false,
@@ -133,7 +139,7 @@ function beat(look, tracks, frame) {
   const now = tracks.phase[frame];
   return {
     traces, margin: { l: 10, r: 8, t: 4, b: 10 }, annotations, ...axes,
-    xaxis: axis(look, "phase of the beat", { ...PHASE, showgrid: false, anchor: `y${markers.length > 1 ? markers.length : ""}` }),
+    xaxis: axis(look, "phase of the beat", { ...PHASE, showgrid: false, anchor: `y${2 * markers.length}` }),
     shapes: [{ type: "line", x0: now, x1: now, yref: "paper", y0: 0, y1: 1, line: { color: look.faint, width: 1 } }],
   };
 }

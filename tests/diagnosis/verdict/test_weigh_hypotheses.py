@@ -17,7 +17,7 @@ from wingfit.diagnosis.location.differences import _variables
 from wingfit.diagnosis.policy import POLICY
 from wingfit.diagnosis.search import _unconverged
 from wingfit.diagnosis.verdict import weigh_hypotheses
-from wingfit.diagnosis.verdict.verdict import _explained_fraction, decide
+from wingfit.diagnosis.verdict.verdict import decide, explained_fraction
 from wingfit.diagnosis.verdict.weigh_hypotheses import (
     HypothesisWeights,
     nominal_refuted,
@@ -183,8 +183,8 @@ def test_the_search_starts_before_a_perfect_effect_would_be_worth_its_genes() ->
     ("left", "before", "part"),
     [(1.0, 4.0, 0.75), (-0.1, 4.0, 1.0), (9.0, 4.0, -1.0), (1.0, 0.0, 0.0), (0.1, -0.1, 0.0)],
 )
-def test_the_explained_fraction_of_an_excess(left: float, before: float, part: float) -> None:
-    assert _explained_fraction(left, before) == part
+def test_theexplained_fraction_of_an_excess(left: float, before: float, part: float) -> None:
+    assert explained_fraction(left, before) == part
 
 
 def test_a_vacuum_has_no_exponent_of_density() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -18,14 +19,11 @@ import numpy as np
 import pytest
 import typer
 
+from tests.docs.existing_commands import mistake
 from tests.records.series_samples import arm_dataset
 from tests.service import toy
 from tests.service.processes import ROOT, ServerProcess, free_port, heed_interrupts
 from wingfit.cli import main as cli
-from wingfit.cli import results
-from wingfit.cli.base import output
-from wingfit.cli.base.output import duration, mm, number
-from wingfit.cli.simulate import marker_distances
 from wingfit.records import Dataset, save_dataset
 from wingfit.sim.effects.registry import EFFECTS
 from wingfit.sim.virtual_rigs.campaign import blank_recording, robird_wing, vacuum
@@ -91,12 +89,14 @@ def test_the_commands_are_those_promised() -> None:
         "forces",
         "predict",
         "export",
+        "history",
+        "residual",
     ]
     data = ["list", "upload", "show", "edit", "download", "delete", "check"]
     expected = (
         {"serve", "campaign", "balance", "kinematics", "forces", "simulate", "models", "effects", "diagnose", "drive"}
         | {"import", "import-forces", "align", "wing-template", "wing-drawing"}
-        | {f"diagnoses {c}" for c in ("list", "watch", "edit", "cancel", "delete", "export")}
+        | {f"diagnoses {c}" for c in ("list", "watch", "edit", "cancel", "delete", "export", "residual")}
         | {f"runs {c}" for c in steer}
         | {f"datasets {c}" for c in data}
         | {"backup", "restore", "rig check", "rig list"}
@@ -137,17 +137,11 @@ def test_effects_are_listed_described_and_included(wingfit: Wingfit, dataset_id:
     assert (code, "does not apply to a wing" in err) == (1, True)
 
 
-def test_the_error_of_a_gene_that_starts_at_zero_is_in_its_unit(capsys: pytest.CaptureFixture[str]) -> None:
-    one: Any = {"name": "drive_harmonics.cos2", "nominal": 0.0, "best": 3.4e-5, "unit": "rad", "lower": -0.1}
-    one |= {"upper": 0.1, "searched": True, "standard_error_percent": 0.64, "identifiable": True}
-    results.print_genes([one | {"standard_error": 3.2e-5}])
-    shown = capsys.readouterr().out
-    assert "± 3.2e-05 rad" in shown
-    assert "not different from zero" in shown
-    assert "%" not in shown
-    assert results.identifiable(one | {"standard_error": 1.6e-5}) == "yes"
-    assert results.identifiable(one | {"standard_error": 3.2e-5, "nominal": 1e-3}) == "yes"
-    assert results.identifiable(one) == "yes", "answers of earlier versions have no standard_error"
+def test_effects_need_no_server(wingfit: Wingfit, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("WINGFIT_URL", f"http://127.0.0.1:{free_port()}")
+    code, out, err = wingfit("effects", "clap-and-peel")
+    assert (code, "clap_and_peel: Clap and peel" in out) == (0, True)
+    assert "next: wingfit runs submit DATASET --with clap_and_peel" in err
 
 
 def test_a_run_is_searched_with_a_coarser_division(wingfit: Wingfit, dataset_id: str) -> None:
@@ -190,6 +184,24 @@ def test_upload_submit_watch_fetch(wingfit: Wingfit, dataset_id: str, tmp_path: 
     assert float(rows[3]["simulated_x_mm"]) > 0
 
 
+def test_history_and_residual_are_drawn_and_saved(wingfit: Wingfit, dataset_id: str, tmp_path: Path) -> None:
+    run_id = json.loads(wingfit("runs", "submit", dataset_id, "--max-generations", "3", "--json")[1])["id"]
+    wingfit("runs", "watch", run_id)
+    figure = tmp_path / "figure.html"
+    code, out, err = wingfit("runs", "history", run_id, "--plot", str(figure))
+    assert code == 0, err
+    assert out.startswith("fitness by generation: best ")
+    assert "* best   o mean" in out
+    assert [line.split()[:2] for line in out.splitlines()[-2:]] == [["structural", "3"], ["aerodynamic", "3"]]
+    assert "plotly" in figure.read_text()
+    assert f"next: open {figure}" in err
+    assert len(json.loads(wingfit("runs", "history", run_id, "--json")[1])) == 6
+    code, out, _ = wingfit("runs", "residual", run_id, "--genome", "nominal", "--recording", "fast")
+    assert (code, out.splitlines()[0]) == (0, "distance between recorded and simulated markers, fast")
+    (misfit,) = json.loads(wingfit("runs", "residual", run_id, "--json")[1])
+    assert (misfit["unit"], len(misfit["x"])) == ("mm", len(misfit["lines"]["largest"]))
+
+
 def test_reading_commands_speak_json(wingfit: Wingfit, dataset_id: str) -> None:
     run_id = json.loads(wingfit("runs", "submit", dataset_id, "--max-generations", "1", "--json")[1])["id"]
     assert json.loads(wingfit("runs", "watch", run_id, "--json")[1])["state"] == "SUCCEEDED"
@@ -202,9 +214,43 @@ def test_reading_commands_speak_json(wingfit: Wingfit, dataset_id: str) -> None:
         ("runs", "result", run_id),
         ("simulate", "--dataset", dataset_id),
     ):
-        code, out, _ = wingfit(*words, "--json")
-        assert code == 0
+        code, out, err = wingfit(*words, "--json")
+        assert (code, "next: " in err) == (0, False)
         assert json.loads(out)
+
+
+def test_a_command_ends_with_the_next_step(wingfit: Wingfit, dataset_id: str, tmp_path: Path) -> None:
+    run_id = json.loads(wingfit("runs", "submit", dataset_id, "--max-generations", "1", "--json")[1])["id"]
+    wingfit("runs", "watch", run_id)
+    archive, best = str(tmp_path / "toy.zip"), str(tmp_path / "best.json")
+    for words in (
+        ("datasets", "list"),
+        ("datasets", "upload", archive),
+        ("datasets", "show", dataset_id),
+        ("datasets", "download", dataset_id, "-o", str(tmp_path / "again.zip")),
+        ("runs", "list"),
+        ("runs", "list", "--state", "failed"),
+        ("runs", "watch", run_id),
+        ("runs", "show", run_id),
+        ("runs", "genome", run_id),
+        ("runs", "genome", run_id, "-o", best),
+        ("runs", "result", run_id),
+        ("runs", "history", run_id),
+        ("runs", "residual", run_id),
+        ("runs", "export", run_id, "--format", "csv", "-o", str(tmp_path / "run.csv")),
+        ("simulate", "--dataset", dataset_id),
+        ("diagnoses", "list"),
+        ("models",),
+        ("effects",),
+        ("rig", "list"),
+        ("runs", "delete", run_id),
+    ):
+        code, out, err = wingfit(*words)
+        assert code == 0, err
+        assert "next: " not in out
+        last = err.splitlines()[-1]
+        assert last.startswith("next: wingfit "), words
+        assert mistake(re.split(r"[,;]| \(", last.removeprefix("next: "))[0]) == "", last
 
 
 def test_an_accuracy_out_of_reach_is_told_with_its_limit(wingfit: Wingfit, dataset_id: str) -> None:
@@ -217,7 +263,10 @@ def test_an_accuracy_out_of_reach_is_told_with_its_limit(wingfit: Wingfit, datas
 
 def test_steering(wingfit: Wingfit, dataset_id: str) -> None:
     run_id = json.loads(wingfit("runs", "submit", dataset_id, "--max-generations", "500", "--json")[1])["id"]
-    assert wingfit("runs", "pause", run_id)[0] == 0
+    code, out, err = wingfit("runs", "pause", run_id)
+    assert (code, out.split()) == (0, ["run", run_id, "PAUSED"])
+    assert err.startswith("pausing")
+    assert f"next: wingfit runs resume {run_id}" in err
     assert wingfit("runs", "resume", run_id)[0] == 0
     assert wingfit("runs", "delete", run_id)[0] == 1
     assert wingfit("runs", "cancel", run_id)[0] == 0
@@ -333,28 +382,3 @@ def test_ctrl_c_while_watching_leaves_the_run_going(server: ServerProcess, wingf
     before = server.api.run(run_id)["generations"]
     server.api.until(run_id, lambda run: run["generations"] > before)
     server.api.client.post(f"/v1/runs/{run_id}/cancel")
-
-
-def test_numbers() -> None:
-    assert [duration(s) for s in (None, 7.4, 192, 3765)] == ["–", "0:07", "3:12", "1:02:45"]
-    assert [mm(v) for v in (None, 2.346)] == ["–", "2.35"]
-    assert [number(v) for v in (None, 12345678.0, 0.25)] == ["–", "1.235e+07", "0.25"]
-    assert [number(v, 2, "%") for v in (109.6, 12.34, 3456.7, -0.0)] == ["110 %", "12 %", "3457 %", "0 %"]
-    assert number(3.0, unit="Hz") == "3 Hz"
-
-
-def test_marker_distances_count_only_what_was_recorded() -> None:
-    tracks: Any = {
-        "markers": ["a", "b"],
-        "recorded_mm": [[[0.0, 0.0, 0.0], [None] * 3], [[0.0, 0.0, 0.0], [None] * 3]],
-        "simulated_mm": [[[3.0, 4.0, 0.0], [1.0] * 3], [[0.0, 0.0, 1.0], [1.0] * 3]],
-    }
-    assert marker_distances(tracks) == {"a": 3.0, "b": None}
-
-
-def test_a_name_does_not_steer_the_terminal(capsys: pytest.CaptureFixture[str]) -> None:
-    output.table(["name", ">n"], [["\x1b[31mred\x1b]0;title\x07\nnext", "1"]])
-    output.say("one\ntwo\x1b[0m")
-    out = capsys.readouterr().out
-    assert not {"\x1b", "\x07", "\x00"} & set(out)
-    assert len(out.splitlines()) == 4

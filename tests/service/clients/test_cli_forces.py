@@ -190,9 +190,9 @@ def test_the_client_passes_on_what_the_server_says(client: Client, dataset_id: s
 
 
 def test_a_balance_campaign_is_written_with_its_truth(wingfit: Wingfit, tmp_path: Path) -> None:
-    code, out, _ = wingfit("balance", str(tmp_path / "mine"), "--seed", "4")
+    code, _, err = wingfit("balance", str(tmp_path / "mine"), "--seed", "4")
     assert code == 0
-    assert "next: wingfit datasets upload" in out
+    assert "next: wingfit datasets upload" in err
     assert "seed 4" in load_dataset(tmp_path / "mine").description
     assert read_truth(tmp_path / "mine.truth.json")["test-1"]["C_l"] == 0.89
     code, out, _ = wingfit("datasets", "check", str(tmp_path / "mine"))

@@ -69,6 +69,21 @@ def test_a_path_is_uploaded_and_what_was_found_is_printed(wingfit: Wingfit, arch
     assert report.read_text().startswith("<!DOCTYPE html>")
 
 
+def test_the_residual_is_drawn_before_and_after(wingfit: Wingfit, archive: Path) -> None:
+    _, _, err = wingfit("diagnose", str(archive), "--division", "4")
+    diagnosis_id = next(word for word in err.split() if word.startswith("dx_"))
+    code, out, err = wingfit("diagnoses", "residual", diagnosis_id)
+    assert code == 0, err
+    assert out.splitlines()[:2] == ["misfit over the beat, root mean square over all recordings", "misfit, mm"]
+    assert "after: with the named effects" in out
+    assert "before: nominal model, refitted" in out
+    assert "noise" in out
+    assert f"next: wingfit diagnoses watch {diagnosis_id}" in err
+    code, _, err = wingfit("diagnoses", "residual", diagnosis_id, "--recording", "none")
+    assert code == 1
+    assert "there are no curves of the recording 'none'; there are those of " in err
+
+
 def test_json_is_the_finding_alone(wingfit: Wingfit, server: ServerProcess) -> None:
     dataset = server.api.upload()["id"]
     code, out, _ = wingfit("diagnose", dataset, "--seed", "6", "--json")

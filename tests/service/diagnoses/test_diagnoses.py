@@ -165,6 +165,23 @@ def test_events_tell_every_step_and_end_with_the_verdict(api: Api, gate: Gate) -
     assert api.client.get(f"/v1/diagnoses/{diagnosis}/events", headers={"Last-Event-ID": "x"}).status_code == 422
 
 
+def test_a_running_diagnosis_shows_what_it_knows(api: Api, gate: Gate) -> None:
+    diagnosis = api.diagnose(api.upload()["id"])["id"]
+    path = f"/v1/diagnoses/{diagnosis}/partial"
+    assert api.client.get(path).json() is None, "the nominal model has not been fitted"
+    gate.let(5)
+    api.until_diagnosis(diagnosis, lambda now: now["steps"] > toy_diagnosis.STEPS)
+    known = api.get(path)
+    assert (known["unit"], known["suspects"]) == ("m", len(toy_diagnosis.KNOWN))
+    assert [place["misfit"] for place in known["places"]] == [1e-3, 3e-3]
+    assert known["leads"][0]["effects"] == ["hinge_offset"]
+    gate.let(STEPS)
+    done = api.diagnosed(diagnosis)
+    assert (done["fit_badge"], round(done["residual_over_noise"], 2)) == ("good", 1.0)
+    assert api.client.get(path).json() is None, "it has a finding"
+    assert api.client.get("/v1/diagnoses/dx_none/partial").status_code == 404
+
+
 def test_cancel_and_delete(api: Api, gate: Gate) -> None:
     dataset = api.upload()["id"]
     diagnosis = api.diagnose(dataset)["id"]

@@ -9,6 +9,7 @@ from typing import Any, get_args
 import pytest
 from pydantic import BaseModel, TypeAdapter
 
+from tests.checks.samples import good_vehicle
 from tests.records.series_samples import arm_dataset
 from tests.service import toy
 from tests.service.conftest import Api
@@ -91,7 +92,11 @@ def test_unchanged_answers_are_304_as_described(api: Api, specification: Specifi
     ids = {"run_id": run, "dataset_id": api.run(run)["dataset_id"], "diagnosis_id": diagnosis}
     ids |= {"film_id": film, "tracking_id": tracking, "camera": "left", "number": "0"}
     file = {"file": ("arm.nc", write_netcdf(arm_dataset()))}
-    series = {"dataset_id": api.client.post("/v1/datasets", files=file).json()["id"]}
+    vehicle = {"file": ("delfly.nc", write_netcdf(good_vehicle()))}
+    others = {
+        f"/v1/datasets/{{dataset_id}}/{name}": {"dataset_id": api.client.post("/v1/datasets", files=one).json()["id"]}
+        for name, one in (("series", file), ("forces", vehicle))
+    }
     tried = 0
     for method, path, operation in operations(specification):
         marked = any(parameter["name"] == "If-None-Match" for parameter in operation.get("parameters", ()))
@@ -99,7 +104,7 @@ def test_unchanged_answers_are_304_as_described(api: Api, specification: Specifi
         if marked:
             answer = api.client.request(
                 method,
-                path.format(**(ids | series if path.endswith("/series") else ids)),
+                path.format(**(ids | others.get(path, {}))),
                 headers={"If-None-Match": "*"},
             )
             assert (answer.status_code, answer.content) == (304, b""), path

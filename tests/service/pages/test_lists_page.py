@@ -204,7 +204,7 @@ def test_badges_and_multiples_of_the_noise_are_shown(seen: Seen) -> None:
             overNoise(job('good', 1.08, null), 'residual_over_noise')];
     }"""
     assert seen.page.evaluate(script) == [
-        [["good 1.1", "badge fit-good"], ["wrong 12", "badge fit-wrong"], ["doubtful 2.0", "badge fit-doubtful"]],
+        [["good 1.1×", "badge fit-good"], ["wrong 12×", "badge fit-wrong"], ["doubtful 2.0×", "badge fit-doubtful"]],
         None,
         None,
         "1.1",

@@ -99,6 +99,7 @@ def test_loads_are_drawn_when_somebody_looks_and_follow_the_choice(
     assert best[0] == pytest.approx(0, abs=1e-6)
     assert "mean lift" in seen.page.inner_text("#loads-numbers")
     seen.page.check("input[name=genome][value=nominal]", force=True)
+    seen.page.locator("#loads-section").scroll_into_view_if_needed()
     seen.wait("document.getElementById('loads-note').textContent.includes('nominal')")
     seen.wait(f"document.getElementById('load-torque').data[0].y[4] !== {json.dumps(best[4])}")
     assert seen.data("load-torque", 0, "y")[4] == pytest.approx(-toy.NOMINAL["stiffness"])

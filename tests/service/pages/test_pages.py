@@ -306,6 +306,8 @@ def test_from_an_upload_to_a_verdict_through_the_page_alone(seen: Seen, tmp_path
     seen.wait("document.querySelector('#run-name .badge')?.textContent === 'done'", 90)
     seen.wait(f"{ROWS.format('misfit')} > 0")
     seen.page.click("#diagnose-run")
+    seen.wait("document.getElementById('diagnose-suspects-summary')?.textContent.includes('all')")
+    seen.page.click("#diagnose-form [type=submit]")
     seen.wait("location.hash.startsWith('#diagnosis=')")
     seen.wait("document.getElementById('report').shadowRoot?.querySelector('svg[role=img]')", 30)
     assert "verdict: named" in seen.page.inner_text("#report .over")

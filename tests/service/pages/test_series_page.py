@@ -111,12 +111,17 @@ def test_the_dataset_shows_its_recordings_and_their_values(seen: Seen, api: Api)
     assert heads == ["Recording", "Use", "Samples", "Duration, s", "Missing, %", "mass, kg", "gear"]
     row = seen.rows("recordings")[2]
     assert (row[0], row[1], row[2], row[5:]) == ("heavy", "to fit", "40", ["0.3", "20"])
-    assert seen.page.is_hidden("#conditions-part")
+    seen.wait(DRAWN.format("conditions", 1))
+    assert seen.page.inner_text("#conditions-title").lower() in ("gear against mass, kg", "mass, kg against gear")
     assert panels(seen) == ["angle, rad", "acceleration, m/s^2", "contact", "input voltage, V"]
     values = api.get(f"/v1/datasets/{arm}/series")
     assert drawn(seen, 0, "x") == values["time_s"]
     assert drawn(seen, 1, "y") == values["channels"]["acceleration"]
     assert None in drawn(seen, 1, "y"), "a gap where nothing was recorded"
+    lost = values["missing"]["acceleration"]
+    assert f"{lost['samples']} of acceleration" in seen.page.inner_text("#series-note")
+    shaded = "document.querySelectorAll('#panels .plot')[1].layout.shapes.length"
+    assert seen.page.evaluate(shaded) == len(lost["gaps"]) > 0
     seen.page.select_option("#series-recording", "heavy")
     heavy = api.get(f"/v1/datasets/{arm}/series?recording=heavy")["channels"]["angle"]
     seen.wait(f"document.querySelector('#panels .plot')?.data?.[0].y[0] === {heavy[0]}")

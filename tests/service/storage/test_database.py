@@ -151,6 +151,8 @@ def test_what_the_first_schema_stored_is_all_there(tmp_path: Path) -> None:
         assert (done.spec.mode, done.spec.method, done.spec.finish, done.spec.seed) == ("staged", "genetic", False, 4)
         result = valid(Result, api.get("/v1/runs/run_1/result"))
         assert (result.kind, result.after_mm) == ("tracks", 1.5)
+        noise = result.noise_mm
+        assert (done.residual_over_noise, done.fit_badge) == ((1.5 / noise, "wrong") if noise else (None, None))
         (item,) = api.history("run_1")
         assert (item["best_mm"], item["best_mn"]) == (1.5, None)
         went_on = api.finish("run_2")

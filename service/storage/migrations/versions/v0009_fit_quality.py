@@ -1,4 +1,4 @@
-"""Adds how the model of a run or diagnosis fits: its misfit as a multiple of the noise, fitted and held out."""
+"""Adds misfits as multiples of the noise to runs and diagnoses, and what a running diagnosis knows so far."""
 
 from __future__ import annotations
 
@@ -18,7 +18,12 @@ Misfits = tuple[float | None, float | None]
 
 
 def upgrade() -> None:
-    """Add the columns, filled for the jobs that have ended."""
+    """Add the columns, filled for the jobs that have ended, and the table of partial findings."""
+    op.create_table(
+        "partial",
+        sa.Column("diagnosis_id", sa.String, sa.ForeignKey("diagnosis.id", ondelete="CASCADE"), primary_key=True),
+        sa.Column("body", sa.JSON, nullable=False),
+    )
     for table in ("run", "diagnosis"):
         for column in COLUMNS:
             op.add_column(table, sa.Column(column, sa.Double))
@@ -27,11 +32,10 @@ def upgrade() -> None:
 
 
 def _fill(table: str, select: str, misfits: Callable[[str, dict[str, Any]], Misfits]) -> None:
-    connection = op.get_bind()
-    update = sa.text(f"UPDATE {table} SET {COLUMNS[0]} = :fitted, {COLUMNS[1]} = :held_out WHERE id = :id")  # noqa: S608  # constants
+    connection, jobs = op.get_bind(), sa.table(table, sa.column("id"), *(sa.column(name) for name in COLUMNS))
     for identity, kind, body in connection.execute(sa.text(select)).all():
-        fitted, held_out = misfits(kind, json.loads(body))
-        connection.execute(update, {"fitted": fitted, "held_out": held_out, "id": identity})
+        found = dict(zip(COLUMNS, misfits(kind, json.loads(body)), strict=True))
+        connection.execute(jobs.update().where(jobs.c.id == identity).values(found))
 
 
 def _of_run(kind: str, result: dict[str, Any]) -> Misfits:

@@ -21,8 +21,10 @@ def test_forces_over_the_beat_follow_recording_model_and_axes(seen: Seen, api: A
     seen.wait(DRAWN.format("spectrum-1", 1))
     first = force_data.FITTED[0]
     answer = _forces(api, local, first, "local")
-    assert seen.data("beat-0", 3, "y")[:-1] == pytest.approx(answer["recorded_n"]["lift"])
-    assert seen.data("beat-0", 2, "y")[:-1] == pytest.approx(answer["modelled_n"]["lift"])
+    assert seen.data("beat-0", 2, "y")[:-1] == pytest.approx(answer["recorded_n"]["lift"])
+    assert seen.data("beat-0", 3, "y")[:-1] == pytest.approx(answer["modelled_n"]["lift"])
+    left = [r - m for r, m in zip(answer["recorded_n"]["lift"], answer["modelled_n"]["lift"], strict=True)]
+    assert seen.data("beat-0", 6, "y")[:-1] == pytest.approx(left)
     band = [r + s for r, s in zip(answer["recorded_n"]["drag"], answer["standard_deviation_n"]["drag"], strict=True)]
     assert seen.data("beat-1", 1, "y")[:-1] == pytest.approx(band)
     assert seen.page.evaluate("document.getElementById('spectrum-0').layout.yaxis.type") == "log"
@@ -33,10 +35,10 @@ def test_forces_over_the_beat_follow_recording_model_and_axes(seen: Seen, api: A
     seen.page.check("input[name=source][value=nominal]", force=True)
     seen.wait("document.getElementById('beats-note').textContent.includes('nominal')")
     nominal = _forces(api, local, first, "nominal")["modelled_n"]
-    assert seen.data("beat-0", 2, "y")[:-1] == pytest.approx(nominal["lift"])
+    assert seen.data("beat-0", 3, "y")[:-1] == pytest.approx(nominal["lift"])
     seen.page.check("input[name=quantities][value='x z']", force=True)
     seen.wait("document.getElementById('beat-1-title').textContent.includes('along z')")
-    assert seen.data("beat-1", 2, "y")[:-1] == pytest.approx(nominal["z"])
+    assert seen.data("beat-1", 3, "y")[:-1] == pytest.approx(nominal["z"])
 
     seen.page.check("input[name=source][value=local]", force=True)
     seen.page.select_option("#force-recording", force_data.HELD_OUT)
@@ -44,7 +46,7 @@ def test_forces_over_the_beat_follow_recording_model_and_axes(seen: Seen, api: A
     offered = seen.page.evaluate("[...document.querySelectorAll('input[name=source]')].map((i) => i.value)")
     assert offered == ["global", "average", "nominal"]  # nothing was fitted to it
     unseen = _forces(api, local, force_data.HELD_OUT, "global")["modelled_n"]["x"]
-    assert seen.data("beat-0", 2, "y")[:-1] == pytest.approx(unseen)
+    assert seen.data("beat-0", 3, "y")[:-1] == pytest.approx(unseen)
     seen.page.select_option("#force-recording", first)
     seen.wait("document.getElementById('beats-note').textContent.includes('local')")  # what was chosen comes back
     assert seen.errors == []
