@@ -24,7 +24,6 @@ DiagnosisSort = Literal[
 ]
 DatasetSort = Literal["created_at", "name", "kind", "recordings", "held_out", "size_bytes"]
 Order = Literal["asc", "desc"]
-Badge = Literal["good", "doubtful", "wrong"]
 
 
 class JobGroup(TypedDict):

@@ -6,7 +6,7 @@ from typing import cast
 
 from wingfit.client import answers as a
 from wingfit.client.diagnosis_answers import Diagnosis
-from wingfit.client.lists.answers import Badge, DatasetSort, DiagnosisSort, JobGroup, Order, RunSort
+from wingfit.client.lists.answers import DatasetSort, DiagnosisSort, JobGroup, Order, RunSort
 from wingfit.client.transport import Transport, given, part
 
 
@@ -33,7 +33,7 @@ class ListCalls(Transport):
         *,
         dataset_id: str | None = None,
         state: str | None = None,
-        badge: Badge | None = None,
+        badge: a.FitBadge | None = None,
         q: str | None = None,
         sort: RunSort | None = None,
         order: Order | None = None,
@@ -52,7 +52,7 @@ class ListCalls(Transport):
         dataset_id: str | None = None,
         run_id: str | None = None,
         state: str | None = None,
-        badge: Badge | None = None,
+        badge: a.FitBadge | None = None,
         q: str | None = None,
         sort: DiagnosisSort | None = None,
         order: Order | None = None,

@@ -6,7 +6,8 @@ from typing import Annotated
 
 from fastapi import Query
 
-from wingfit.client.lists.answers import Badge, DatasetSort, DiagnosisSort, Order, RunSort
+from wingfit.client.answers import FitBadge
+from wingfit.client.lists.answers import DatasetSort, DiagnosisSort, Order, RunSort
 
 _SORT = Query(description="order; items without a value come last")
 OfRuns = Annotated[RunSort, _SORT]
@@ -22,7 +23,7 @@ Text = Annotated[
         description="part of the name or notes, or a whole id; A to Z and a to z are equal",
     ),
 ]
-Fit = Annotated[Badge | None, Query(description="only those whose model fits so")]
+Fit = Annotated[FitBadge | None, Query(description="only those whose model fits so")]
 Active = Annotated[bool, Query(description="only those that have not ended")]
 OfDataset = Annotated[str | None, Query(max_length=200)]
 

@@ -19,6 +19,7 @@ from sqlalchemy.orm import Session
 from wingfit.calibration.result import ADEQUATE
 from wingfit.client.lists.answers import JobGroup
 from wingfit.service.http.problems import ProblemError, error_item, invalid
+from wingfit.service.outcomes.fit_quality import DOUBTFUL
 from wingfit.service.storage.tables import DatasetJobRow, DatasetRow, DiagnosisRow, KeyRow, OwnedRow, RunRow
 from wingfit.workers.jobs import State
 
@@ -27,7 +28,6 @@ Values = dict[str, Any]
 BEFORE, NEXT = "before-", "next-"  # beginnings of cursors
 NEWEST = "created_at"
 BIGGEST = 2**62  # whole number in a cursor
-DOUBTFUL = 3.0  # times the noise
 ACTIVE = tuple(state.value for state in State if not state.final)
 
 _STATES = (

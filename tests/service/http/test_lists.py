@@ -41,7 +41,7 @@ class Filled:
                 row = store.one(session, table, made)
                 assert isinstance(row, RunRow | DiagnosisRow)
                 session.execute(insert(table), [self._copy(columns(row), prefix, k) for k in range(1, COUNT)])
-                row.residual_over_noise = None
+                row.residual_over_noise = row.held_out_over_noise = None
 
     def _copy(self, values: dict[str, Any], prefix: str, k: int) -> dict[str, Any]:
         spec = dict(values["spec"])
