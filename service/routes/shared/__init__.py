@@ -1,0 +1,1 @@
+"""Routes that several kinds of resource share."""
