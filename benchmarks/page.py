@@ -1,0 +1,220 @@
+"""``python -m benchmarks.page``: measures the web page in Chromium, on a real server.
+
+A dataset of forces is uploaded, calibrated and diagnosed with clicks alone. Then each page is opened in light and dark,
+on a desktop and on a phone: its answer must be near the top, axe must find nothing, and the console must be silent. Last,
+the page is opened over many runs. Takes a few minutes.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sqlite3
+import sys
+import tempfile
+import time
+from contextlib import closing
+from dataclasses import dataclass, field
+from pathlib import Path
+from shutil import which
+from typing import TYPE_CHECKING, Any
+
+from benchmarks.common import machine
+from benchmarks.common.files import REPOSITORY, zipped
+from benchmarks.common.server_process import Server
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Page
+
+BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+DATASET = "delfly"
+MANY_RUNS = 10_000
+LONGEST_S = 600.0
+TRIES = 3
+DESKTOP, PHONE = {"width": 1280, "height": 900}, {"width": 390, "height": 780}
+# What answers the question of a page: a badge or sentence, and the first picture.
+ANSWERS = {
+    "run": ("#run-fit", "#beats"),
+    "diagnosis": ("#report >> h1", "#report >> .figures, #report >> svg"),
+    "dataset": ("#dataset-name", "#forces-view"),
+    "diagnoses": ("#listing-table tbody tr",),
+}
+
+
+@dataclass
+class Found:
+    """What the browser found: violations of axe, errors on the console, and the largest page in bytes moved."""
+
+    violations: list[str] = field(default_factory=list)
+    errors: list[str] = field(default_factory=list)
+    bytes_of: dict[str, int] = field(default_factory=dict)
+
+
+class Clicks:
+    """Clicks on a page, counted."""
+
+    def __init__(self, page: Page) -> None:
+        self.page, self.count = page, 0
+
+    def on(self, selector: str, timeout_s: float = 60.0) -> None:
+        """Click on the element ``selector`` when it is there."""
+        self.page.click(selector, timeout=1e3 * timeout_s)
+        self.count += 1
+
+
+def main() -> None:
+    """Measure, and print the figures; the last line of output is one JSON object."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.page", description=__doc__)
+    parser.add_argument("--json", action="store_true", help="one JSON object as the last line (always printed)")
+    parser.parse_args()
+    with tempfile.TemporaryDirectory(prefix="wf-") as scratch:
+        figures = measured(Path(scratch))
+    print(json.dumps(figures | {"processor": machine.cpu(), "commit": machine.commit()}))
+    sys.exit(0 if not figures["axe_violations"] and not figures["console_errors"] else 1)
+
+
+def measured(folder: Path) -> dict[str, Any]:
+    """Return the figures; ``folder`` holds the server's data."""
+    from playwright.sync_api import sync_playwright  # needed here alone
+
+    path = next((found for name in BROWSERS if (found := which(name))), None)
+    if path is None:
+        sys.exit("chromium is not installed; install it, e.g. apt-get install chromium")
+    archive = folder / f"{DATASET}.zip"
+    archive.write_bytes(zipped(REPOSITORY / "examples" / DATASET))
+    server, found = Server(folder, "processes"), Found()
+    with sync_playwright() as started:
+        browser = started.chromium.launch(executable_path=path, args=["--no-sandbox", "--disable-gpu"])
+        server.start()
+        try:
+            clicks, pages = _worked(browser, server, archive)
+            tops = {name: _top(browser, server, pages[name], selectors) for name, selectors in ANSWERS.items()}
+            for scheme in ("light", "dark"):
+                for size in (DESKTOP, PHONE):
+                    _looked_at(browser, server, pages, scheme, size, found)
+        finally:
+            server.stop()
+        _multiplied(folder / "data", MANY_RUNS)
+        server.start()
+        try:
+            seconds = {one: _seconds(browser, server, one) for one in ("", "runs", "runs&sort=fit&order=desc")}
+        finally:
+            server.stop()
+        browser.close()
+    largest = max(found.bytes_of, key=lambda one: found.bytes_of[one])
+    return {
+        "answer_px_from_top": max(tops.values()),
+        "answers": tops,
+        "clicks_upload_to_finding": clicks,
+        f"seconds_usable_{MANY_RUNS}_runs": max(seconds.values()),
+        "seconds": seconds,
+        "axe_violations": len(found.violations),
+        "violations": sorted(set(found.violations)),
+        "console_errors": len(found.errors),
+        "errors": found.errors[:5],
+        "largest_page_kb": round(found.bytes_of[largest] / 1e3),
+        "largest_page": largest,
+    }
+
+
+def _worked(browser: Browser, server: Server, archive: Path) -> tuple[int, dict[str, str]]:
+    """Go from the upload to a finding with clicks; return their number, and the addresses of the pages seen."""
+    page = browser.new_context(viewport=DESKTOP).new_page()  # type: ignore[arg-type]
+    clicks = Clicks(page)
+    page.goto(_address(server, ""))
+    with page.expect_file_chooser() as chooser:
+        clicks.on("#pick-file")
+    chooser.value.set_files(archive)
+    page.wait_for_selector("#submit-dialog[open]", timeout=1e3 * LONGEST_S)
+    clicks.on("#submit-form [type=submit]")
+    page.wait_for_selector("#run-fit:not([hidden])", timeout=1e3 * LONGEST_S)
+    run = page.evaluate("location.hash").removeprefix("#")
+    clicks.on("#diagnose-run")
+    clicks.on("#diagnose-form [type=submit]")
+    page.wait_for_selector("#report >> h1", timeout=1e3 * LONGEST_S)
+    diagnosis = page.evaluate("location.hash").removeprefix("#")
+    page.goto(_address(server, "datasets"))
+    link = page.wait_for_selector("#listing-table tbody a[href^='#dataset=']")
+    dataset = (link.get_attribute("href") or "").removeprefix("#") if link else ""
+    page.context.close()
+    lists = {name: name for name in ("runs", "diagnoses", "datasets", "effects", "import", "films")}
+    return clicks.count, {"home": "", "run": run, "diagnosis": diagnosis, "dataset": dataset, **lists}
+
+
+def _address(server: Server, hash_: str) -> str:
+    return f"http://127.0.0.1:{server.port}/" + (f"#{hash_}" if hash_ else "")
+
+
+def _top(browser: Browser, server: Server, address: str, selectors: tuple[str, ...]) -> int:
+    """Return how far from the top of the page the last of the elements ``selectors`` begins, in pixels."""
+    page = browser.new_context(viewport=DESKTOP).new_page()  # type: ignore[arg-type]
+    page.goto(_address(server, address))
+    tops = []
+    for selector in selectors:
+        page.wait_for_selector(selector, timeout=1e3 * LONGEST_S)
+        page.wait_for_timeout(1500)  # until what is above it has its height
+        box = page.locator(selector).first.bounding_box()
+        tops.append(box["y"] if box else float("inf"))
+    page.context.close()
+    return round(max(tops))
+
+
+def _looked_at(
+    browser: Browser, server: Server, pages: dict[str, str], scheme: str, size: dict[str, int], found: Found
+) -> None:
+    """Open each page with ``scheme`` and ``size``, and add what axe, console and network say to ``found``."""
+    from axe_playwright_python.sync_playwright import Axe  # needed here alone
+
+    for name, address in pages.items():
+        context = browser.new_context(viewport=size, color_scheme=scheme)  # type: ignore[arg-type]
+        page, where = context.new_page(), f"{name}, {scheme}, {size['width']} px"
+        moved = [0]
+        page.on(
+            "console", lambda one, at=where: found.errors.append(f"{at}: {one.text}") if one.type == "error" else None
+        )
+        page.on("pageerror", lambda one, at=where: found.errors.append(f"{at}: {one}"))
+        page.on("requestfinished", lambda one, sum_=moved: _add(sum_, one.sizes()["responseBodySize"]))
+        page.goto(_address(server, address))
+        page.wait_for_timeout(4000)
+        violations = Axe().run(page).response["violations"]
+        found.violations += [f"{where}: {one['id']}" for one in violations]
+        found.bytes_of[name] = max(found.bytes_of.get(name, 0), moved[0])
+        context.close()
+
+
+def _add(total: list[int], more: int) -> None:
+    total[0] += more
+
+
+def _multiplied(data: Path, count: int) -> None:
+    """Copy the run in the database of ``data`` until there are ``count``, with names and misfits of their own."""
+    with closing(sqlite3.connect(data / "wingfit.sqlite3")) as connection:
+        columns = [row[1] for row in connection.execute("pragma table_info(run)")]
+        (row,) = connection.execute(f"select {', '.join(columns)} from run limit 1").fetchall()  # noqa: S608  # our own
+        kept = dict(zip(columns, row, strict=True))
+        kept.pop("number")
+        places = ", ".join("?" for _ in kept)
+        insert = f"insert into run ({', '.join(kept)}) values ({places})"  # noqa: S608  # the names of our own columns
+        for k in range(count - 1):
+            own = {"id": f"run_{k:016x}", "name": f"copy {k}", "residual_over_noise": 1.0 + k / 1000}
+            connection.execute(insert, list((kept | own).values()))
+        connection.commit()
+
+
+def _seconds(browser: Browser, server: Server, address: str) -> float:
+    """Return the seconds from opening ``address`` until its rows can be clicked, the least of TRIES."""
+    ready = "#newest-runs .card" if address == "" else "#listing-table tbody tr a"
+    page = browser.new_context(viewport=DESKTOP).new_page()  # type: ignore[arg-type]
+    taken = []
+    for _ in range(TRIES):
+        page.goto("about:blank")
+        began = time.monotonic()
+        page.goto(_address(server, address))
+        page.wait_for_selector(ready)
+        taken.append(time.monotonic() - began)
+    page.context.close()
+    return round(min(taken), 2)
+
+
+if __name__ == "__main__":
+    main()
