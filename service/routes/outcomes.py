@@ -24,7 +24,7 @@ from wingfit.service.http import responses as http
 from wingfit.service.http.problems import conflict, error_item, invalid
 from wingfit.service.outcomes import force_views, load_views
 from wingfit.service.outcomes.requests import LoadsIn, OutputName, SimulationIn, WingIn
-from wingfit.service.routes.shared.jobs import load
+from wingfit.service.routes.jobs import load
 from wingfit.service.runs import best_genome, spec_views, views
 from wingfit.service.runs.request_checks import gene_names
 from wingfit.service.runs.simulation_hints import with_remedy

@@ -23,7 +23,7 @@ from wingfit.service.http import csv_text
 from wingfit.service.http import list_query as q
 from wingfit.service.http import responses as http
 from wingfit.service.http.problems import ProblemError, conflict, error_item, invalid
-from wingfit.service.routes.shared.jobs import Actions, add_job_routes, load, submit_job
+from wingfit.service.routes.jobs import Actions, add_job_routes, load, submit_job
 from wingfit.service.storage import listing, store
 from wingfit.service.storage.listing import Wanted
 from wingfit.service.storage.tables import FilmRow, TrackedRow, TrackingRow

@@ -395,8 +395,10 @@ def test_nothing_stands_in_anyones_way(browser: Browser, api: Api, decay: str, r
             found = axe.Axe().run(seen.page).response["violations"]
             wide = seen.page.evaluate("document.documentElement.scrollWidth") - width
             if found or wide > 0:
-                nodes = [(one["id"], one["nodes"][0]["target"]) for one in found]
-                wrong[f"{address.split('=')[0]} {width}"] = [wide, *nodes]
+                wrong[f"{address.split('=')[0]} {width}"] = [
+                    wide,
+                    *((one["id"], one["nodes"][0]["target"]) for one in found),
+                ]
         seen.page.context.close()
     api.client.post(f"/v1/diagnoses/{waiting}/cancel")
     assert wrong == {}, json.dumps(wrong, indent=1)

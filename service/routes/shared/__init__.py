@@ -1,1 +1,0 @@
-"""Routes that several kinds of resource share."""
