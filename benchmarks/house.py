@@ -30,6 +30,8 @@ PRODUCT = (*PARTS, "wingfit")
 CODE = (*PRODUCT, "benchmarks", "docs", "examples", "tests")
 SOURCES = (".py", ".js", ".css", ".html")
 PROSE = (*SOURCES, ".md", ".yml", ".yaml", ".toml", ".sh", "")
+# Reports that docs.generate.gallery writes: nobody reads or edits them as source.
+WRITTEN = ROOT / "docs" / "gallery"
 # Lines of the product at commit fa75500, before the move, counted as here.
 BEFORE = 36_543
 DOCSTRINGS_BEFORE = 4_983
@@ -153,8 +155,8 @@ def cycles(graph: dict[str, set[str]]) -> list[list[str]]:
 
 
 def large_files() -> list[str]:
-    """Source files of more than MOST_LINES lines."""
-    every = files(*CODE, suffixes=SOURCES)
+    """Source files of more than MOST_LINES lines, without those that a program writes."""
+    every = (path for path in files(*CODE, suffixes=SOURCES) if path.parent != WRITTEN)
     return [
         path.relative_to(ROOT).as_posix() for path in every if len(path.read_text("utf-8").splitlines()) > MOST_LINES
     ]
