@@ -23,9 +23,9 @@ from wingfit.service.container import DOWNLOAD_SLOT, UPLOAD_SLOT, Service, Servi
 from wingfit.service.datasets.parsed_datasets import Opened
 from wingfit.service.http import list_query as q
 from wingfit.service.http import responses as http
+from wingfit.service.http.list_routes import add_edit_route
 from wingfit.service.http.problems import ProblemError, conflict, error_item, invalid
 from wingfit.service.http.request_limits import UPLOAD_LIMIT
-from wingfit.service.routes.lists import add_edit_route
 from wingfit.service.runs import views
 from wingfit.service.storage import listing, store
 from wingfit.service.storage.database import Database

@@ -17,10 +17,10 @@ from wingfit.service.diagnoses import checks, views
 from wingfit.service.diagnoses.requests import DiagnosisIn
 from wingfit.service.http import list_query as q
 from wingfit.service.http import responses as http
+from wingfit.service.http.list_routes import add_edit_route, add_groups_route
 from wingfit.service.http.problems import ProblemError, conflict, error_item, invalid
 from wingfit.service.rigs.stored_rig import given_rig, requested_rig, stored_rig
 from wingfit.service.routes.jobs import Actions, add_job_routes, load_any, submit_job
-from wingfit.service.routes.lists import add_edit_route, add_groups_route
 from wingfit.service.runs import spec_views
 from wingfit.service.storage import listing, store
 from wingfit.service.storage.listing import Wanted

@@ -17,10 +17,10 @@ from wingfit.service.container import Service, ServiceDep
 from wingfit.service.http import json_reads
 from wingfit.service.http import list_query as q
 from wingfit.service.http import responses as http
+from wingfit.service.http.list_routes import add_edit_route, add_groups_route
 from wingfit.service.http.problems import error_item, invalid
 from wingfit.service.rigs.stored_rig import requested_rig, stored_rig
 from wingfit.service.routes.jobs import Actions, add_job_routes, load_any, submit_job
-from wingfit.service.routes.lists import add_edit_route, add_groups_route
 from wingfit.service.runs import spec_views, views
 from wingfit.service.runs.request_checks import gene_names, refuse_unknown
 from wingfit.service.runs.requests import RunIn
