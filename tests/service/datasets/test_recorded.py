@@ -31,7 +31,7 @@ def table(example: str, recording: str) -> dict[str, Any]:
     """The columns of the CSV of a recording, by name."""
     path = EXAMPLES / example / "recordings" / f"{recording}.csv"
     found = np.genfromtxt(path, delimiter=",", names=True)
-    return {name: found[name] for name in found.dtype.names}
+    return {name: found[name] for name in found.dtype.names or ()}
 
 
 @pytest.fixture(scope="module")
