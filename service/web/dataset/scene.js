@@ -67,7 +67,8 @@ function scene(look, node, { wing, tracks, parts, frame, turned, names, view }) 
   const recorded = tracks.positions_mm[frame];
   const rest = new Map(wing.markers.map((one) => [one.name, turn(one.position_mm)]));
   const pairs = tracks.markers.map((name, m) => [recorded[m], rest.get(name)]).filter((pair) => pair.every(isSeen));
-  const far = (pair) => Math.hypot(...pair[0].map((value, k) => value - pair[1][k])) > FAR * wing.span_mm;
+  // At rest, the stroke itself makes the distances long.
+  const far = (pair) => turned && Math.hypot(...pair[0].map((value, k) => value - pair[1][k])) > FAR * wing.span_mm;
   const points = (name, labels, list, marker, extra = {}) => ({
     type: "scatter3d", mode: names ? "markers+text" : "markers", name, ...coordinates(list), marker, text: labels.map(plain), textposition: "top center",
     textfont: { size: 10, color: marker.color }, hovertemplate: `%{text}<br>x %{x:.1f}, y %{y:.1f}, z %{z:.1f} mm<extra>${name}</extra>`, ...extra,

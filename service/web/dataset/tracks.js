@@ -94,7 +94,7 @@ function sayDistance() {
     misfit === null ? "No frame shows a marker."
       : el("span", { className: far ? "bad-word" : "good-word" }, `${rounded(misfit)} mm, ${rounded(percent, 2)} % of the span`),
     misfit === null ? "" : `: root mean square distance from the described positions, turned about the hinge. `,
-    far ? "That is far: compare axes, signs, unit and names." : "An elastic wing leaves 0.3 to 6 %.",
+    far ? "That is far: compare axes, signs, unit and names, unless the wing folds." : "An elastic wing leaves 0.3 to 6 %.",
     ` ${frames.toLocaleString("en")} frames of ${plural(beats, "beat")}; phase 0: ${start === "time 0" ? "time 0" : "the reference markers pass the hinge upwards"}.`,
   ];
   $("picture-note").replaceChildren(...parted);

@@ -99,7 +99,7 @@ function note() {
   const some = values.stride > 1 ? `One in ${values.stride} of the ${frames.toLocaleString("en")} samples is shown.` : "";
   const counts = Object.entries(values.missing).filter(([, gaps]) => gaps.samples);
   const lost = counts.map(([name, gaps]) => `${gaps.samples.toLocaleString("en")} of ${name}`);
-  return [lost.length ? `Missing samples: ${lost.slice(0, PANELS).join(", ")}${lost.length > PANELS ? ", …" : ""}; gaps are shaded.` : "No sample is missing.", some].join(" ");
+  return [lost.length ? `Missing samples: ${lost.slice(0, PANELS).join(", ")}${lost.length > PANELS ? ", …" : ""}; gaps are shaded over time.` : "No sample is missing.", some].join(" ");
 }
 
 async function drawPanels() {
@@ -135,7 +135,7 @@ function chart(look, { name, y, unit }, time) {
       ...(alone.some((value) => value !== null) ? [{ ...trace, ...drawn(alone), mode: "markers" }] : [])],
     shapes: beat ? [] : shades(look, values.missing[name]?.gaps ?? [], half, "y domain"),
     margin: { l: 10, r: 8, t: 8, b: 10 },
-    xaxis: beat ? axis(look, "phase of the beat, from the first sample", { showgrid: false, ...PHASE }) : axis(look, "time, s", { showgrid: false, range: [time[0], time.at(-1)] }),
+    xaxis: beat ? axis(look, "phase of the period", { showgrid: false, ...PHASE }) : axis(look, "time, s", { showgrid: false, range: [time[0], time.at(-1)] }),
     yaxis: zeroAxis(look, unit === "1" ? "" : plain(unit)),
   };
 }

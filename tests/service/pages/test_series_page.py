@@ -6,7 +6,6 @@ import json
 import shlex
 import subprocess
 import sys
-import threading
 from collections.abc import Iterator
 from importlib.metadata import EntryPoint
 from pathlib import Path
@@ -19,8 +18,9 @@ import wingfit
 from tests.records.series_samples import arm_dataset
 from tests.service.conftest import Api
 from tests.service.pages.browsing import DRAWN, Seen
+from tests.service.pages.browsing import opened as watched
 from tests.service.rigs import decay_rig
-from tests.service.rigs.test_drive import DECLARED, client_of, service, upload
+from tests.service.rigs.test_drive import DECLARED, client_of, driver, service, upload
 from wingfit.client.transport import zip_folder
 from wingfit.records import Channel, Quantity, Series, SeriesDataset
 from wingfit.records.files.netcdf import write_netcdf
@@ -69,10 +69,9 @@ def run(api: Api, decay: str) -> str:
 
 
 def opened(browser: Browser, api: Api, **options: Any) -> Seen:
-    base = str(api.client.base_url).rstrip("/")
-    context = browser.new_context(**({"viewport": {"width": 1280, "height": 900}} | options))
-    context.grant_permissions(["clipboard-read", "clipboard-write"], origin=base)
-    return Seen.watched(context.new_page(), base)
+    seen = watched(browser, api, **options)
+    seen.page.context.grant_permissions(["clipboard-read", "clipboard-write"], origin=seen.base)
+    return seen
 
 
 @pytest.fixture
@@ -136,7 +135,7 @@ def test_many_channels_and_samples_are_drawn_a_few_at_a_time(seen: Seen, api: Ap
     values = np.stack([np.sin(times * (k + 1)) for k in range(count)], axis=1)
     values[:, 0] = np.nan
     values[[0, 60, 120], 0] = [1.0, 2.0, 3.0]
-    recording = Series("long", times, channels, values)
+    recording = Series("long", times, channels, values, period=0.5)
     wide = upload(api, SeriesDataset("wide", "board", (recording,), channels), write_netcdf)
     seen.show(f"dataset={wide}")
     all_drawn(seen, 6)
@@ -145,6 +144,11 @@ def test_many_channels_and_samples_are_drawn_a_few_at_a_time(seen: Seen, api: Ap
     assert [value for value in drawn(seen, 0, "y", 1) if value is not None] == [1.0, 2.0, 3.0], "alone"
     seen.page.select_option("#series-shown", label="c12 to c13")
     all_drawn(seen, 2)
+    seen.page.click("#series-over >> text=Over the beat")
+    seen.wait("document.querySelector('#panels .plot')?.data?.[0].x.includes(null)")
+    phases = drawn(seen, 0, "x")
+    assert phases.count(None) == 3, "four periods of half a second, one over the other"
+    assert [value for value in phases if value is not None] == pytest.approx(times[::6] % 0.5 / 0.5, abs=1e-9)
     assert panels(seen) == ["c12, V", "c13, V"]
 
 
@@ -282,25 +286,6 @@ def test_a_driven_diagnosis_waits_then_shows_its_report(seen: Seen, api: Api, ru
     report = str(seen.page.evaluate(REPORT))
     assert "time" in report
     assert "phase of the beat" not in report
-
-
-class driver:  # noqa: N801
-    """A driver in a thread, which has ended when the block is left."""
-
-    def __init__(self, api: Api, job: str) -> None:
-        self._thread = threading.Thread(target=self._drive, args=(api, job), daemon=True)
-
-    @staticmethod
-    def _drive(api: Api, job: str) -> None:
-        with client_of(api) as client:
-            wingfit.drive(client, job, decay_rig.rig)
-
-    def __enter__(self) -> None:
-        self._thread.start()
-
-    def __exit__(self, *_: object) -> None:
-        self._thread.join(60.0)
-        assert not self._thread.is_alive()
 
 
 def test_lists_and_comparisons_have_the_units_of_series(

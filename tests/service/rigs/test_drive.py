@@ -60,6 +60,23 @@ def client_of(api: Api) -> Client:
     return Client(str(api.client.base_url))
 
 
+@contextmanager
+def driver(api: Api, job: str) -> Iterator[None]:
+    """A driver in a thread, which has ended when the block is left."""
+
+    def drive() -> None:
+        with client_of(api) as client:
+            wingfit.drive(client, job, decay_rig.rig)
+
+    thread = threading.Thread(target=drive, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        thread.join(60.0)
+    assert not thread.is_alive()
+
+
 def without_time(finding: Json) -> Json:
     return {name: value for name, value in finding.items() if name != "seconds"}
 
