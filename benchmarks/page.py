@@ -9,26 +9,25 @@ from __future__ import annotations
 
 import argparse
 import json
-import sqlite3
 import sys
 import tempfile
 import time
-from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
 from shutil import which
 from typing import TYPE_CHECKING, Any
 
 from benchmarks.common import machine
-from benchmarks.common.files import REPOSITORY, zipped
+from benchmarks.common.files import archive
 from benchmarks.common.server_process import Server
+from benchmarks.load.filling import fill
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 DATASET = "delfly"
-MANY_RUNS = 10_000
+MANY_RUNS, EACH = 10_000, 2  # runs, and generations of each
 LONGEST_S = 600.0
 TRIES = 3
 DESKTOP, PHONE = {"width": 1280, "height": 900}, {"width": 390, "height": 780}
@@ -80,21 +79,21 @@ def measured(folder: Path) -> dict[str, Any]:
     path = next((found for name in BROWSERS if (found := which(name))), None)
     if path is None:
         sys.exit("chromium is not installed; install it, e.g. apt-get install chromium")
-    archive = folder / f"{DATASET}.zip"
-    archive.write_bytes(zipped(REPOSITORY / "examples" / DATASET))
+    packed = folder / f"{DATASET}.zip"
+    packed.write_bytes(archive(DATASET))
     server, found = Server(folder, "processes"), Found()
     with sync_playwright() as started:
         browser = started.chromium.launch(executable_path=path, args=["--no-sandbox", "--disable-gpu"])
         server.start()
         try:
-            clicks, pages = _worked(browser, server, archive)
+            clicks, pages = _worked(browser, server, packed)
             tops = {name: _top(browser, server, pages[name], selectors) for name, selectors in ANSWERS.items()}
             for scheme in ("light", "dark"):
                 for size in (DESKTOP, PHONE):
                     _looked_at(browser, server, pages, scheme, size, found)
         finally:
             server.stop()
-        _multiplied(folder / "data", MANY_RUNS)
+        fill(folder / "data", MANY_RUNS, EACH, EACH)
         server.start()
         try:
             seconds = {one: _seconds(browser, server, one) for one in ("", "runs", "runs&sort=fit&order=desc")}
@@ -117,14 +116,14 @@ def measured(folder: Path) -> dict[str, Any]:
     }
 
 
-def _worked(browser: Browser, server: Server, archive: Path) -> tuple[int, dict[str, str]]:
+def _worked(browser: Browser, server: Server, packed: Path) -> tuple[int, dict[str, str]]:
     """Go from the upload to a finding with clicks; return their number, and the addresses of the pages seen."""
     page = browser.new_context(viewport=DESKTOP).new_page()  # type: ignore[arg-type]
     clicks = Clicks(page)
     page.goto(_address(server, ""))
     with page.expect_file_chooser() as chooser:
         clicks.on("#pick-file")
-    chooser.value.set_files(archive)
+    chooser.value.set_files(packed)
     page.wait_for_selector("#submit-dialog[open]", timeout=1e3 * LONGEST_S)
     clicks.on("#submit-form [type=submit]")
     page.wait_for_selector("#run-fit:not([hidden])", timeout=1e3 * LONGEST_S)
@@ -184,21 +183,6 @@ def _looked_at(
 
 def _add(total: list[int], more: int) -> None:
     total[0] += more
-
-
-def _multiplied(data: Path, count: int) -> None:
-    """Copy the run in the database of ``data`` until there are ``count``, with names and misfits of their own."""
-    with closing(sqlite3.connect(data / "wingfit.sqlite3")) as connection:
-        columns = [row[1] for row in connection.execute("pragma table_info(run)")]
-        (row,) = connection.execute(f"select {', '.join(columns)} from run limit 1").fetchall()  # noqa: S608  # our own
-        kept = dict(zip(columns, row, strict=True))
-        kept.pop("number")
-        places = ", ".join("?" for _ in kept)
-        insert = f"insert into run ({', '.join(kept)}) values ({places})"  # noqa: S608  # the names of our own columns
-        for k in range(count - 1):
-            own = {"id": f"run_{k:016x}", "name": f"copy {k}", "residual_over_noise": 1.0 + k / 1000}
-            connection.execute(insert, list((kept | own).values()))
-        connection.commit()
 
 
 def _seconds(browser: Browser, server: Server, address: str) -> float:

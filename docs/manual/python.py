@@ -38,6 +38,11 @@ PAGES: dict[str, tuple[str, str, tuple[str, ...]]] = {
         "A simulation of your own, of any rig; :doc:`/docs/rigs` explains the contract.",
         ("Rig", "Run", "Port", "Suspect", "SimulationError", "declaration", "drive"),
     ),
+    "plots": (
+        "Plots",
+        "Figures of runs, findings and datasets; :doc:`/docs/plots` shows them.",
+        ("plot",),
+    ),
     "client": (
         "The client of a server",
         "Sends requests to ``wingfit serve``; :doc:`/docs/api` explains the calls.",
@@ -68,10 +73,18 @@ def pages() -> dict[str, str]:
     return {"python/index.rst": index} | {f"python/{name}.rst": _page(*one) for name, one in PAGES.items()}
 
 
+def _function(name: str) -> str:
+    """Return the section on a function of a module of the package, such as plot.history."""
+    return f"{name}\n{'-' * len(name)}\n\n.. autofunction:: wingfit.{name}"
+
+
 def _page(title: str, words: str, names: tuple[str, ...]) -> str:
     parts = [f"{title}\n{'=' * len(title)}", words]
     for name in names:
         found = getattr(wingfit, name)
+        if inspect.ismodule(found):
+            parts += [_function(f"{name}.{one}") for one in found.__all__]
+            continue
         kind = "autofunction" if inspect.isfunction(found) else "autoclass"
         if isinstance(found, type) and issubclass(found, Exception):
             kind = "autoexception"

@@ -1,16 +1,19 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from wingfit.calibration.forces.disagreement import disagreement_remarks, disagreements
 from wingfit.calibration.forces.global_model import at, average, fit_global
 from wingfit.calibration.forces.result import LocalEstimate
 from wingfit.records import Condition
 from wingfit.sim.virtual_rigs.balance import TRIALS
 
+ERROR = 0.02
 CONDITIONS = [trial.condition for trial in TRIALS]
 
 
@@ -172,3 +175,26 @@ def test_a_coefficient_that_nothing_tells_is_said() -> None:
     assert fit_global(unsure, CONDITIONS).remarks == (
         "C_r could not be identified in any condition; its dependence on frequency and pitch is not meaningful",
     )
+
+
+def local(values: Sequence[float] | np.ndarray, error: float = ERROR) -> list[LocalEstimate]:
+    return [estimate(f"run {k}", {"C_l": float(value)}, error) for k, value in enumerate(values)]
+
+
+def test_estimates_that_span_a_factor_of_two_disagree() -> None:
+    values = [0.8, 1.0, 1.1, 1.25, 1.4, 1.6]
+    found = disagreements(local(values))
+    assert found == {"C_l": pytest.approx(np.std(values, ddof=1))}
+    (remark,) = disagreement_remarks(local(values))
+    assert "the 6 local estimates of C_l disagree: 0.8 to 1.6" in remark
+
+
+def test_equal_coefficients_disagree_as_rarely_as_stated() -> None:
+    random = np.random.default_rng(7)
+    found = [disagreements(local(1.0 + ERROR * random.standard_normal(6))) for _ in range(2000)]
+    assert 0.004 < np.mean([bool(one) for one in found]) < 0.018  # 0.01, and 3.6 standard errors of it
+
+
+def test_estimates_without_errors_are_not_compared() -> None:
+    assert disagreements(local([1.0, 2.0], np.inf)) == {}
+    assert disagreements(local([1.0])) == {}
