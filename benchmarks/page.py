@@ -1,8 +1,8 @@
 """``python -m benchmarks.page``: measures the web page in Chromium, on a real server.
 
 A dataset of forces is uploaded, calibrated and diagnosed with clicks alone. Then each page is opened in light and dark,
-on a desktop and on a phone: its answer must be near the top, axe must find nothing, and the console must be silent. Last,
-the page is opened over many runs. Takes a few minutes.
+on a desktop and on a phone: its answer must be near the top, axe must find nothing, and the console must be silent. At
+last the page is opened over many runs. Takes a few minutes.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import time
 from dataclasses import dataclass, field
 from pathlib import Path
 from shutil import which
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from benchmarks.common import machine
 from benchmarks.common.files import archive
@@ -23,14 +23,18 @@ from benchmarks.common.server_process import Server
 from benchmarks.load.filling import fill
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser, Page
+    from playwright.sync_api import Browser, ConsoleMessage, Page, Request, ViewportSize
 
+Scheme = Literal["light", "dark"]
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 DATASET = "delfly"
 MANY_RUNS, EACH = 10_000, 2  # runs, and generations of each
 LONGEST_S = 600.0
 TRIES = 3
-DESKTOP, PHONE = {"width": 1280, "height": 900}, {"width": 390, "height": 780}
+DESKTOP: ViewportSize = {"width": 1280, "height": 900}
+PHONE: ViewportSize = {"width": 390, "height": 780}
+SCHEMES: tuple[Scheme, ...] = ("light", "dark")
+SETTLED_MS = 4000.0  # until the figures are drawn
 # What answers the question of a page: a badge or sentence, and the first picture.
 ANSWERS = {
     "run": ("#run-fit", "#beats"),
@@ -47,6 +51,28 @@ class Found:
     violations: list[str] = field(default_factory=list)
     errors: list[str] = field(default_factory=list)
     bytes_of: dict[str, int] = field(default_factory=dict)
+
+
+@dataclass
+class Watch:
+    """Notes errors of a page, ``where``, in ``found``, and counts the bytes that it moves."""
+
+    where: str
+    found: Found
+    moved: int = 0
+
+    def message(self, message: ConsoleMessage) -> None:
+        """Note an error on the console."""
+        if message.type == "error":
+            self.found.errors.append(f"{self.where}: {message.text}")
+
+    def failure(self, error: object) -> None:
+        """Note an error that no script caught."""
+        self.found.errors.append(f"{self.where}: {error}")
+
+    def request(self, request: Request) -> None:
+        """Count what a request has moved."""
+        self.moved += request.sizes()["responseBodySize"]
 
 
 class Clicks:
@@ -76,7 +102,7 @@ def measured(folder: Path) -> dict[str, Any]:
     """Return the figures; ``folder`` holds the server's data."""
     from playwright.sync_api import sync_playwright  # needed here alone
 
-    path = next((found for name in BROWSERS if (found := which(name))), None)
+    path = next((there for name in BROWSERS if (there := which(name))), None)
     if path is None:
         sys.exit("chromium is not installed; install it, e.g. apt-get install chromium")
     packed = folder / f"{DATASET}.zip"
@@ -88,7 +114,7 @@ def measured(folder: Path) -> dict[str, Any]:
         try:
             clicks, pages = _worked(browser, server, packed)
             tops = {name: _top(browser, server, pages[name], selectors) for name, selectors in ANSWERS.items()}
-            for scheme in ("light", "dark"):
+            for scheme in SCHEMES:
                 for size in (DESKTOP, PHONE):
                     _looked_at(browser, server, pages, scheme, size, found)
         finally:
@@ -118,7 +144,7 @@ def measured(folder: Path) -> dict[str, Any]:
 
 def _worked(browser: Browser, server: Server, packed: Path) -> tuple[int, dict[str, str]]:
     """Go from the upload to a finding with clicks; return their number, and the addresses of the pages seen."""
-    page = browser.new_context(viewport=DESKTOP).new_page()  # type: ignore[arg-type]
+    page = browser.new_context(viewport=DESKTOP).new_page()
     clicks = Clicks(page)
     page.goto(_address(server, ""))
     with page.expect_file_chooser() as chooser:
@@ -146,7 +172,7 @@ def _address(server: Server, hash_: str) -> str:
 
 def _top(browser: Browser, server: Server, address: str, selectors: tuple[str, ...]) -> int:
     """Return how far from the top of the page the last of the elements ``selectors`` begins, in pixels."""
-    page = browser.new_context(viewport=DESKTOP).new_page()  # type: ignore[arg-type]
+    page = browser.new_context(viewport=DESKTOP).new_page()
     page.goto(_address(server, address))
     tops = []
     for selector in selectors:
@@ -159,36 +185,29 @@ def _top(browser: Browser, server: Server, address: str, selectors: tuple[str, .
 
 
 def _looked_at(
-    browser: Browser, server: Server, pages: dict[str, str], scheme: str, size: dict[str, int], found: Found
+    browser: Browser, server: Server, pages: dict[str, str], scheme: Scheme, size: ViewportSize, found: Found
 ) -> None:
     """Open each page with ``scheme`` and ``size``, and add what axe, console and network say to ``found``."""
     from axe_playwright_python.sync_playwright import Axe  # needed here alone
 
     for name, address in pages.items():
-        context = browser.new_context(viewport=size, color_scheme=scheme)  # type: ignore[arg-type]
-        page, where = context.new_page(), f"{name}, {scheme}, {size['width']} px"
-        moved = [0]
-        page.on(
-            "console", lambda one, at=where: found.errors.append(f"{at}: {one.text}") if one.type == "error" else None
-        )
-        page.on("pageerror", lambda one, at=where: found.errors.append(f"{at}: {one}"))
-        page.on("requestfinished", lambda one, sum_=moved: _add(sum_, one.sizes()["responseBodySize"]))
+        context = browser.new_context(viewport=size, color_scheme=scheme)
+        page = context.new_page()
+        watch = Watch(f"{name}, {scheme}, {size['width']} px", found)
+        page.on("console", watch.message)
+        page.on("pageerror", watch.failure)
+        page.on("requestfinished", watch.request)
         page.goto(_address(server, address))
-        page.wait_for_timeout(4000)
-        violations = Axe().run(page).response["violations"]
-        found.violations += [f"{where}: {one['id']}" for one in violations]
-        found.bytes_of[name] = max(found.bytes_of.get(name, 0), moved[0])
+        page.wait_for_timeout(SETTLED_MS)
+        found.violations += [f"{watch.where}: {one['id']}" for one in Axe().run(page).response["violations"]]
+        found.bytes_of[name] = max(found.bytes_of.get(name, 0), watch.moved)
         context.close()
-
-
-def _add(total: list[int], more: int) -> None:
-    total[0] += more
 
 
 def _seconds(browser: Browser, server: Server, address: str) -> float:
     """Return the seconds from opening ``address`` until its rows can be clicked, the least of TRIES."""
     ready = "#newest-runs .card" if address == "" else "#listing-table tbody tr a"
-    page = browser.new_context(viewport=DESKTOP).new_page()  # type: ignore[arg-type]
+    page = browser.new_context(viewport=DESKTOP).new_page()
     taken = []
     for _ in range(TRIES):
         page.goto("about:blank")

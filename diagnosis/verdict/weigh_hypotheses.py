@@ -19,7 +19,7 @@ any smooth omission is imitated in part by some effect.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -85,10 +85,8 @@ def weigh(
     imitates = _imitation(data, hypotheses, floor, error)
     weight = np.where(possible, evidence - imitates, -np.inf)
     if data.kind != "series":
-        with_unknown = _evidence(
-            data, tau + policy.unknown_residual**2 * excess, genes + policy.unknown_genes, effects, suspects
-        )
-        weight = _with_unknown_rest(hypotheses, weight, with_unknown - imitates)
+        rest = _UnknownRest(data, hypotheses, excess, floor, error, suspects, imitates)
+        weight = _with_unknown_rest(hypotheses, weight, rest.log_odds)
         unknown = max(unknown, weight[effects >= MANY].max(initial=-np.inf))
     top = max(weight.max(), unknown)
     weight, other = np.exp(weight - top), np.exp(unknown - top)
@@ -100,20 +98,52 @@ def weigh(
     return HypothesisWeights(hypotheses, evidence - evidence[0], probabilities, unknown, excess, data.policy)
 
 
-def _with_unknown_rest(hypotheses: Sequence[Refit], weight: Array, with_unknown: Array) -> Array:
+@dataclass(frozen=True)
+class _UnknownRest:
+    """Compares hypotheses that add effects to others with a law outside the library in place of these effects.
+
+    ``excess`` [H]: as in :class:`HypothesisWeights`; ``floor`` (m or N): discretisation error; ``error``: standard
+    error of the noise (:func:`noise_error`); ``imitates`` [H]: as of :func:`_imitation`.
+    """
+
+    data: WhitenedData
+    hypotheses: Sequence[Refit]
+    excess: Float[Array, " H"]
+    floor: float
+    error: float
+    suspects: int
+    imitates: Float[Array, " H"]
+
+    def log_odds(self, k: int, j: int) -> float:
+        """Return the log odds of hypothesis ``j`` beside an unknown law, to ``k``, which has the effects of ``j``.
+
+        The further effects of ``k`` explain what ``j`` leaves; so what they may leave in another form is relative to
+        that, as what a first effect may leave is relative to the misfit of the nominal model.
+        """
+        data, policy, hypotheses, excess = self.data, self.data.policy, self.hypotheses, self.excess
+        tau = tolerated_excess(data, hypotheses[j].excess, self.floor, self.error) / data.noise**2
+        left = np.array([excess[k], policy.unknown_residual**2 * excess[j]])
+        genes = np.array([hypotheses[k].freedom, hypotheses[j].freedom + policy.unknown_genes], float)
+        effects = np.array([len(hypotheses[k].trials), len(hypotheses[j].trials)], float)
+        known, unknown = _evidence(data, tau + left, genes, effects, self.suspects) - self.imitates[[k, j]]
+        return float(unknown - known)
+
+
+def _with_unknown_rest(hypotheses: Sequence[Refit], weight: Array, log_odds: Callable[[int, int], float]) -> Array:
     """Return the log weights [H], a part of which goes to effects that a law outside the library accompanies.
 
     Further effects may only imitate such a law. So a hypothesis shares its weight with the best of those whose effects
-    it contains, if ``with_unknown`` [H], their log weight together with such a law, is comparable.
+    it contains, by their ``log_odds`` (:meth:`_UnknownRest.log_odds`).
     """
     found, names = weight.copy(), [set(one.names) for one in hypotheses]
     for k in sorted(np.flatnonzero(np.isfinite(weight)), key=lambda k: -len(names[k])):
         contained = [j for j, other in enumerate(names) if other and other < names[k]]
         if contained:
-            best = max(contained, key=lambda j: with_unknown[j])
-            whole, both = found[k], np.logaddexp(weight[k], with_unknown[best])
-            found[k] = whole + weight[k] - both
-            found[best] = np.logaddexp(found[best], whole + with_unknown[best] - both)
+            odds = {j: log_odds(int(k), j) for j in contained}
+            best = max(contained, key=lambda j: odds[j])
+            whole, both = found[k], np.logaddexp(0.0, odds[best])
+            found[k] = whole - both
+            found[best] = np.logaddexp(found[best], whole + odds[best] - both)
     return found
 
 

@@ -18,9 +18,14 @@ export function showErrors(form, box, error) {
   box.replaceChildren(el("p", {}, error.message), ...(items.length ? [el("ul", {}, ...items)] : []));
 }
 
+const SHOWN = 3; // remarks; the others unfold
+
 // A remark that begins with one of ``names``, those of genes, keeps its first letter.
 export function showRemarks(list, remarks, names = []) {
   list.hidden = !remarks.length;
   const first = (remark) => (names.includes(remark.match(/^[^ ,:]*/)[0]) ? remark[0] : remark[0].toUpperCase());
-  list.replaceChildren(...remarks.map((remark) => el("li", {}, `${first(remark)}${remark.slice(1)}.`)));
+  const items = remarks.map((remark) => el("li", {}, `${first(remark)}${remark.slice(1)}.`));
+  const rest = items.splice(SHOWN);
+  if (rest.length) items.push(el("li", {}, el("details", {}, el("summary", {}, `${rest.length} more`), el("ul", {}, ...rest))));
+  list.replaceChildren(...items);
 }

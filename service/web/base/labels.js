@@ -109,7 +109,7 @@ export function forceSetup(spec) {
   const cut = spec.low_pass_hz;
   return [
     spec.without.length ? `without ${spec.without.map(spoken).join(", ")}` : null,
-    `fitted to ${spec.axes.join(" and ")}`,
+    spec.axes.length ? `fitted to ${spec.axes.join(" and ")}` : null,
     cut === 0 ? "no low-pass" : `low-pass at ${cut === null ? "3.2 × flap frequency" : `${significant(cut)} Hz`}`,
-  ];
+  ].filter(Boolean);
 }

@@ -198,7 +198,7 @@ function drawHead() {
 
 // Convergence is watched while a run on markers or series goes on; afterwards, and beside forces, the result comes first.
 function placeHistory() {
-  const [section, anchor] = [$("history-section"), isFinal(run) || isForces(run) ? $("loads-section") : $("numbers")];
+  const [section, anchor] = [$("history-section"), isFinal(run) || isForces(run) ? $("loads-section") : $("remarks")];
   if (anchor.nextElementSibling !== section) anchor.after(section);
 }
 

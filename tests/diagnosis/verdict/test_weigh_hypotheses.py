@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -26,6 +27,10 @@ from wingfit.diagnosis.verdict.weigh_hypotheses import (
     weigh,
 )
 from wingfit.records import Condition
+
+
+def at(table: np.ndarray, k: int, j: int) -> float:
+    return float(table[k, j])
 
 
 def verdict(nominal: float, *others: Refit, floor: float = 0.0) -> tuple[str, tuple[str, ...]]:
@@ -106,18 +111,28 @@ def test_sharing_with_parts_beside_an_unknown_law_loses_no_probability() -> None
     rng = np.random.default_rng(3)
     for _ in range(50):
         weight, beside = rng.normal(0.0, 3.0, (2, len(names)))
-        found = weigh_hypotheses._with_unknown_rest(each, weight, beside)
+        odds = beside[None, :] - weight[:, None]
+        found = weigh_hypotheses._with_unknown_rest(each, weight, partial(at, odds))
         assert np.logaddexp.reduce(found) == pytest.approx(np.logaddexp.reduce(weight))
         assert found[0] == weight[0]
         assert found[-1] <= weight[-1]
         assert found[1] >= weight[1]
     ordered = np.array([4, 2, 0, 3, 1])
-    other = weigh_hypotheses._with_unknown_rest([each[k] for k in ordered], weight[ordered], beside[ordered])
+    moved = odds[np.ix_(ordered, ordered)]
+    other = weigh_hypotheses._with_unknown_rest([each[k] for k in ordered], weight[ordered], partial(at, moved))
     np.testing.assert_allclose(other, found[ordered])
     assert verdict(4.07, refit(1.82, ("a",)), refit(1.62, ("a", "b")), refit(1.12, ("a", "b", "c"))) == (
         "named",
         ("a",),
     )
+
+
+def test_a_small_second_effect_that_leaves_nothing_is_named_beside_a_large_first() -> None:
+    """What a second effect may leave is relative to what the first leaves, not to the misfit of the nominal model."""
+    first = refit(50.0 * 0.23, ("a",))
+    assert verdict(50.0, first, refit(0.05, ("a", "b"), 4)) == ("named", ("a", "b"))
+    half = refit(50.0 * 0.23 * 0.4, ("a", "b"), 4)
+    assert verdict(50.0, first, half)[1] == ("a",), "a law outside the library may explain as much"
 
 
 def test_a_measurement_fault_has_its_own_verdict() -> None:
