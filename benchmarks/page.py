@@ -38,7 +38,7 @@ SETTLED_MS = 4000.0  # until the figures are drawn
 # What answers the question of a page: a badge or sentence, and the first picture.
 ANSWERS = {
     "run": ("#run-fit", "#beats"),
-    "diagnosis": ("#report >> h1", "#report >> .figures, #report >> svg"),
+    "diagnosis": ("#report >> h1", "#report >> svg[role=img]"),
     "dataset": ("#dataset-name", "#forces-view"),
     "diagnoses": ("#listing-table tbody tr",),
 }

@@ -199,7 +199,7 @@ def test_an_installed_rig_is_calibrated_and_diagnosed(seen: Seen, api: Api, deca
     seen.page.click("#installed-form [value=runs]")
     seen.wait("location.hash.startsWith('#run=')")
     made = seen.page.evaluate("location.hash").removeprefix("#run=")
-    seen.wait("document.querySelector('#run-name .badge')?.textContent === 'done'", 60)
+    seen.wait("!document.getElementById('run-fit').hidden", 60)
     assert seen.page.is_hidden("#run-waiting")
     program = copied(seen, "#copy-python")
     seen.page.wait_for_selector("#toast", state="hidden")
@@ -244,7 +244,7 @@ def test_a_driven_run_is_followed_to_its_end(seen: Seen, api: Api, decay: str) -
     assert seen.page.is_hidden("#copy-curl")
     assert "waits for its simulation" in seen.page.inner_text("#history-note")
     with driver(api, made):
-        seen.wait("document.querySelector('#run-name .badge').textContent === 'done'", 60)
+        seen.wait("!document.getElementById('run-fit').hidden", 60)
     assert seen.page.is_hidden("#run-waiting")
     result = api.get(f"/v1/runs/{made}/result")
     seen.wait(f"{ROWS.format('series-misfit')} === {len(result['recordings'])}")
