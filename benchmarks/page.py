@@ -23,7 +23,7 @@ from benchmarks.common.server_process import Server
 from benchmarks.load.filling import fill
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser, ConsoleMessage, Page, Request, ViewportSize
+    from playwright.sync_api import Browser, ConsoleMessage, Page, ViewportSize
 
 Scheme = Literal["light", "dark"]
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
@@ -34,6 +34,9 @@ TRIES = 3
 DESKTOP: ViewportSize = {"width": 1280, "height": 900}
 PHONE: ViewportSize = {"width": 390, "height": 780}
 SCHEMES: tuple[Scheme, ...] = ("light", "dark")
+MOVED = (
+    "performance.getEntries().reduce((sum, one) => sum + (one.transferSize || 0), 0)"  # bytes, with the drawing library
+)
 SETTLED_MS = 4000.0  # until the figures are drawn
 # What answers the question of a page: a badge or sentence, and the first picture.
 ANSWERS = {
@@ -55,11 +58,10 @@ class Found:
 
 @dataclass
 class Watch:
-    """Notes errors of a page, ``where``, in ``found``, and counts the bytes that it moves."""
+    """Notes errors of a page, ``where``, in ``found``."""
 
     where: str
     found: Found
-    moved: int = 0
 
     def message(self, message: ConsoleMessage) -> None:
         """Note an error on the console."""
@@ -69,10 +71,6 @@ class Watch:
     def failure(self, error: object) -> None:
         """Note an error that no script caught."""
         self.found.errors.append(f"{self.where}: {error}")
-
-    def request(self, request: Request) -> None:
-        """Count what a request has moved."""
-        self.moved += request.sizes()["responseBodySize"]
 
 
 class Clicks:
@@ -196,11 +194,10 @@ def _looked_at(
         watch = Watch(f"{name}, {scheme}, {size['width']} px", found)
         page.on("console", watch.message)
         page.on("pageerror", watch.failure)
-        page.on("requestfinished", watch.request)
         page.goto(_address(server, address))
         page.wait_for_timeout(SETTLED_MS)
         found.violations += [f"{watch.where}: {one['id']}" for one in Axe().run(page).response["violations"]]
-        found.bytes_of[name] = max(found.bytes_of.get(name, 0), watch.moved)
+        found.bytes_of[name] = max(found.bytes_of.get(name, 0), int(page.evaluate(MOVED)))
         context.close()
 
 

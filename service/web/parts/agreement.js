@@ -49,7 +49,7 @@ const nameCell = (row) => el("th", { scope: "row" }, row.name, row.use ? " " : n
 function drawDifferences(rows, models, fitted) {
   const shown = columns(forceUnit(rows.flatMap((row) => models.map((name) => row.by[name]?.rmse_n))));
   $("agreement").tHead.replaceChildren(
-    el("tr", { className: "groups" }, el("th", {}), ...models.map((name) => el("th", { colSpan: shown.length, scope: "colgroup", className: "n first" }, SOURCES[name]))),
+    el("tr", { className: "groups" }, el("td"), ...models.map((name) => el("th", { colSpan: shown.length, scope: "colgroup", className: "n first" }, SOURCES[name]))),
     el("tr", {}, el("th", {}, "Recording"), ...models.flatMap(() => shown.map(([title], k) => el("th", { className: k ? "n" : "n first" }, title)))));
   const cells = (by) => models.flatMap((name) => shown.map(([, show], k) => number(by[name] ? show(by[name]) : "–", k === 0)));
   const body = rows.map((row) => el("tr", {}, nameCell(row), ...cells(row.by)));
