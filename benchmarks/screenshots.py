@@ -122,7 +122,8 @@ def _shot(
     tab.goto(f"{url}/#{address}")
     deadline = time.monotonic() + DRAWN_SECONDS
     # Polled from here: waiting inside the page needs eval, which its content security policy forbids.
-    drawn = f"[document.getElementById('{figure}')].some((one) => one?.data?.length || one?.shadowRoot?.querySelector('svg'))"
+    node = f"document.getElementById('{figure}')"
+    drawn = f"[{node}].some((one) => one?.data?.length || one?.shadowRoot?.querySelector('svg'))"
     while not tab.evaluate(drawn):
         if time.monotonic() > deadline:
             raise RuntimeError(f"{figure} was not drawn within {DRAWN_SECONDS:g} s on #{address}")

@@ -17,7 +17,7 @@ let later = null;
 export function showPartial(diagnosis) {
   const over = !diagnosis || diagnosis.state === "SUCCEEDED" || diagnosis.state === "QUEUED";
   if (over || diagnosis.id !== of) {
-    [known, of, fetchedAt] = [null, diagnosis?.id ?? "", 0];
+    [known, of, fetchedAt] = [null, over ? "" : diagnosis.id, 0]; // an answer on its way is not shown any more
     $("partial").hidden = true;
   }
   if (!over) refresh(diagnosis);
