@@ -99,6 +99,6 @@ def law(row: RunRow, dataset: Dataset) -> GlobalModel:
         )
     stored = row.result["global_model"]
     if stored is None:
-        why = next((remark for remark in row.result["remarks"] if "global model" in remark), None)
+        why = next((remark for remark in row.result["remarks"] if remark.startswith("no global model")), None)
         raise conflict(why or "the run has no global model: only mode 'local' gives one, one estimate per recording")
     return force_views.law(stored, dataset)

@@ -183,7 +183,7 @@ def test_a_misspelt_query_parameter_is_refused(client: httpx.Client) -> None:
     assert answer.status_code == 422
     (fault,) = answer.json()["errors"]
     assert (fault["where"], fault["value"]) == ("query.stat", "RUNNING")
-    assert "cursor, dataset_id, limit, state" in fault["message"]
+    assert "active, badge, cursor, dataset_id, limit, order, q, sort, state" in fault["message"]
     assert client.get("/v1/health", params={"x": "1"}).status_code == 422
     assert client.get("/", params={"x": "1"}).status_code == 200
 

@@ -142,7 +142,9 @@ def test_a_joint_run_has_one_estimate_and_no_global_model(seen: Seen, api: Api, 
     assert not seen.page.is_visible("#law-part")
     assert not seen.page.is_visible("#prediction-form")
     assert "no global model" in seen.page.inner_text("#prediction-note")
-    groups = seen.page.evaluate("[...document.querySelectorAll('#agreement .groups th')].map((c) => c.textContent)")
+    groups = seen.page.evaluate(
+        "[...document.querySelectorAll('#agreement .groups :is(td, th)')].map((c) => c.textContent)"
+    )
     assert groups == ["", "Joint", "Nominal"]
     assert "fitted to x and z" in seen.page.inner_text("#run-about")
     assert seen.errors == []
