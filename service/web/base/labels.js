@@ -66,6 +66,8 @@ export const relativeMisfit = ({ relative_to: relativeTo }, value) => (relativeT
   ? { value: rounded(value), unit: "× noise" }
   : { value: rounded(value === null ? null : 100 * value), unit: OF_RANGE });
 
+const ADEQUATE = 1.3; // times the noise, as on the server (calibration/result.py)
+
 // What the fit of a finished job means, in a sentence.
 export function fitSentence(job) {
   if (!job.fit_badge) return "The noise of the recordings is not known, so the residual cannot be judged: record at least two beats, or state the noise.";
@@ -73,8 +75,7 @@ export function fitSentence(job) {
   const both = `The residual is ${rounded(fitted, 2)} times the noise on the fitted recordings`
     + (held === null ? "; none was held out, so no prediction is tested." : `, and ${rounded(held, 2)} times on those held out.`);
   if (job.fit_badge === "good") return `${both} Noise explains it.`;
-  const held_out_only = held !== null && fitted <= 1.3;
-  if (held_out_only) return `${both} The model fits, and does not predict: physics is missing, or the genes absorbed noise.`;
+  if (held !== null && fitted <= ADEQUATE) return `${both} The model fits, and does not predict: physics is missing, or the genes absorbed noise.`;
   return `${both} ${job.fit_badge === "doubtful" ? "Physics may be missing" : "Physics is missing, or the input is wrong"}: diagnose it.`;
 }
 

@@ -1,9 +1,10 @@
 // The form that starts a diagnosis of a dataset, or of the best genome of a run.
 
 import { fill, get, postJson } from "../base/api.js";
+import { effectFamilies, tick } from "../base/choices.js";
 import { copy, curl } from "../base/copying.js";
 import { showErrors } from "../base/form_errors.js";
-import { $, el, plural, toast } from "../base/format.js";
+import { $, plural, toast } from "../base/format.js";
 import { isForces, PRESETS, spoken } from "../base/labels.js";
 import { NO_NUMBER, randomKey } from "../pages/submit.js";
 
@@ -81,15 +82,15 @@ export async function openDiagnoseForm(dataset, run = null) {
     form().preset.replaceChildren(...models.presets.map(({ name }) => new Option(PRESETS[name] ?? spoken(name), name)));
     if (spec) form().preset.value = spec.preset;
     const recorded = new Set(dataset.recordings.flatMap(({ channels }) => channels.map((name) => name.replace("force_", ""))));
-    $("diagnose-axes").replaceChildren(...[...recorded].map((axis) => tick("axes", axis, axis, spec ? spec.axes.includes(axis) : true)));
+    $("diagnose-axes").replaceChildren(...[...recorded].map((axis) => tick(axis, axis, spec ? spec.axes.includes(axis) : true, "", "axes")));
     showTerms();
   } else if (spec) {
     if (![...form().division.options].some(({ value }) => value === spec.division)) form().division.add(new Option(spec.division, spec.division));
     form().division.value = spec.division;
     form().accuracy_mm.value = spec.accuracy_mm;
   }
-  showEffects($("diagnose-effects"), "effects", spec?.effects ?? []);
-  showEffects($("diagnose-suspects"), "suspects", []);
+  $("diagnose-effects").replaceChildren(...effectFamilies(fitting(), spec?.effects, "effects"));
+  $("diagnose-suspects").replaceChildren(...effectFamilies(fitting(), [], "suspects"));
   summarize();
 }
 
@@ -98,7 +99,7 @@ function showRecordings() {
   const fitted = dataset.recordings.filter((one) => !one.held_out);
   const held = dataset.recordings.filter((one) => one.held_out);
   const chosen = new Set(run?.spec.recordings?.length ? run.spec.recordings : fitted.map(({ name }) => name));
-  $("diagnose-recordings").replaceChildren(...fitted.map(({ name }) => tick("recordings", name, name, chosen.has(name))));
+  $("diagnose-recordings").replaceChildren(...fitted.map(({ name }) => tick(name, name, chosen.has(name), "", "recordings")));
   $("diagnose-held").textContent = held.length
     ? `Held out, to test the result: ${held.map(({ name }) => name).join(", ")}.` : "No recording is held out: the result cannot be tested on data that it has not seen.";
 }
@@ -109,16 +110,10 @@ function showTerms() {
   const preset = models.presets.find(({ name }) => name === form().preset.value);
   const without = subject.run?.spec.preset === preset.name ? subject.run.spec.without : [];
   $("diagnose-terms").replaceChildren(...preset.terms.map((name) => models.terms.find((term) => term.name === name))
-    .map((term) => tick("terms", term.name, spoken(term.name), !without.includes(term.name), `${term.description} (${term.equation})`)));
+    .map((term) => tick(term.name, spoken(term.name), !without.includes(term.name), `${term.description} (${term.equation})`, "terms")));
 }
 
 const fitting = () => effects.filter((effect) => effect.applies_to.includes(isForces(subject.dataset) ? "vehicle" : "wing"));
-
-function showEffects(node, name, chosen) {
-  const families = [...new Set(fitting().map((effect) => effect.family))];
-  node.replaceChildren(...families.map((family) => el("div", { className: "family" }, el("p", { className: "quiet" }, family),
-    ...fitting().filter((effect) => effect.family === family).map((effect) => tick(name, effect.name, effect.title, chosen.includes(effect.name), effect.signature)))));
-}
 
 function summarize() {
   if (!effects) return;
@@ -130,9 +125,6 @@ function summarize() {
 
 const boxes = (name) => [...form().querySelectorAll(`input[type=checkbox][name=${name}]`)];
 const ticked = (name) => boxes(name).filter((box) => box.checked).map((box) => box.value);
-
-const tick = (name, value, text, checked, title = "") =>
-  el("label", { className: "tick", title }, el("input", { type: "checkbox", name, value, checked, defaultChecked: checked }), ` ${text}`);
 
 function values() {
   const { dataset, run } = subject;

@@ -2,8 +2,9 @@
 
 import { ApiError, call, get, part, postJson } from "../base/api.js";
 import { confirmed } from "../base/confirm.js";
+import { effectFamilies, tick } from "../base/choices.js";
 import { copy, curl, python } from "../base/copying.js";
-import { $, el, toast } from "../base/format.js";
+import { $, toast } from "../base/format.js";
 import { showErrors } from "../base/form_errors.js";
 import { isForces, isSeries, METHODS, MODES, PRESETS, setup, spoken } from "../base/labels.js";
 
@@ -162,10 +163,7 @@ async function showEffectChoices(form, rig) {
     return;
   }
   const fitting = effects.filter((effect) => effect.applies_to.includes(rig));
-  const families = [...new Set(fitting.map((effect) => effect.family))];
-  $("effect-choices").replaceChildren(...families.map((family) => el("div", { className: "family" },
-    el("p", { className: "quiet" }, family),
-    ...fitting.filter((effect) => effect.family === family).map((effect) => tick(effect.name, effect.title, false, effect.signature)))));
+  $("effect-choices").replaceChildren(...effectFamilies(fitting));
   $("effects-part").hidden = !fitting.length;
   summarizeEffects();
 }
@@ -185,9 +183,6 @@ function showPreset(form) {
 function options(select, words, values) {
   select.replaceChildren(...values.map((value) => new Option(words[value] ?? spoken(value), value)));
 }
-
-const tick = (value, text, checked, title = "") =>
-  el("label", { className: "tick", title }, el("input", { type: "checkbox", value, checked }), ` ${text}`);
 
 // XMLHttpRequest, because fetch does not report the progress of an upload.
 export function send(file, onFraction) {
