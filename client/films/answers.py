@@ -6,10 +6,12 @@ from typing import Literal
 
 from typing_extensions import TypedDict
 
-from wingfit.client.answers import State
+from wingfit.client.answers import Dataset, State
 
 MarkerKind = Literal["chequer", "dot"]
 Light = Literal["strobe", "continuous"]
+WingSide = Literal["left", "right"]
+WingRig = Literal["vacuum_chamber", "wind_tunnel"]
 Pixel = list[float]
 
 
@@ -185,3 +187,40 @@ class TrackingResult(TypedDict):
     times_s: list[float]
     found: list[int]
     shown: list[SeenInstant]
+
+
+class UnusedTrack(TypedDict):
+    """A track that is no described marker, and the reason."""
+
+    track: str
+    reason: str
+
+
+class FilmAlignment(TypedDict):
+    """How well the tracks of one film were brought to the frame of the wing.
+
+    ``residual_mm`` is the standard deviation of a coordinate against the modelled motion, ``rest_scatter_mm`` that of
+    the described rest positions; ``flap_frequency_hz`` is on the clock of the cameras; ``flap_amplitude_deg`` half the
+    range of the flap angle; ``exchanges`` counts parts of tracks that belong to other markers than their tracks.
+    """
+
+    recording: str
+    tracking_id: str
+    side: WingSide
+    residual_mm: float
+    rest_scatter_mm: float
+    flap_frequency_hz: float
+    flap_amplitude_deg: float
+    mean_flap_deg: float
+    frames: int
+    markers: list[str]
+    exchanges: int
+    dropped: list[UnusedTrack]
+    remarks: list[str]
+
+
+class FilmedDataset(TypedDict):
+    """A dataset that was made of tracked films, and how each was aligned to its wing."""
+
+    dataset: Dataset
+    alignments: list[FilmAlignment]

@@ -10,7 +10,7 @@ from typing import Any, cast
 import httpx
 
 from wingfit.client import answers as a
-from wingfit.client.films.answers import Film, FoundMarker, MarkerKind, Tracking, TrackingResult
+from wingfit.client.films.answers import Film, FilmedDataset, FoundMarker, MarkerKind, Tracking, TrackingResult
 from wingfit.client.follow_job import Watching
 from wingfit.client.transport import CountedFile, OnBytes, WingfitError, given, part
 
@@ -119,6 +119,22 @@ class FilmCalls(Watching):
         """Write the covariances of all places (a NumPy archive) to ``path``; return the path of the file."""
         name = f"{tracking_id}-covariance.npz"
         return self._file(f"{_tracking(tracking_id)}/covariance.npz", Path(path), name, on_bytes)
+
+    def dataset_of_films(self, name: str, recordings: Sequence[Mapping[str, Any]], **known: Any) -> FilmedDataset:
+        """Align the tracks of films to a described wing, and store them as a new dataset ``name``.
+
+        ``recordings``: of each tracking that has succeeded, a dict with tracking_id, name, rig ("vacuum_chamber" or
+        "wind_tunnel"), flap_frequency_hz, phase_lag_deg, pressure_mbar and temperature_c; airspeed_m_s,
+        angle_of_attack_deg and held_out where they apply. ``known``: dataset_id of a dataset that describes
+        the wing, or description, the text of a dataset.yaml or of the keys of a wing; and side ("left" or "right"), up
+        ("z", "-y", ...), mean_flap_deg, ignore_names. Returns the dataset, and how each film was aligned.
+        """
+        body = {
+            "name": name,
+            "recordings": [dict(one) for one in recordings],
+            **given(**known),
+        }
+        return cast(FilmedDataset, self._json("POST", "/v1/trackings/dataset", json=body, key=str(uuid.uuid4())))
 
     def tracking_report(self, tracking_id: str) -> str:
         """Fetch pictures of the tracks, as the text of one HTML file."""

@@ -40,10 +40,15 @@ def read_wing(path: str | PathLike[str]) -> Wing:
         raw = place.read_bytes()
     except OSError as error:
         raise fail(str(path), None, f"cannot be read: {error.strerror or error}; check the path") from None
-    document = read_yaml(raw, place.name)
+    return parse_wing(raw, place.name)
+
+
+def parse_wing(raw: bytes, name: str) -> Wing:
+    """Return the wing that the bytes ``raw`` of the file ``name`` describe; as :func:`read_wing` of that file."""
+    document = read_yaml(raw, name)
     data = document.data
     if not isinstance(data, dict):
-        raise fail(place.name, None, "describes no wing: it must have the key 'wing', or the keys of a wing")
+        raise fail(name, None, "describes no wing: it must have the key 'wing', or the keys of a wing")
     for other in ("vehicle", "rig"):
         if other in data:
             raise fail(document.where((other,)), None, f"describes a {other}; tracks are aligned to a wing: give one")

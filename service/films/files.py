@@ -15,7 +15,7 @@ import secrets
 import shutil
 from collections.abc import AsyncIterator, Iterable
 from pathlib import Path
-from typing import IO
+from typing import IO, NamedTuple
 
 from starlette.concurrency import run_in_threadpool
 
@@ -35,6 +35,14 @@ FILM, TRACKING = re.compile(r"fl_[0-9a-f]{16}"), re.compile(r"tk_[0-9a-f]{16}")
 UPLOADED = re.compile(r"[A-Za-z0-9_-]{1,40}\.[0-9a-f]{8}")
 
 TRACKS, COVARIANCE, REPORT, RESULT = "tracks.csv", "covariance.npz", "report.html", "result.json"
+
+
+class TrackingFiles(NamedTuple):
+    """Files of one tracking that has succeeded: tracks (CSV), covariances (NumPy), and the cameras of its film."""
+
+    tracks: Path
+    covariance: Path
+    cameras: Path
 
 
 class FilmFiles:

@@ -7,7 +7,7 @@ from typing import Annotated
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationInfo, field_validator
 from pydantic_core import PydanticCustomError
 
-from wingfit.client.films.answers import Light, MarkerKind
+from wingfit.client.films.answers import Light, MarkerKind, WingRig, WingSide
 from wingfit.service.runs.requests import DATASET_ID, Name, Number, Title, Whole
 
 MOST_CAMERAS = 8
@@ -15,6 +15,9 @@ CALIBRATION = "cameras"  # name of the file of calibrated cameras
 FILM_ID = "fl_3b9ac1d07e5f2468"
 MOST_MARKERS, MOST_LABELS = 2000, 5000
 MOST_FRAMES = 10**9 - 1
+LONGEST_DESCRIPTION = 2**20  # characters
+MOST_FILMS = 40  # in one dataset: an alignment of a film takes seconds
+RECORDING_NAME = r"^[A-Za-z0-9]([A-Za-z0-9._-]*[A-Za-z0-9_-])?$"
 
 
 def _different(cameras: list[str]) -> list[str]:
@@ -111,3 +114,75 @@ class TrackingIn(BaseModel):
     labels: Annotated[
         list[LabelIn], Field(max_length=MOST_LABELS, description="markers named by hand in some frames")
     ] = []
+
+
+class FilmedRecordingIn(BaseModel):
+    """A recording of a dataset that is made of tracked films, and the conditions that were set for it."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    tracking_id: Name
+    name: Annotated[str, Field(max_length=100, pattern=RECORDING_NAME)]
+    rig: WingRig
+    flap_frequency_hz: Annotated[
+        Number, Field(gt=0, le=1000, description="as set, to 2 %; the dataset gets the one on the clock of the cameras")
+    ]
+    phase_lag_deg: Annotated[Number, Field(ge=-180, le=180)]
+    pressure_mbar: Annotated[Number, Field(ge=0)]
+    temperature_c: Number
+    airspeed_m_s: Annotated[Number, Field(ge=0)] = 0.0
+    angle_of_attack_deg: Annotated[Number, Field(ge=-90, le=90)] = 0.0
+    held_out: bool = False
+
+
+class FilmedDatasetIn(BaseModel):
+    """Body of a request that makes a dataset of tracked films, in the frame of the described wing."""
+
+    model_config = ConfigDict(
+        extra="forbid",
+        json_schema_extra={
+            "examples": [
+                {
+                    "name": "wing in the chamber",
+                    "dataset_id": DATASET_ID,
+                    "recordings": [
+                        {
+                            "tracking_id": "tk_9e0b6a7c1d2f3458",
+                            "name": "vacuum",
+                            "rig": "vacuum_chamber",
+                            "flap_frequency_hz": 3.0,
+                            "phase_lag_deg": 3.0,
+                            "pressure_mbar": 10.0,
+                            "temperature_c": 20.0,
+                        }
+                    ],
+                }
+            ]
+        },
+    )
+
+    name: Title
+    dataset_id: Annotated[Name | None, Field(description="of a dataset that describes the filmed wing")] = None
+    description: Annotated[
+        str | None,
+        Field(max_length=LONGEST_DESCRIPTION, description="instead: dataset.yaml, or the keys of a wing, as text"),
+    ] = None
+    recordings: Annotated[list[FilmedRecordingIn], Field(min_length=1, max_length=MOST_FILMS)]
+    side: Annotated[WingSide | None, Field(description="of the wing; null: estimated")] = None
+    up: Annotated[
+        str | None, Field(pattern="^-?[xyz]$", description="axis of the tracks that is up; null: estimated")
+    ] = None
+    mean_flap_deg: Annotated[
+        Number | None, Field(gt=-90, lt=90, description="mean flap angle over the beat; null: that of the drive")
+    ] = None
+    ignore_names: Annotated[bool, Field(description="the names of the tracks say nothing about markers")] = False
+
+    @field_validator("recordings")
+    @classmethod
+    def _names_differ(cls, recordings: list[FilmedRecordingIn]) -> list[FilmedRecordingIn]:
+        for what in ("name", "tracking_id"):
+            values = [getattr(one, what) for one in recordings]
+            if twice := next((value for value in values if values.count(value) > 1), None):
+                message = "two recordings have the {what} '{value}'; each has its own"
+                raise PydanticCustomError("repeated", message, {"what": what, "value": twice})
+        return recordings

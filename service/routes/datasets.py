@@ -3,24 +3,20 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import AsyncIterator, Sequence
+from collections.abc import AsyncIterator
 from pathlib import PurePath
 from typing import Annotated
 
 from fastapi import APIRouter, Form, Query, Request, UploadFile
-from sqlalchemy.orm import Session
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response, StreamingResponse
 
-from wingfit.checks import Mistake
 from wingfit.client import answers as a
 from wingfit.client.recorded.answers import SeriesValues
-from wingfit.records import AnyDataset, SeriesDataset
-from wingfit.records.files.confined import ReaderError
+from wingfit.records import SeriesDataset
 from wingfit.report.wing_drawing import wing_drawing
-from wingfit.service.auth.access import owner_of_new
-from wingfit.service.container import DOWNLOAD_SLOT, UPLOAD_SLOT, Service, ServiceDep
-from wingfit.service.datasets.parsed_datasets import Opened
+from wingfit.service.container import DOWNLOAD_SLOT, UPLOAD_SLOT, ServiceDep
+from wingfit.service.datasets.new_datasets import opened, stored
 from wingfit.service.http import list_query as q
 from wingfit.service.http import responses as http
 from wingfit.service.http.list_routes import add_edit_route
@@ -30,7 +26,7 @@ from wingfit.service.runs import views
 from wingfit.service.storage import listing, store
 from wingfit.service.storage.database import Database
 from wingfit.service.storage.listing import Wanted
-from wingfit.service.storage.tables import ArchiveRow, DatasetRow
+from wingfit.service.storage.tables import DatasetRow
 
 router = APIRouter(prefix="/v1/datasets", tags=["datasets"])
 DRAWING_TYPE = "image/svg+xml"
@@ -75,22 +71,7 @@ def upload(
         earlier = store.earlier_answer(session, again)
     if earlier:
         return http.sent(earlier)
-    loaded, parsed, mistakes = _open(service, data, filename)
-
-    def create(session: Session) -> store.Answer:
-        row = _row(loaded, mistakes, name, filename, digest, len(data))
-        store.make_room(session, row.owner, len(data) + len(parsed or b""), service.settings.max_stored_mb)
-        session.add(row)
-        session.flush()
-        session.add(ArchiveRow(dataset_id=row.id, body=data))
-        if parsed is not None:
-            store.keep_parsed(session, row.id, parsed)
-        return store.Answer(201, f"/v1/datasets/{row.id}", views.dataset(row))
-
-    answer, new = http.created(service.database, again, create)
-    if new:
-        service.datasets.keep(answer.body["id"], loaded)
-    return http.sent(answer)
+    return http.sent(stored(service, again, opened(service, data, filename), (filename, data), name))
 
 
 @router.get("", response_model=a.Page[a.Dataset], responses=http.errors(), summary="List datasets")
@@ -197,35 +178,3 @@ def delete(service: ServiceDep, dataset_id: str) -> None:
     """Delete a dataset that no run or diagnosis refers to."""
     with service.database.write() as session:
         service.datasets.delete(session, dataset_id)
-
-
-def _open(service: Service, data: bytes, filename: str) -> Opened:
-    try:
-        return service.datasets.accept(data, filename)
-    except ReaderError as error:
-        raise ProblemError(503, "unavailable", str(error)) from None
-    except ValueError as error:
-        faults = getattr(error, "errors", None) or []
-        listed = [error_item(fault.where, fault.value, fault.message) for fault in faults]
-        fallback = [error_item(filename, None, str(error))]
-        raise invalid("the dataset cannot be read", listed or fallback) from None
-
-
-def _row(
-    loaded: AnyDataset, mistakes: Sequence[Mistake], name: str | None, filename: str, digest: str, size: int
-) -> DatasetRow:
-    return DatasetRow(
-        id=store.new_id("ds"),
-        owner=owner_of_new(),
-        name=name or loaded.name,
-        kind=loaded.kind,
-        description=loaded.description,
-        filename=filename,
-        created_at=store.now(),
-        sha256=digest,
-        size_bytes=size,
-        markers=len(loaded.wing.markers) if loaded.kind == "tracks" else 0,
-        recordings=views.recordings(loaded),
-        rig=views.rig_info(loaded),
-        warnings=views.warnings(mistakes),
-    )

@@ -12,13 +12,16 @@ from starlette.responses import FileResponse, HTMLResponse, Response
 
 from wingfit.client.answers import Page
 from wingfit.client.films import answers as a
-from wingfit.records import DatasetError
-from wingfit.service.container import DOWNLOAD_SLOT, Service, ServiceDep
+from wingfit.records import DatasetError, Wing
+from wingfit.records.description.wing_description import parse_wing
+from wingfit.records.files.archive import write_zip
+from wingfit.service.container import DOWNLOAD_SLOT, UPLOAD_SLOT, Service, ServiceDep
+from wingfit.service.datasets.new_datasets import opened, stored
 from wingfit.service.films import views
 from wingfit.service.films.description import LABELS, write_description
-from wingfit.service.films.files import COVARIANCE, REPORT, TRACKS
+from wingfit.service.films.files import COVARIANCE, REPORT, TRACKS, TrackingFiles
 from wingfit.service.films.films import require_opencv
-from wingfit.service.films.requests import TrackingIn
+from wingfit.service.films.requests import CALIBRATION, FilmedDatasetIn, TrackingIn
 from wingfit.service.http import csv_text
 from wingfit.service.http import list_query as q
 from wingfit.service.http import responses as http
@@ -31,6 +34,7 @@ from wingfit.workers import jobs
 
 router = APIRouter(prefix="/v1/trackings", tags=["trackings"])
 ARCHIVE = "application/octet-stream"
+_FILE = "films.zip"  # of a dataset that was made of films
 # The figures of the report run scripts, which the sandbox keeps from the API: they have an origin of their own, and
 # load and send nothing.
 REPORT_HEADERS = {
@@ -73,6 +77,44 @@ def submit(request: Request, service: ServiceDep, body: TrackingIn, idempotency_
         return row
 
     return submit_job(request, service, service.tracking, idempotency_key, body, plan)
+
+
+@router.post(
+    "/dataset",
+    status_code=201,
+    response_model=a.FilmedDataset,
+    responses={201: {"headers": http.LOCATION}, **http.errors(409, 429, 501)},
+    summary="Make a dataset of tracked films",
+    dependencies=[UPLOAD_SLOT],
+)
+def make_dataset(
+    request: Request, service: ServiceDep, body: FilmedDatasetIn, idempotency_key: http.RepeatKey = None
+) -> Response:
+    """Align the tracks of one or more films to a described wing, and store them as a new dataset.
+
+    All films get one frame: the cameras stayed where they were. The new dataset states the noise of each marker, the
+    errors of the frame, and the cameras.
+    """
+    again = http.repeat(request, idempotency_key, body.model_dump_json())
+    with service.database.read() as session:
+        earlier = store.earlier_answer(session, again)
+    if earlier:
+        return http.sent(earlier)
+    wing = _described(service, body)
+    films = [_tracked(service, number, one.tracking_id) for number, one in enumerate(body.recordings)]
+    require_opencv()
+    from wingfit.service.films.aligning import dataset_of_films  # imported late: the server starts faster
+
+    try:
+        dataset, alignments = dataset_of_films(wing, body, films)
+        archive = write_zip(dataset)
+    except DatasetError as error:
+        items = [error_item(fault.where, fault.value, fault.message) for fault in error.errors]
+        raise invalid("the tracks were not aligned", items) from None
+    found = opened(service, archive, _FILE)
+    return http.sent(
+        stored(service, again, found, (_FILE, archive), body=lambda made: {"dataset": made, "alignments": alignments})
+    )
 
 
 @router.get("", response_model=Page[a.Tracking], responses=http.errors(), summary="List trackings")
@@ -183,14 +225,50 @@ def _spec(service: Service, body: TrackingIn) -> dict[str, Any]:
 
 
 def _places(service: Service, dataset_id: str) -> list[dict[str, Any]]:
-    dataset = load(service, dataset_id)
-    if dataset.kind != "tracks":
-        message = "describes a vehicle; name the dataset of a wing, or give places"
-        raise invalid("the dataset has no markers", [error_item("body.dataset_id", dataset_id, message)])
     axes = ("x_m", "y_m", "z_m")
     return [
-        {"marker": one.name, **dict(zip(axes, map(float, one.position), strict=True))} for one in dataset.wing.markers
+        {"marker": one.name, **dict(zip(axes, map(float, one.position), strict=True))}
+        for one in _wing(service, dataset_id).markers
     ]
+
+
+def _described(service: Service, body: FilmedDatasetIn) -> Wing:
+    """Return the wing that the request describes, or whose dataset it names."""
+    if (body.dataset_id is None) == (body.description is None):
+        given = "both are" if body.description else "neither is"
+        message = f"{given} given: name a dataset of the wing, or send its description"
+        raise invalid("the wing is not described once", [error_item("body.dataset_id", body.dataset_id, message)])
+    if body.dataset_id is not None:
+        return _wing(service, body.dataset_id)
+    try:
+        return parse_wing((body.description or "").encode(), "description")
+    except DatasetError as error:
+        items = [error_item(f"body.{fault.where}", fault.value, fault.message) for fault in error.errors]
+        raise invalid("the description of the wing cannot be read", items) from None
+
+
+def _wing(service: Service, dataset_id: str) -> Wing:
+    dataset = load(service, dataset_id)
+    if dataset.kind != "tracks":
+        message = "describes a vehicle; name the dataset of a wing"
+        raise invalid("the dataset has no markers", [error_item("body.dataset_id", dataset_id, message)])
+    return dataset.wing
+
+
+def _tracked(service: Service, number: int, tracking_id: str) -> TrackingFiles:
+    """Return the files of the tracking that recording ``number`` of a request names; a 422 if there is none."""
+    try:
+        with service.database.read() as session:
+            row = store.one(session, TrackingRow, tracking_id)
+            film = store.one(session, FilmRow, row.film_id)
+    except ProblemError as problem:
+        message = "there is no such tracking; GET /v1/trackings lists them"
+        where = f"body.recordings.{number}.tracking_id"
+        raise invalid(problem.detail, [error_item(where, tracking_id, message)]) from None
+    if film.calibration is None or CALIBRATION in views.absent(film, service.films.files):
+        raise conflict(f"film {film.id} has no file of cameras on this server; upload it again")
+    cameras = service.films.files.video(film.id, film.calibration)
+    return TrackingFiles(_file(service, row.id, TRACKS), _file(service, row.id, COVARIANCE), cameras)
 
 
 def _check(service: Service, film: FilmRow, spec: dict[str, Any]) -> None:
