@@ -170,7 +170,8 @@ class FilmedDatasetIn(BaseModel):
     recordings: Annotated[list[FilmedRecordingIn], Field(min_length=1, max_length=MOST_FILMS)]
     side: Annotated[WingSide | None, Field(description="of the wing; null: estimated")] = None
     up: Annotated[
-        str | None, Field(pattern="^-?[xyz]$", description="axis of the tracks that is up; null: estimated")
+        str | None,
+        Field(max_length=2, pattern="^-?[xyz]$", description="axis of the tracks that is up; null: estimated"),
     ] = None
     mean_flap_deg: Annotated[
         Number | None, Field(gt=-90, lt=90, description="mean flap angle over the beat; null: that of the drive")

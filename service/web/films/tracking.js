@@ -8,6 +8,7 @@ import { cancel, remove } from "../pages/submit.js";
 import { importFile } from "../importing/page.js";
 import { hidePictures, setUpPictures, showPictures } from "./pictures.js";
 import { drawFound } from "./found.js";
+import { setUpFilmedDataset, showFilmedDataset } from "./dataset.js";
 
 const STAGES = { detecting: "detecting markers", instants: "matching frames", rays: "intersecting rays", following: "identifying and following markers" };
 
@@ -21,6 +22,7 @@ let wanted = null;
 export function setUpTracking(given) {
   hooks = given;
   setUpPictures();
+  setUpFilmedDataset();
   $("tracking-actions").addEventListener("click", (event) => {
     const action = event.target.dataset?.action;
     if (action) act(action);
@@ -116,6 +118,7 @@ const small = (value) => (value !== null && value < 0.001 ? "< 0.001" : rounded(
 async function showResult() {
   const names = Object.keys(result.markers);
   $("tracking-result").hidden = false;
+  showFilmedDataset(tracking).catch((error) => toast(error.message));
   $("tracking-numbers").replaceChildren(
     keyNumber("Instants", result.instants.toLocaleString("en")), keyNumber("Duration", rounded(result.seconds), "s"),
     keyNumber("Markers found, median", fixed(result.markers_found_median, Number.isInteger(result.markers_found_median) ? 0 : 1), `of ${names.length}`, true),

@@ -12,18 +12,17 @@ import pytest
 from tests.cameras.films import cameras
 from tests.service import toy
 from tests.service.conftest import Api, Json, prepare, serving
+from tests.service.films.aligned import DEVIATION, write_tracks
 from tests.service.films.films import ended, put, submitted, uploaded
 from tests.service.shapes import valid
 from tests.service.toy_diagnosis import ToyDiagnoser
-from tests.tracking.alignment.recorded import PLACE, ROBIRD, TURN, Filmed, dataset, filmed
+from tests.tracking.alignment.recorded import PLACE, ROBIRD, TURN, dataset, filmed
 from wingfit.client.films.answers import FilmedDataset
 from wingfit.records import Dataset
 from wingfit.records.files.archive import read_zip
-from wingfit.records.files.table import write_table
 from wingfit.service.app import create_app
 from wingfit.service.settings import Settings
 
-DEVIATION = 2e-4
 CHAMBER = {"rig": "vacuum_chamber", "temperature_c": 20.0}
 
 
@@ -37,24 +36,12 @@ def served(data: Path) -> Iterator[Api]:
         yield Api(client)
 
 
-def _write(data: Path, film: str, tracking: str, made: Filmed) -> None:
-    """Write the tracks of a wing in the place of those of a small film."""
-    folder = data / "films" / film / "tracked" / tracking
-    tracks = made.tracks
-    columns = [f"{name}_{axis}_m" for name in tracks.names for axis in "xyz"]
-    table = write_table(columns, tracks.times, tracks.positions.reshape(len(tracks.times), -1))
-    (folder / "tracks.csv").write_text(table)
-    covariance = np.broadcast_to(DEVIATION**2 * np.eye(3), (*tracks.positions.shape[:2], 3, 3))
-    names, times = np.array(tracks.names), tracks.times
-    np.savez(folder / "covariance.npz", names=names, times=times, covariance=covariance)
-
-
 @pytest.fixture(scope="module")
 def trackings(served: Api, film: str, data: Path) -> list[str]:
     every = [submitted(served, film)["id"] for _ in range(2)]
     for number, one in enumerate(every):
         assert ended(served, one)["state"] == "SUCCEEDED"
-        _write(data, film, one, filmed(number))
+        write_tracks(data, film, one, filmed(number))
     return every
 
 
@@ -143,7 +130,7 @@ def test_recordings_of_other_cameras_have_no_common_frame(
     assert put(served.client, other["id"], "cameras", moved.encode()).status_code == 200
     one = submitted(served, other["id"])["id"]
     assert ended(served, one)["state"] == "SUCCEEDED"
-    _write(data, other["id"], one, filmed(1))
+    write_tracks(data, other["id"], one, filmed(1))
     found = _refused(served, _body([trackings[0], one]))
     assert found["where"] == "body.recordings.1.tracking_id"
     assert "calibrated otherwise" in found["message"]

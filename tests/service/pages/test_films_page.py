@@ -17,7 +17,10 @@ import numpy as np
 from tests.cameras.films import FRAMES, NAMES, RATE, SIZE, cameras, wing, write_film
 from tests.service import toy
 from tests.service.conftest import Api, serving
+from tests.service.films.aligned import write_tracks
+from tests.service.films.films import ended
 from tests.service.pages.browsing import DRAWN, Seen, opened
+from tests.tracking.alignment.recorded import ROBIRD, dataset, filmed
 from wingfit.records.array_types import Array
 from wingfit.service.app import create_app
 from wingfit.service.settings import Settings
@@ -32,8 +35,13 @@ TRACKED = "!document.getElementById('tracking-result').hidden"
 
 
 @pytest.fixture(scope="module")
-def api(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Api]:
-    settings = Settings(data=tmp_path_factory.mktemp("films") / "data")
+def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("films") / "data"
+
+
+@pytest.fixture(scope="module")
+def api(data: Path) -> Iterator[Api]:
+    settings = Settings(data=data)
     with serving(create_app(settings, make_evaluator=toy.NoEvaluator)) as client:
         yield Api(client)
 
@@ -135,6 +143,41 @@ def test_from_films_to_tracks_and_a_dataset(seen: Seen, api: Api, files: Path, t
     seen.page.click("#tracking-dataset")
     seen.wait("document.getElementById('import-summary')?.textContent.startsWith('plain table, 12 markers, 20 frames')")
     assert seen.page.inner_text("#import-file-name").startswith("run_3")
+
+
+def test_tracks_become_a_dataset_of_a_described_wing(
+    seen: Seen, api: Api, data: Path, film: str, tracking: str
+) -> None:
+    assert ended(api, tracking)["state"] == "SUCCEEDED"
+    write_tracks(data, film, tracking, filmed(1))
+    seen.show(f"tracking={tracking}")
+    seen.wait("document.querySelector('#filmed-recordings tbody tr')")
+    row = "#filmed-recordings tbody tr:first-child [name={}]"
+    seen.page.fill("#filmed-dataset [name=name]", "filmed wing")
+    seen.page.set_input_files("#filmed-wing-file", ROBIRD / "dataset.yaml")
+    seen.page.evaluate("document.querySelector('#filmed-dataset [name=wing]').value = 'file'")
+    seen.page.select_option("#filmed-dataset [name=side]", "right")
+    conditions = dataset().recordings[1].condition
+    seen.page.fill(row.format("flap_frequency_hz"), str(conditions.flap_frequency))
+    seen.page.fill(row.format("pressure_mbar"), str(conditions.pressure / 100))
+    seen.page.fill(row.format("temperature_c"), "-300")
+    seen.page.click("#filmed-dataset [type=submit]")
+    seen.wait("!document.getElementById('filmed-errors').hidden")
+    assert "Phase lag, deg of" in seen.page.inner_text("#filmed-errors")
+    seen.page.fill(row.format("phase_lag_deg"), str(round(float(np.degrees(conditions.phase_lag)), 6)))
+    seen.page.click("#filmed-dataset [type=submit]")
+    seen.wait("document.getElementById('filmed-errors').textContent.includes('temperature')", 60)
+    seen.errors.clear()  # the browser reports the refusal
+    seen.page.fill(row.format("temperature_c"), "20")
+    seen.page.click("#filmed-dataset [type=submit]")
+    seen.wait("!document.getElementById('filmed-result').hidden", 60)
+    [aligned] = seen.rows("filmed-aligned")
+    assert aligned[1] == "right"
+    assert float(aligned[2]) < 3.0
+    seen.page.click("#filmed-open")
+    seen.wait("location.hash.startsWith('#dataset=')")
+    stored = api.client.get(f"/v1/datasets/{seen.page.url.rpartition('=')[2]}").json()
+    assert stored["name"] == "filmed wing"
 
 
 def test_faults_are_shown_at_the_file_concerned(seen: Seen, api: Api, files: Path) -> None:
