@@ -1,9 +1,10 @@
-// Which names of points in 3-D are written, and on which side of their points, so that none covers another.
+// Which names of points in 3-D are written, and on which side of their points, so that none covers another name or a point.
 
-const CHARACTER = 6.2; // px, width of one of the font of the names
-const LINE = 11; // px, height of a name
-const AWAY = 10; // px, from a point to the middle of a name above or below it
+const CHARACTER = 7.4; // px, width of one of the font of the names
+const LINE = 12; // px, height of a name
+const AWAY = 13; // px, from a point to the middle of a name above or below it
 const BESIDE = 6; // px, from a point to a name at its side
+const POINT = 3; // px, half the size of a point, less what a name may cover
 const UNITS = 2.25; // of the scene in the height of a chart whose projection is orthographic
 const SIDES = [["top center", 0, -1], ["bottom center", 0, 1], ["middle right", 1, 0], ["middle left", -1, 0],
   ["top right", 1, -1], ["top left", -1, -1], ["bottom right", 1, 1], ["bottom left", -1, 1]];
@@ -25,18 +26,18 @@ export function projected(points, camera, { ranges, ratio, height }) {
   });
 }
 
-// For each name at its place [x, y] in px: the name, or "" if there is no room for it, its side, and its box [left, top, right, bottom].
+// The names that have room at their places [x, y] in px: index, side, and box [left, top, right, bottom].
 export function placed(names, places) {
-  const taken = [];
-  return names.map((name, k) => {
+  const taken = places.map(([x, y]) => [x - POINT, y - POINT, x + POINT, y + POINT]);
+  return names.flatMap((name, index) => {
     const wide = CHARACTER * name.length;
     for (const [side, across, down] of SIDES) {
-      const [x, y] = [places[k][0] + across * (BESIDE + wide / 2), places[k][1] + down * AWAY];
+      const [x, y] = [places[index][0] + across * (BESIDE + wide / 2), places[index][1] + down * AWAY];
       const box = [x - wide / 2, y - LINE / 2, x + wide / 2, y + LINE / 2];
       if (taken.some((one) => box[0] < one[2] && one[0] < box[2] && box[1] < one[3] && one[1] < box[3])) continue;
       taken.push(box);
-      return { name, side, box };
+      return [{ name, index, side, box }];
     }
-    return { name: "", side: SIDES[0][0], box: null };
+    return [];
   });
 }

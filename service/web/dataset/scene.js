@@ -81,7 +81,7 @@ function scene(look, node, { wing, tracks, parts, frame, turned, names, view }) 
   const places = wing.markers.map((one) => turn(one.position_mm));
   // The user may have turned the picture.
   const camera = node.layout?.scene?.uirevision === view ? node.layout.scene.camera : CAMERAS[view];
-  const written = names ? placed(wing.markers.map((one) => one.name), projected(places, camera, { ranges: parts.ranges, ratio, height: node.clientHeight })) : [];
+  const written = new Map(names ? placed(wing.markers.map((one) => one.name), projected(places, camera, { ranges: parts.ranges, ratio, height: node.clientHeight })).map((one) => [one.index, one]) : []);
   const outline = wing.outline_mm.map(turn);
   const tips = parts.arrows.map((arrow) => arrow[1]);
   const { fan } = parts;
@@ -96,8 +96,12 @@ function scene(look, node, { wing, tracks, parts, frame, turned, names, view }) 
     line("distance", pairs.filter((pair) => !far(pair)), described, 2),
     line("far", pairs.filter(far), look.bad, 5),
     points("described", wing.markers.map((one) => one.name), places, { size: 5, color: described, symbol: "circle-open", line: { width: 1, color: described } },
-      { showlegend: true, ...(names ? { mode: "markers+text", text: written.map((one) => plain(one.name)), textposition: written.map((one) => one.side), textfont: { size: 10, color: described } } : {}) }),
+      { showlegend: true }),
     points("recorded", tracks.markers, recorded, { size: 3.5, color: look.ink }, { showlegend: true }),
+    // Those without room are transparent: Plotly draws names that come later too small.
+    { type: "scatter3d", mode: "text", name: "names", ...coordinates(names ? places : []), text: wing.markers.map((one) => plain(one.name)), hoverinfo: "skip", showlegend: false,
+      textposition: wing.markers.map((_, m) => written.get(m)?.side ?? "top center"),
+      textfont: { size: 10, color: wing.markers.map((_, m) => (written.has(m) ? described : "rgba(0,0,0,0)")) } },
     line("axes", parts.arrows, look.accent, 6),
     { type: "scatter3d", mode: "text", name: "labels", ...coordinates([...tips, parts.hinge[0], fan.at(-1)]), text: [...AXES, "hinge axis", "stroke plane"], hoverinfo: "skip",
       showlegend: false, textfont: { size: 12, color: [look.accent, look.accent, look.accent, look.ink, look.series[2]] }, textposition: "top center" },

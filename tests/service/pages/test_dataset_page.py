@@ -178,8 +178,7 @@ def test_markers_are_drawn_where_they_were_recorded(browser: Browser, api: Api, 
 def _check_names(seen: Seen) -> None:
     """Of 49 names as many are written as there is room for, and none over another; turning makes room for others."""
     seen.page.check("#picture-names")
-    texts = "document.getElementById('picture').data.findLast((one) => one.name === 'described').text"
-    seen.wait(f"{texts}?.length === 49")
+    seen.wait("document.getElementById('picture').data.find((one) => one.name === 'names').x.length === 49")
     script = """async () => {
         const { placed, projected } = await import('./dataset/labels.js');
         const node = document.getElementById('picture'), { scene } = node.layout;
@@ -189,15 +188,16 @@ def _check_names(seen: Seen) -> None:
         const points = Array.from(one.x, (x, k) => [x, one.y[k], one.z[k]]);
         const places = projected(points, scene.camera, { ranges, ratio, height: node.clientHeight });
         const found = placed(one.customdata, places);
-        return [found.map((each) => each.name), found.map((each) => each.box), Array.from(one.text), places];
+        const names = node.data.find((each) => each.name === 'names');
+        const shown = names.text.filter((_, m) => names.textfont.color[m] !== 'rgba(0,0,0,0)');
+        return [found.map((each) => each.name), found.map((each) => each.box), Array.from(shown), places];
     }"""
     written = {}
     for view in ("oblique", "above"):
         seen.page.select_option("#picture-view", view)
         seen.wait(f"document.getElementById('picture').layout.scene.uirevision === '{view}'")
-        names, boxes, texts_now, places = seen.page.evaluate(script)
-        assert texts_now == names
-        shown = [box for box in boxes if box]
+        names, shown, texts, places = seen.page.evaluate(script)
+        assert texts == names
         assert all(
             one[2] <= other[0] or other[2] <= one[0] or one[3] <= other[1] or other[3] <= one[1]
             for k, one in enumerate(shown)
@@ -205,7 +205,7 @@ def _check_names(seen: Seen) -> None:
         )
         spread = [max(place[k] for place in places) - min(place[k] for place in places) for k in (0, 1)]
         assert 100 < max(spread) < seen.page.evaluate("document.getElementById('picture').clientWidth")
-        written[view] = [name for name in names if name]
+        written[view] = names
     assert 15 < len(written["oblique"]) < 49
     assert len(written["above"]) > len(written["oblique"]), "seen from above, the markers are farther apart"
 
