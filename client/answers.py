@@ -109,11 +109,15 @@ class RecordingInfo(TypedDict):
 
 
 class QuantityInfo(TypedDict):
-    """A channel, input or setting of a rig of the user's own; ``unit`` is "1" if it has none."""
+    """A channel, input or setting of a rig of the user's own; ``unit`` is "1" if it has none.
+
+    ``place``: where a channel is measured, if the dataset states it.
+    """
 
     name: str
     unit: str
     description: str
+    place: NotRequired[str]
 
 
 class RigInfo(TypedDict):

@@ -12,8 +12,10 @@ from typing import Any
 
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
+from python_multipart.exceptions import FormParserError
 from sqlalchemy.exc import OperationalError
 from starlette.exceptions import HTTPException
+from starlette.formparsers import MultiPartException
 from starlette.responses import Response
 
 from wingfit.service.storage import disk_space
@@ -24,6 +26,7 @@ LONGEST_VALUE = 200
 KINDS = {413: "too-large", 422: "invalid"}
 # Seconds after which to repeat the request, by the kind of problems that end by themselves.
 RETRY_AFTER = {"busy": 5, "not-ready": 5, "stopping": 5, "disk-full": 30}
+LONG_HEADER = "Maximum header size exceeded"  # what the parser of forms says
 LOG = logging.getLogger("wingfit.http")
 
 ErrorItem = dict[str, Any]
@@ -111,7 +114,17 @@ async def _on_http(request: Request, error: Exception) -> Response:
     if detail := disk_space.while_spooling(error.__cause__):
         return _without_room(request, error.__cause__, detail)
     kind = KINDS.get(error.status_code) or HTTPStatus(error.status_code).phrase.lower().replace(" ", "-")
-    return response(ProblemError(error.status_code, kind, str(error.detail)), error.headers)
+    return response(ProblemError(error.status_code, kind, _broken_form(error) or str(error.detail)), error.headers)
+
+
+def _broken_form(error: HTTPException) -> str | None:
+    """Say what is wrong with a form that cannot be parsed, and what to do; None if ``error`` has another cause."""
+    fault = error.__context__.__cause__ if isinstance(error.__context__, MultiPartException) else None
+    if not isinstance(fault, FormParserError):
+        return None
+    if str(fault) == LONG_HEADER:
+        return "the name of a file or field of the form is too long: at most 4 kB; shorten the name"
+    return f"the form cannot be read as multipart/form-data: {fault}; send it as 'curl -F file=@PATH' does"
 
 
 async def _on_validation(_: Request, error: Exception) -> Response:

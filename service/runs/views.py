@@ -14,7 +14,7 @@ from wingfit.checks import Mistake
 from wingfit.client import answers as a
 from wingfit.client.answers import Comparison, Numerics
 from wingfit.client.recorded.answers import SeriesValues
-from wingfit.records import AnyDataset, Recording, Series, SeriesDataset
+from wingfit.records import AnyDataset, Channel, Recording, Series, SeriesDataset
 from wingfit.records.array_types import Array, Mask
 from wingfit.service.answers import answer, checked
 from wingfit.service.datasets.gaps import missing
@@ -112,10 +112,15 @@ def rig_info(loaded: AnyDataset) -> a.RigInfo | None:
         return None
     return {
         "name": loaded.rig,
-        "channels": [{"name": one.name, "unit": one.unit, "description": one.description} for one in loaded.channels],
+        "channels": [_channel(one) for one in loaded.channels],
         "inputs": [{"name": one.name, "unit": one.unit, "description": one.description} for one in loaded.inputs],
         "settings": [{"name": one.name, "unit": one.unit, "description": one.description} for one in loaded.settings],
     }
+
+
+def _channel(one: Channel) -> a.QuantityInfo:
+    found: a.QuantityInfo = {"name": one.name, "unit": one.unit, "description": one.description}
+    return found | {"place": one.place} if one.place else found
 
 
 def recordings(loaded: AnyDataset) -> list[a.RecordingInfo]:

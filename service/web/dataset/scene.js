@@ -2,6 +2,7 @@
 
 import { plain } from "../base/format.js";
 import { draw } from "../base/plots.js";
+import { placed, projected } from "./labels.js";
 
 const AXES = ["x aft", "y outboard", "z up"];
 const ARROW = 0.3; // of the span
@@ -70,10 +71,17 @@ function scene(look, node, { wing, tracks, parts, frame, turned, names, view }) 
   // At rest, the stroke itself makes the distances long.
   const far = (pair) => turned && Math.hypot(...pair[0].map((value, k) => value - pair[1][k])) > FAR * wing.span_mm;
   const points = (name, labels, list, marker, extra = {}) => ({
-    type: "scatter3d", mode: names ? "markers+text" : "markers", name, ...coordinates(list), marker, text: labels.map(plain), textposition: "top center",
-    textfont: { size: 10, color: marker.color }, hovertemplate: `%{text}<br>x %{x:.1f}, y %{y:.1f}, z %{z:.1f} mm<extra>${name}</extra>`, ...extra,
+    type: "scatter3d", mode: "markers", name, ...coordinates(list), marker, customdata: labels.map(plain), hovertemplate: `%{customdata}<br>x %{x:.1f}, y %{y:.1f}, z %{z:.1f} mm<extra>${name}</extra>`, ...extra,
   });
   const described = look.series[1];
+  const lengths = parts.ranges.map(([low, high]) => high - low);
+  // One scale, as large as the chart allows: its height sets the scale, so a narrow chart needs a smaller box.
+  const zoom = Math.min(1.9, (1.6 * node.clientWidth) / node.clientHeight) / Math.max(...lengths);
+  const ratio = lengths.map((length) => length * zoom);
+  const places = wing.markers.map((one) => turn(one.position_mm));
+  // The user may have turned the picture.
+  const camera = node.layout?.scene?.uirevision === view ? node.layout.scene.camera : CAMERAS[view];
+  const written = new Map(names ? placed(wing.markers.map((one) => one.name), projected(places, camera, { ranges: parts.ranges, ratio, height: node.clientHeight })).map((one) => [one.index, one]) : []);
   const outline = wing.outline_mm.map(turn);
   const tips = parts.arrows.map((arrow) => arrow[1]);
   const { fan } = parts;
@@ -87,21 +95,22 @@ function scene(look, node, { wing, tracks, parts, frame, turned, names, view }) 
     line("hinge axis", [parts.hinge], look.ink, 4, { line: { color: look.ink, width: 4, dash: "dash" } }),
     line("distance", pairs.filter((pair) => !far(pair)), described, 2),
     line("far", pairs.filter(far), look.bad, 5),
-    points("described", wing.markers.map((one) => one.name), wing.markers.map((one) => turn(one.position_mm)),
-      { size: 5, color: described, symbol: "circle-open", line: { width: 1, color: described } }, { showlegend: true }),
-    points("recorded", tracks.markers, recorded, { size: 3.5, color: look.ink }, { mode: "markers", showlegend: true }),
+    points("described", wing.markers.map((one) => one.name), places, { size: 5, color: described, symbol: "circle-open", line: { width: 1, color: described } },
+      { showlegend: true }),
+    points("recorded", tracks.markers, recorded, { size: 3.5, color: look.ink }, { showlegend: true }),
+    // Those without room are transparent: Plotly draws names that come later too small.
+    { type: "scatter3d", mode: "text", name: "names", ...coordinates(names ? places : []), text: wing.markers.map((one) => plain(one.name)), hoverinfo: "skip", showlegend: false,
+      textposition: wing.markers.map((_, m) => written.get(m)?.side ?? "top center"),
+      textfont: { size: 10, color: wing.markers.map((_, m) => (written.has(m) ? described : "rgba(0,0,0,0)")) } },
     line("axes", parts.arrows, look.accent, 6),
     { type: "scatter3d", mode: "text", name: "labels", ...coordinates([...tips, parts.hinge[0], fan.at(-1)]), text: [...AXES, "hinge axis", "stroke plane"], hoverinfo: "skip",
       showlegend: false, textfont: { size: 12, color: [look.accent, look.accent, look.accent, look.ink, look.series[2]] }, textposition: "top center" },
   ];
-  const lengths = parts.ranges.map(([low, high]) => high - low);
-  // One scale, as large as the chart allows: its height sets the scale, so a narrow chart needs a smaller box.
-  const zoom = Math.min(1.9, (1.6 * node.clientWidth) / node.clientHeight) / Math.max(...lengths);
   const box = (k) => ({
     title: { text: `${"xyz"[k]}, mm`, font: { size: 11 } }, range: parts.ranges[k], gridcolor: look.line, zeroline: false, showbackground: false,
     color: look.quiet, nticks: 5, tickfont: { size: 10 },
   });
-  const [x, y, z] = lengths.map((length) => length * zoom);
+  const [x, y, z] = ratio;
   return {
     traces, margin: { l: 0, r: 0, t: 24, b: 0 }, showlegend: true, uirevision: view,
     legend: { orientation: "h", x: 0, y: 1.02, yanchor: "bottom", itemsizing: "constant", font: { color: look.ink } },

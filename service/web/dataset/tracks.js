@@ -17,6 +17,7 @@ let tracks = null;
 let parts = null;
 let timer = null;
 let request = 0;
+let turnable = false; // whether turning the picture places the names anew
 let onNoise = () => {};
 
 export function setUpTracks(hooks) {
@@ -123,6 +124,8 @@ async function drawPicture() {
   $("picture-phase").setAttribute("aria-valuetext", `phase ${text} of the beat`);
   const shown = { wing, tracks, parts, frame, turned: $("picture-described").value === "turned", names: $("picture-names").checked, view: $("picture-view").value };
   await drawScene($("picture"), shown).catch((error) => toast(error.message));
+  if (!turnable) $("picture").on?.("plotly_relayout", () => $("picture-names").checked && !timer && drawPicture()); // names have room elsewhere
+  turnable = true;
 }
 
 function play() {

@@ -7,6 +7,13 @@ import { stored } from "../parts/warnings.js";
 
 const DESCRIPTION = "dataset.yaml";
 const OF_DATASET = /\.(ya?ml|csv)$/i;
+const OF_TRACKS = /\.(csv|tsv|txt|c3d|trc|h5|hdf5|slp)$/i; // read by the page Import, and never a dataset
+
+class TracksError extends Error {
+  constructor() {
+    super("a file of one recording, not a dataset.");
+  }
+}
 
 let queue = []; // {name, file or files, item}
 let sending = false;
@@ -67,12 +74,16 @@ function show(one, text, fraction = null) {
   one.item.replaceChildren(el("span", {}, text), ...(bar ? [bar] : []));
 }
 
+// What to do with a file of one recording.
+const remedies = () => [" Of marker tracks: ", el("a", { href: "#import" }, "import it"), ". Of forces of a balance: ", el("code", {}, "wingfit import-forces"),
+  ". A recording in the form of wingfit: choose the folder with its dataset.yaml."];
+
 // An error stays until it is dismissed.
 function refuse(one, error) {
   one.item.className = "error";
   one.item.setAttribute("role", "alert");
   const errors = error.errors ?? [];
-  one.item.replaceChildren(el("span", {}, el("strong", {}, one.name), `: ${error.message}`),
+  one.item.replaceChildren(el("span", {}, el("strong", {}, one.name), `: ${error.message}`, ...(error instanceof TracksError ? remedies() : [])),
     el("button", { type: "button", ariaLabel: `Dismiss the message about ${one.name}`, onclick: () => {
       one.item.remove();
       $("pick-file").focus();
@@ -86,6 +97,7 @@ async function next() {
   if (!one) return;
   try {
     show(one, `Reading ${one.name}`);
+    if (one.file && OF_TRACKS.test(one.name)) throw new TracksError();
     const file = one.file ?? await archive(one);
     const dataset = await send(file, (fraction) => show(one, fraction < 1 ? `Uploading ${one.name}, ${size(file.size)}, ${Math.round(100 * fraction)} %` : `Checking ${one.name}`, fraction));
     toast(stored("Uploaded", dataset));

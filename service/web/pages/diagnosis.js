@@ -1,6 +1,7 @@
 // The selected diagnosis: its progress, then its report as the server draws it.
 
 import { follow, get, getText, isFinal, part } from "../base/api.js";
+import { copy } from "../base/copying.js";
 import { $, plural, toast, when } from "../base/format.js";
 import { redrawPartial, showPartial } from "../diagnosing/partial.js";
 import { showNotes } from "../lists/edit.js";
@@ -8,6 +9,8 @@ import { showWaiting } from "../parts/driving.js";
 import { badge, setBar, timeLeft } from "../parts/sidebar.js";
 import { cancel, remove } from "./submit.js";
 import { fitBadge, forceSetup, isForces, modelInWords, withEffects } from "../base/labels.js";
+
+const MOST_IN_NAME = 60; // characters of the name of a file
 
 let diagnosis = null;
 let stopFollowing = () => {};
@@ -20,6 +23,8 @@ export function setUpDiagnosis(given) {
     const action = event.target.dataset?.action;
     if (action) act(action);
   });
+  $("finding-print").addEventListener("click", () => window.print());
+  $("finding-link").addEventListener("click", () => copy(location.href));
 }
 
 export const redrawDiagnosis = () => redrawPartial();
@@ -83,8 +88,9 @@ function update() {
   $("diagnosis-progress").textContent = [done ? null : `${Math.round(100 * diagnosis.progress)} %`, timeLeft(diagnosis),
     diagnosis.state === "RUNNING" ? diagnosis.stage : null,
     plural(diagnosis.evaluations, "evaluation")].filter(Boolean).join(" · ");
-  for (const id of ["report-link", "finding-exports"]) $(id).hidden = !done;
-  $("report-link").href = `${path}/report`;
+  for (const id of ["report-link", "finding-exports", "finding-print", "finding-link"]) $(id).hidden = !done;
+  for (const id of ["report-link", "finding-html"]) $(id).href = `${path}/report`;
+  $("finding-html").download = `${diagnosis.name.replace(/[^\p{L}\p{N}_]+/gu, "-").slice(0, MOST_IN_NAME).replace(/^-|-$/g, "") || "finding"}.html`;
   for (const format of ["csv", "netcdf", "json"]) $(`finding-${format}`).href = `${path}/export?format=${format}`;
   if (done && !fetched) fetchReport();
   for (const button of $("diagnosis-actions").querySelectorAll("[data-action]")) {

@@ -3,6 +3,8 @@
 import { $, plain, plural, toast } from "../base/format.js";
 import { axis, draw, residualLine, withResidual } from "../base/plots.js";
 
+const GAP = 1.9; // usual steps: a longer one is a gap
+
 let curves = [];
 
 export function setUpCurves() {
@@ -25,7 +27,16 @@ export function redrawCurves() {
   const thinned = curve.stride > 1 ? ` One in ${curve.stride} of the samples is shown.` : "";
   const missing = curve.best ? "" : " The best genome cannot be simulated.";
   $("curves-note").textContent = `The ${plural(curves.length, "channel")} with the largest misfit, worst first.${thinned}${missing}`;
-  draw($("curve-plot"), (look) => chart(look, curve)).catch((error) => toast(error.message));
+  draw($("curve-plot"), (look) => chart(look, broken(curve))).catch((error) => toast(error.message));
+}
+
+// The curve with a break wherever a step over time is much longer than usual: samples are missing there.
+function broken({ time_s: time, recorded, nominal, best, ...rest }) {
+  const steps = time.slice(1).map((value, k) => value - time[k]);
+  const usual = [...steps].sort((a, b) => a - b)[Math.floor(steps.length / 2)];
+  const apart = (values) => values?.flatMap((value, k) => (k && steps[k - 1] > GAP * usual ? [null, value] : [value])) ?? null;
+  const at = time.flatMap((value, k) => (k && steps[k - 1] > GAP * usual ? [(value + time[k - 1]) / 2, value] : [value]));
+  return { ...rest, time_s: at, recorded: apart(recorded), nominal: apart(nominal), best: apart(best) };
 }
 
 function chart(look, { unit, time_s: time, recorded, nominal, best }) {

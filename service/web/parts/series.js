@@ -39,7 +39,7 @@ function drawQuantities(rig) {
   const kinds = [["channel", rig.channels], ["input", rig.inputs], ["setting", rig.settings]];
   $("quantities").tBodies[0].replaceChildren(...kinds.flatMap(([kind, those]) => those.map((one) => el("tr", {},
     el("th", { scope: "row" }, one.name), el("td", {}, kind), el("td", {}, one.unit === "1" ? DASH : one.unit),
-    el("td", { className: "prose" }, one.description || DASH)))));
+    el("td", { className: "prose" }, [one.place, one.description].filter(Boolean).join("; ") || DASH)))));
 }
 
 // Head and rows of the table of recordings.

@@ -114,7 +114,7 @@ export function drawSeriesMisfit(result) {
       el("td", {}, unit === "1" ? DASH : unit), el("td", { className: "wide" }, twin(before / top, after / top, noise / top)));
   })));
   const relative = result.relative_to === "noise" ? "the standard deviation of its noise" : "its range, because the noise of some channel is not known";
-  $("series-misfit-note").textContent = "Root mean square of the differences. Grey: nominal genome. Coloured: best genome. Dotted: noise of one sample. "
+  $("series-misfit-note").textContent = "Root mean square of the differences. Grey: nominal genome. Coloured: best genome. Dotted: noise of one sample, from repeats or periods where there are some, else as stated or from the highest frequencies. "
     + `The numbers at the top are relative: each channel is divided by ${relative}.`;
 }
 

@@ -93,6 +93,14 @@ def test_a_broken_form_is_a_problem(api: Api) -> None:
     assert answer.headers["Content-Type"] == "application/problem+json"
 
 
+def test_a_name_that_is_too_long_for_the_form_is_named(api: Api) -> None:
+    answer = api.client.post("/v1/datasets", files={"file": (f"{'a' * 4300}.zip", toy.archive())})
+    assert answer.status_code == 400
+    assert "the name of a file or field of the form is too long: at most 4 kB" in answer.json()["detail"]
+    files = {"file": (f"{'a' * 4000}.zip", toy.archive())}
+    assert api.client.post("/v1/datasets", files=files).status_code == 201
+
+
 def test_what_is_too_large_is_a_413(api: Api, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(request_limits, "UPLOAD_LIMIT", 1000)
     monkeypatch.setattr(request_limits, "FORM_OVERHEAD", 200)

@@ -10,8 +10,11 @@ import numpy as np
 import pytest
 import yaml
 
+import wingfit
 from tests.checks.samples import good_wing
+from tests.records.series_samples import arm_dataset
 from tests.service.conftest import Api
+from tests.service.rigs.test_drive import client_of
 from tests.service.shapes import valid
 from wingfit.checks import CHECKS
 from wingfit.checks.guard import NOT_CARRIED_OUT
@@ -246,6 +249,26 @@ def test_routes_answer_for_their_kind_of_dataset(api: Api, delfly: Dataset) -> N
     ):
         answer = api.client.get(f"{wing}/{query}")
         assert (answer.status_code, answer.json()["errors"][0]["where"]) == (422, f"query.{where}")
+
+
+def test_the_client_fetches_what_was_recorded(api: Api, delfly: Dataset) -> None:
+    wing = api.upload()["id"]
+    vehicle, series = (
+        api.client.post("/v1/datasets", files={"file": ("x.nc", write_netcdf(one))}).json()["id"]
+        for one in (_short(delfly), arm_dataset())
+    )
+    with client_of(api) as client:
+        assert client.described_wing(wing) == api.get(f"/v1/datasets/{wing}/wing")
+        assert client.recorded_tracks(wing, "fast") == api.get(f"/v1/datasets/{wing}/tracks?recording=fast")
+        assert client.recorded_tracks(wing, beat=1) == api.get(f"/v1/datasets/{wing}/tracks?beat=1")
+        assert client.recorded_samples(wing, "fast", marker="b")["marker"] == "b"
+        assert client.recorded_forces(vehicle) == api.get(f"/v1/datasets/{vehicle}/forces")
+        assert client.recorded_series(series, "heavy") == api.get(f"/v1/datasets/{series}/series?recording=heavy")
+        assert client.dataset_checks(series) == api.get(f"/v1/datasets/{series}/checks")
+        with pytest.raises(wingfit.WingfitError, match="has tracks, not forces"):
+            client.recorded_forces(wing)
+        with pytest.raises(wingfit.WingfitError, match="there is no such recording"):
+            client.recorded_tracks(wing, "none")
 
 
 def _short(dataset: Dataset) -> Dataset:

@@ -170,8 +170,44 @@ def test_markers_are_drawn_where_they_were_recorded(browser: Browser, api: Api, 
     seen.page.click("#checks-summary")
     assert seen.page.locator("#checks li").count() == 11
     _check_gaps(seen, api, dataset)
+    _check_names(seen)
     assert (seen.errors, seen.foreign) == ([], [])
     seen.page.context.close()
+
+
+def _check_names(seen: Seen) -> None:
+    """Of 49 names as many are written as there is room for, and none over another; turning makes room for others."""
+    seen.page.check("#picture-names")
+    seen.wait("document.getElementById('picture').data.find((one) => one.name === 'names').x.length === 49")
+    script = """async () => {
+        const { placed, projected } = await import('./dataset/labels.js');
+        const node = document.getElementById('picture'), { scene } = node.layout;
+        const one = node.data.findLast((each) => each.name === 'described');
+        const ranges = ['xaxis', 'yaxis', 'zaxis'].map((name) => scene[name].range);
+        const ratio = ['x', 'y', 'z'].map((name) => scene.aspectratio[name]);
+        const points = Array.from(one.x, (x, k) => [x, one.y[k], one.z[k]]);
+        const places = projected(points, scene.camera, { ranges, ratio, height: node.clientHeight });
+        const found = placed(one.customdata, places);
+        const names = node.data.find((each) => each.name === 'names');
+        const shown = names.text.filter((_, m) => names.textfont.color[m] !== 'rgba(0,0,0,0)');
+        return [found.map((each) => each.name), found.map((each) => each.box), Array.from(shown), places];
+    }"""
+    written = {}
+    for view in ("oblique", "above"):
+        seen.page.select_option("#picture-view", view)
+        seen.wait(f"document.getElementById('picture').layout.scene.uirevision === '{view}'")
+        names, shown, texts, places = seen.page.evaluate(script)
+        assert texts == names
+        assert all(
+            one[2] <= other[0] or other[2] <= one[0] or one[3] <= other[1] or other[3] <= one[1]
+            for k, one in enumerate(shown)
+            for other in shown[:k]
+        )
+        spread = [max(place[k] for place in places) - min(place[k] for place in places) for k in (0, 1)]
+        assert 100 < max(spread) < seen.page.evaluate("document.getElementById('picture').clientWidth")
+        written[view] = names
+    assert 15 < len(written["oblique"]) < 49
+    assert len(written["above"]) > len(written["oblique"]), "seen from above, the markers are farther apart"
 
 
 def _check_gaps(seen: Seen, api: Api, dataset: str) -> None:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
@@ -12,8 +14,14 @@ from tests.service.pages.browsing import Seen
 from tests.service.processes import ServerProcess
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser
+    from playwright.sync_api import Browser, Page
 
+GALLERY = Path(__file__).parents[3] / "docs" / "gallery"
+MOST_SHEETS = 2  # of A4
+PAPER_WIDTH = 733  # of A4 within its margins, in CSS pixels
+CUT = """[...document.querySelectorAll('details > *, table')].filter((node) => !node.offsetHeight
+    || node.getBoundingClientRect().width > document.querySelector('section, h2').getBoundingClientRect().width + 2)
+    .map((node) => [node.tagName, node.textContent.slice(0, 80), node.getBoundingClientRect().width])"""
 TEXT = "document.getElementById('{}').textContent"
 
 
@@ -74,6 +82,13 @@ def test_a_dataset_is_diagnosed_and_the_finding_shown(seen: Seen, server: Server
     assert "hatch" in shown.locator(".legend .faint").first.evaluate(colour)
     levels = shown.locator("h1, h2, h3").evaluate_all("(all) => all.map((one) => one.ariaLevel - one.tagName[1])")
     assert set(levels) == {2}, "headings continue those of the page"
+    with seen.page.expect_download() as download:
+        seen.page.click("#finding-html")
+    assert download.value.suggested_filename == "what-is-missing.html"
+    assert sheets(seen.page) <= MOST_SHEETS, "the page prints its finding, without menu and buttons"
+    seen.page.emulate_media(media="print")
+    assert [seen.page.is_visible(part) for part in (".top", "#finding-print", "#report >> h1")] == [False, False, True]
+    seen.page.emulate_media(media="screen")
     with seen.page.expect_popup() as opened:
         seen.page.click("#report-link")
     report = opened.value
@@ -90,6 +105,21 @@ def test_a_dataset_is_diagnosed_and_the_finding_shown(seen: Seen, server: Server
     seen.wait("document.querySelector('#newest-diagnoses .none') && !document.getElementById('empty').hidden")
     assert seen.errors == []
     assert seen.foreign == []
+
+
+@pytest.mark.parametrize("finding", sorted(GALLERY.glob("*.html")), ids=lambda path: path.stem)
+def test_a_printed_finding_is_complete_on_two_pages(seen: Seen, finding: Path) -> None:
+    page = seen.page
+    page.goto(finding.as_uri())
+    assert sheets(page) <= MOST_SHEETS
+    page.emulate_media(media="print")
+    page.set_viewport_size({"width": PAPER_WIDTH, "height": 1060})
+    assert page.evaluate(CUT) == [], "nothing is folded, and no table reaches into the next column"
+
+
+def sheets(page: Page) -> int:
+    """The number of pages that ``page`` has on paper."""
+    return len(re.findall(rb"/Type\s*/Page\b", page.pdf(prefer_css_page_size=True)))
 
 
 def test_a_run_is_diagnosed_from_its_best_genome_and_cancelled(seen: Seen, server: ServerProcess) -> None:

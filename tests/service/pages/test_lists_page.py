@@ -153,6 +153,25 @@ def test_the_start_page_has_findings_runs_and_datasets_in_view(seen: Seen) -> No
     assert seen.page.is_hidden("aside")
     assert seen.page.is_hidden("#home-steps")
     assert "named" in seen.page.inner_text("#newest-diagnoses .card")
+    seen.page.set_viewport_size({"width": 390, "height": 780})
+    cut = "[...document.querySelectorAll('.lines strong')].filter((node) => node.scrollWidth > node.clientWidth).length"
+    narrow = "Math.min(...[...document.querySelectorAll('.lines strong')].map((node) => node.clientWidth))"
+    assert seen.page.evaluate(cut) == 0, "names are whole on a phone"
+    assert seen.page.evaluate(narrow) > 250, "and have the whole line"
+
+
+def test_a_file_of_tracks_is_sent_to_the_import_page(seen: Seen, tmp_path: Path) -> None:
+    """It is no dataset: the page says what to do with it, instead of sending it to be refused."""
+    tracks = tmp_path / "my robot.csv"
+    tracks.write_text("frame,m1_x,m1_y,m1_z\n0,1,2,3\n")
+    seen.show("")
+    seen.page.set_input_files("#file", tracks)
+    seen.wait(f"{STATE}.includes('not a dataset')")
+    assert "wingfit import-forces" in seen.page.inner_text("#upload-state .error")
+    assert seen.page.get_attribute("#upload .ways a", "href") == "#import"
+    seen.page.click("#upload-state .error a")
+    seen.wait("location.hash === '#import' && !document.getElementById('import-page').hidden")
+    assert seen.errors == [], "nothing was sent"
 
 
 def test_errors_of_uploads_stay_until_they_are_dismissed(seen: Seen, tmp_path: Path) -> None:

@@ -26,7 +26,7 @@ from wingfit.records import Channel, Quantity, Series, SeriesDataset
 from wingfit.records.files.netcdf import write_netcdf
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser
+    from playwright.sync_api import Browser, Route
 
 TEXT = "document.getElementById('{}').textContent"
 REPORT = "document.getElementById('report').shadowRoot.textContent"
@@ -124,7 +124,8 @@ def test_the_dataset_shows_its_recordings_and_their_values(seen: Seen, api: Api)
     seen.page.select_option("#series-recording", "heavy")
     heavy = api.get(f"/v1/datasets/{arm}/series?recording=heavy")["channels"]["angle"]
     seen.wait(f"document.querySelector('#panels .plot')?.data?.[0].y[0] === {heavy[0]}")
-    assert ["angle", "channel", "rad", "of an encoder"] in seen.rows("quantities")
+    assert ["angle", "channel", "rad", "axis; of an encoder"] in seen.rows("quantities")
+    assert ["acceleration", "channel", "m/s^2", "tip"] in seen.rows("quantities")
     assert ["mass", "setting", "kg", "–"] in seen.rows("quantities")
 
 
@@ -233,6 +234,25 @@ def check_curves(seen: Seen, curves: list[dict[str, Any]]) -> None:
         for trace, name in enumerate(("recorded", "nominal", "best")):
             assert seen.data("curve-plot", trace, "y") == pytest.approx(curves[k][name])
     assert "worst first" in seen.page.inner_text("#curves-note")
+
+
+def test_lines_end_where_samples_are_missing(seen: Seen, run: str) -> None:
+    """A straight line over a gap would look like a recorded and simulated motion."""
+
+    def without_a_block(route: Route) -> None:
+        result = route.fetch().json()
+        for curve in result["curves"]:
+            for name in ("time_s", "recorded", "nominal", "best"):
+                curve[name] = curve[name][:10] + curve[name][20:]
+        route.fulfill(json=result)
+
+    seen.page.route("**/result", without_a_block)
+    seen.open(run)
+    seen.wait(DRAWN.format("curve-plot", 4))
+    for trace in range(5):
+        values = seen.data("curve-plot", trace, "y")
+        assert [k for k, value in enumerate(values) if value is None] == [10]
+    assert "as stated" in seen.page.inner_text("#series-misfit-note")
 
 
 def test_a_driven_run_is_followed_to_its_end(seen: Seen, api: Api, decay: str) -> None:
