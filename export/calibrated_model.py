@@ -1,4 +1,4 @@
-"""A calibrated model, complete: what a simulation needs, values with their covariance, where they hold, whence they come.
+"""A calibrated model: what a simulation needs, values with their covariance, where they hold, and where they come from.
 
 SI units, angles in rad, as in :mod:`wingfit.records`.
 """
@@ -6,81 +6,23 @@ SI units, angles in rad, as in :mod:`wingfit.records`.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Literal
 
 from wingfit.calibration.spec import CalibrationSpec, vehicle_model, wing_model
+from wingfit.export.runtime.parts import CONDITION_UNITS as CONDITION_UNITS
+from wingfit.export.runtime.parts import Calibrated
+from wingfit.export.runtime.parts import Covariance as Covariance
+from wingfit.export.runtime.parts import FittedRange as FittedRange
+from wingfit.export.runtime.parts import FittedRecording as FittedRecording
+from wingfit.export.runtime.parts import Parameter as Parameter
+from wingfit.export.runtime.parts import Provenance as Provenance
 from wingfit.records import Condition, Dataset, Vehicle, Wing
 from wingfit.records.dataset import AnyKind
 from wingfit.sim.vehicle.blade_element_wing import BladeElementWing
 from wingfit.sim.wing.flexible_wing import FlexibleWing
 
 SCHEMA = "urn:wingfit:schema:calibrated-model:1"
-Origin = Literal["run", "diagnosis"]
-# Fields of a condition, in which a model holds within the range of its recordings, with their units.
-CONDITION_UNITS: Mapping[str, str] = {
-    "flap_frequency": "Hz", "phase_lag": "rad", "pressure": "Pa", "temperature": "K", "airspeed": "m/s",
-    "angle_of_attack": "rad", "gravity": "m/s^2",
-}  # fmt: skip
-
-
-@dataclass(frozen=True)
-class Parameter:
-    """A gene of the model under a condition: value + per_hz f + per_rad theta, limited to [lower, upper], in ``unit``.
-
-    f is the flap frequency (Hz), theta the angle of attack or body pitch (rad); both slopes are 0 unless the model is
-    the global one of a vehicle (Armanini et al. 2016, Eq. 23). ``estimated``: whether recordings determined it.
-    ``scatter``: standard deviation of the values under single conditions about this law, beyond their own errors.
-    """
-
-    name: str
-    unit: str
-    description: str
-    value: float
-    lower: float
-    upper: float
-    estimated: bool
-    per_hz: float = 0.0
-    per_rad: float = 0.0
-    scatter: float = 0.0
-
-    def at(self, condition: Condition) -> float:
-        """Return the value under ``condition``, within the bounds."""
-        law = self.value + self.per_hz * condition.flap_frequency + self.per_rad * condition.angle_of_attack
-        return min(max(law, self.lower), self.upper)
-
-
-@dataclass(frozen=True)
-class Covariance:
-    """Covariance [F, F] of the estimates called ``names``: a parameter "C_l", or its slopes "C_l.per_hz", "C_l.per_rad".
-
-    The unit of an entry is the product of the units of both estimates.
-    """
-
-    names: tuple[str, ...]
-    matrix: tuple[tuple[float, ...], ...]
-
-
-@dataclass(frozen=True)
-class FittedRange:
-    """From ``low`` to ``high``, in ``unit``, the fitted recordings span the field ``name`` of their conditions.
-
-    ``name`` is one of :data:`CONDITION_UNITS` or, of any other rig, the name of a setting.
-    """
-
-    name: str
-    unit: str
-    low: float
-    high: float
-
-
-@dataclass(frozen=True)
-class FittedRecording:
-    """One recording to which the model was fitted; ``condition`` is None, with ``settings``, for any other rig."""
-
-    name: str
-    condition: Condition | None
-    settings: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -97,31 +39,6 @@ class AnyRig:
     version: str
     channels: Mapping[str, str]
     settings: Mapping[str, str]
-
-
-@dataclass(frozen=True)
-class Provenance:
-    """Where a model comes from.
-
-    Attributes:
-        origin: "run" or "diagnosis", with its ``id`` and ``name``.
-        dataset: name of the dataset, with the SHA-256 ``dataset_sha256`` of the uploaded file ("" if unknown).
-        wingfit_version: of the program that writes the model; ``commit``: of its source, "" if unknown.
-        seed: of the random generators of the calibration.
-        created_at: date and time of the export (RFC 3339, UTC).
-        source: what the values are, such as "global model of 8 recordings".
-    """
-
-    origin: Origin
-    id: str
-    name: str
-    dataset: str
-    dataset_sha256: str
-    wingfit_version: str
-    commit: str
-    seed: int
-    created_at: str
-    source: str
 
 
 @dataclass(frozen=True)
@@ -189,6 +106,14 @@ class CalibratedModel:
         if not known:
             raise ValueError(f"rig {self.rig.name!r} has settings instead of conditions of flapping")
         return Condition(**{name: sum(getattr(one, name) for one in known) / len(known) for name in CONDITION_UNITS})
+
+    @property
+    def calibrated(self) -> Calibrated:
+        """The parts that a copy of the simulation carries."""
+        return Calibrated(
+            self.rig.name, self.parameters, self.covariance, self.ranges, self.recordings, self.provenance,
+            self.misfit, self.noise, self.misfit_unit, self.remarks,
+        )  # fmt: skip
 
     def simulation(self) -> FlexibleWing | BladeElementWing:
         """Return wingfit's own simulation of the model, with the same order of genes; ValueError for any other rig."""
