@@ -10,13 +10,11 @@ import numpy as np
 
 from benchmarks.export.models import calibrated_vehicle, calibrated_wing
 from wingfit.calibration.spec import CalibrationSpec
-from wingfit.export.calibrated_model import CalibratedModel
+from wingfit.export.predict import predictor
 from wingfit.export.runtime.conditions import shown
-from wingfit.export.runtime.vehicle import VehicleModel
-from wingfit.export.runtime.wing import INSTANTS, WingModel
+from wingfit.export.runtime.wing import INSTANTS
 from wingfit.records import Dataset, Recording
 from wingfit.records.array_types import Array
-from wingfit.sim.vehicle.blade_element_wing import BladeElementWing
 from wingfit.sim.virtual_rigs import balance, campaign
 from wingfit.sim.wing.flexible_wing import FlexibleWing
 
@@ -52,17 +50,17 @@ def vehicles(campaigns: int, seed: int) -> Iterator[Coverage]:
         ]
         fitted = [one for one in trials if one.name not in PREDICTED]
         data = balance.campaign(seed * 1000 + k, balance.EXAMPLE, fitted)
-        model = simulated(calibrated_vehicle(data))
+        model = predictor(calibrated_vehicle(data))
         inside = []
         for one in (trial for trial in trials if trial.name in PREDICTED):
             given: dict[str, Any] = shown(one.condition)
             found, truth = model.forces(**given), balance.true_beat(balance.delfly(), one)
-            every = found.force_n.shape[0] // 8
+            every = len(found.time_s) // 8
             low, high = found.interval()
             there = truth[:: len(truth) // 8, 0]
             inside += ((low[::every, 0] <= there) & (there <= high[::every, 0])).tolist()
-            ends = found.mean_interval()
-            inside.append(bool(ends[0][0] <= truth[:, 0].mean() <= ends[1][0]))
+            means = found.means()
+            inside.append(bool(means["mean_force_x_low_n"] <= truth[:, 0].mean() <= means["mean_force_x_high_n"]))
         yield Coverage(len(inside), int(np.sum(inside)))
 
 
@@ -74,11 +72,11 @@ def wings(campaigns: int, seed: int) -> Iterator[Coverage]:
     for k in range(campaigns):
         data, truth = campaign.campaign(division=WING.division, small=True, seed=seed * 1000 + k)
         fixed = {name: value for name, value in truth.as_dict().items() if name not in WING.genes}
-        model = wing_of(calibrated_wing(data, replace(WING, fixed=fixed)))
+        model = predictor(calibrated_wing(data, replace(WING, fixed=fixed)))
         inside = list[bool]()
         for recording in _inside(data):
             given: dict[str, Any] = shown(recording.condition)
-            found = model.motion(**given)
+            found = model.forces(**given)
             own = FlexibleWing(data.wing, WING.division, numerics=campaign.REFERENCE)
             there = _resampled(own.beat(truth.values, recording).tracks)
             low, high = found.interval()
@@ -86,24 +84,6 @@ def wings(campaigns: int, seed: int) -> Iterator[Coverage]:
             within = (low <= there) & (there <= high)
             inside += within[::every, :, 2].ravel().tolist()
         yield Coverage(len(inside), int(np.sum(inside)))
-
-
-def simulated(model: CalibratedModel) -> VehicleModel:
-    """Return the model of a vehicle as the exported file has it, in this process."""
-    own = model.simulation()
-    if not isinstance(own, BladeElementWing):
-        raise TypeError("not a vehicle")
-    return VehicleModel(
-        own.vehicle, own.terms, own.elements, own.instants, own.peel_width, own.effects, model.calibrated
-    )
-
-
-def wing_of(model: CalibratedModel) -> WingModel:
-    """Return the model of a wing as the exported package has it, in this process."""
-    settings = model.settings
-    return WingModel(
-        model.wing, settings.division, settings.bounds_factor, settings.accuracy, settings.effects, model.calibrated
-    )
 
 
 def _inside(data: Dataset) -> list[Recording]:

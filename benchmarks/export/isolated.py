@@ -45,9 +45,8 @@ def run(code: str, *places: Path, cache: Path) -> Any:
     """
     text = PREAMBLE.format(places=[str(one) for one in places]) + code
     own = {"PATH": os.environ.get("PATH", ""), "NUMBA_CACHE_DIR": str(cache), "OPENBLAS_NUM_THREADS": "1"}
-    done = subprocess.run(
-        [sys.executable, "-I", "-S", "-c", text], capture_output=True, text=True, env=own, check=False
-    )
+    command = [sys.executable, "-I", "-S", "-c", text]
+    done = subprocess.run(command, capture_output=True, text=True, env=own, check=False)  # noqa: S603  (fixed text)
     if done.returncode:
         raise RuntimeError(f"the exported model fails:\n{done.stdout}{done.stderr}")
     return json.loads(done.stdout.splitlines()[-1])
