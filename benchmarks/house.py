@@ -24,7 +24,7 @@ from typing import Any, NamedTuple
 ROOT = Path(__file__).parents[1]
 PARTS = (
     "records", "importers", "tracking", "cameras", "sim", "inference", "calibration", "diagnosis", "report", "plot",
-    "workers", "service", "client", "cli",
+    "export", "workers", "service", "client", "cli",
 )  # fmt: skip
 PRODUCT = (*PARTS, "wingfit")
 CODE = (*PRODUCT, "benchmarks", "docs", "examples", "tests")

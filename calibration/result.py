@@ -9,7 +9,7 @@ import numpy as np
 
 from wingfit.calibration.effects import absent
 from wingfit.calibration.estimates.drift_remark import drift_remark
-from wingfit.calibration.estimates.uncertainty import Standing, standing
+from wingfit.calibration.estimates.uncertainty import GeneCovariance, Standing, standing
 from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.preparation import Stage, prepare
 from wingfit.calibration.problem import Problem, base_genome
@@ -83,6 +83,7 @@ class Result:
     ``before`` and ``after`` are the mean distances of the nominal and of the best genome on the fitted recordings,
     ``held_out_before`` and ``held_out_after`` on the held-out ones (None without any). ``noise`` is the mean distance
     by tracking noise alone, from the scatter between beats, None if unknown. ``remarks`` are warnings about the result.
+    ``covariance`` is that of the genes whose standard errors are known; those of different stages are independent.
     """
 
     genes: tuple[GeneResult, ...]
@@ -93,6 +94,7 @@ class Result:
     held_out_after: float | None
     noise: float | None
     remarks: tuple[str, ...] = ()
+    covariance: GeneCovariance | None = None
 
 
 @dataclass(frozen=True)
@@ -161,8 +163,9 @@ def judge(spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, genome:
         )
     remarks += drift
     remarks += absent(best.as_dict(), ready.searched)
+    known, covariance = _errors(model, stages, best, evaluator)
     return Result(
-        genes=_genes(model, stages, nominal, best, evaluator, adequate),
+        genes=gene_results(known, nominal, best, adequate),
         recordings=recordings,
         before=_mean(fitted, "before"),
         after=after,
@@ -170,6 +173,7 @@ def judge(spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, genome:
         held_out_after=_mean(held_out, "after") if held_out else None,
         noise=noise,
         remarks=tuple(remarks),
+        covariance=covariance,
     )
 
 
@@ -188,18 +192,16 @@ def compare(spec: CalibrationSpec, dataset: Dataset, genome: Mapping[str, float]
     )
 
 
-def _genes(
-    model: FlexibleWing,
-    stages: tuple[Stage, ...],
-    nominal: Genome,
-    best: Genome,
-    evaluator: Evaluator,
-    adequate: bool,
-) -> tuple[GeneResult, ...]:
-    known: dict[str, Standing] = {}
+def _errors(
+    model: FlexibleWing, stages: tuple[Stage, ...], best: Genome, evaluator: Evaluator
+) -> tuple[dict[str, Standing], GeneCovariance | None]:
+    """Return the standard errors of the genes that any of ``stages`` searched, by name, and their covariance."""
+    known, parts = dict[str, Standing](), list[GeneCovariance]()
     for stage in stages:
-        known |= standing(Problem(model, stage.recordings, stage.free, best), evaluator)
-    return gene_results(known, nominal, best, adequate)
+        errors, part = standing(Problem(model, stage.recordings, stage.free, best), evaluator)
+        known |= errors
+        parts += [part] if part else []
+    return known, GeneCovariance.of_independent(parts)
 
 
 def gene_results(

@@ -329,11 +329,19 @@ class RecordingResult(TypedDict):
     after_mm: float | None
 
 
+class GeneCovariance(TypedDict):
+    """Covariance [F][F] of the estimates of the genes called ``names``; an entry has the product of both units."""
+
+    names: list[str]
+    matrix: list[list[float]]
+
+
 class Result(TypedDict):
     """Result of a calibration on tracks: mean distance between simulated and recorded markers, and the genes.
 
     ``before_mm`` (nominal genome) and ``after_mm`` (best genome) are means over the fitted recordings, weighted by the
-    number of samples. ``noise_mm`` is the mean distance that tracking noise alone would cause.
+    number of samples. ``noise_mm`` is the mean distance that tracking noise alone would cause. ``covariance`` is that
+    of the genes whose standard errors are known; results of earlier versions have none.
     """
 
     kind: Literal["tracks"]
@@ -345,6 +353,7 @@ class Result(TypedDict):
     remarks: list[str]
     recordings: list[RecordingResult]
     genes: list[GeneInfo]
+    covariance: NotRequired[GeneCovariance | None]
 
 
 class Numerics(TypedDict):

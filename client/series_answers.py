@@ -6,7 +6,7 @@ from typing import Literal, NotRequired
 
 from typing_extensions import TypedDict
 
-from wingfit.client.answers import GeneInfo
+from wingfit.client.answers import GeneCovariance, GeneInfo
 
 
 class ChannelResult(TypedDict):
@@ -56,8 +56,8 @@ class SeriesResult(TypedDict):
 
     ``before`` (nominal genome) and ``after`` (best genome) are root mean squares over the fitted recordings, in each
     channel divided by the standard deviation of its noise or, where that is not known of all, by its range
-    (``relative_to``). ``curves`` are those of the channels that fit worst, that with the largest misfit first; results
-    of earlier versions have none.
+    (``relative_to``). ``curves`` are those of the channels that fit worst, that with the largest misfit first.
+    ``covariance`` is that of the genes whose standard errors are known. Results of earlier versions have neither.
     """
 
     kind: Literal["series"]
@@ -70,3 +70,4 @@ class SeriesResult(TypedDict):
     recordings: list[SeriesRecordingResult]
     genes: list[GeneInfo]
     curves: NotRequired[list[Curve]]
+    covariance: NotRequired[GeneCovariance | None]

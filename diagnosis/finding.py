@@ -11,6 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal
 
+from wingfit.diagnosis.evidence.fitted_model import FittedModel
 from wingfit.records.array_types import Array, Float
 from wingfit.records.dataset import AnyKind
 
@@ -352,6 +353,7 @@ class Finding:
         remarks: everything else that a reader must know.
         seconds, evaluations: computing time, and number of individuals simulated.
         versions: of the packages that the numbers depend on.
+        fitted: refitted hypotheses as models, that with ``added_effects`` first; empty in findings of before.
     """
 
     dataset: str
@@ -383,6 +385,7 @@ class Finding:
     seconds: float = 0.0
     evaluations: int = 0
     versions: dict[str, str] = field(default_factory=dict)
+    fitted: tuple[FittedModel, ...] = ()
 
 
 def amount(value: float, unit: str) -> str:

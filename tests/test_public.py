@@ -92,6 +92,7 @@ def test_the_wheel_holds_one_package() -> None:
         "cli",
         "client",
         "diagnosis",
+        "export",
         "importers",
         "plot",
         "records",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -43,6 +44,26 @@ class Standing:
 
 
 @dataclass(frozen=True)
+class GeneCovariance:
+    """Covariance [F][F] of the estimates of F genes called ``names``; an entry has the product of both units."""
+
+    names: tuple[str, ...]
+    matrix: tuple[tuple[float, ...], ...]
+
+    @classmethod
+    def of_independent(cls, parts: Sequence[GeneCovariance]) -> GeneCovariance | None:
+        """Return the covariance of all genes of ``parts``, which were estimated from different data; None if none."""
+        names = tuple(name for part in parts for name in part.names)
+        if not names:
+            return None
+        whole, start = np.zeros((len(names), len(names))), 0
+        for part in parts:
+            own = slice(start, start + len(part.names))
+            whole[own, own], start = part.matrix, own.stop
+        return cls(names, tuple(tuple(row) for row in whole.tolist()))
+
+
+@dataclass(frozen=True)
 class Uncertainty:
     """Covariance of an estimate.
 
@@ -81,6 +102,13 @@ class Uncertainty:
         return np.asarray(self.covariance / scale / scale[:, None])
 
     @property
+    def of_known(self) -> GeneCovariance:
+        """The covariance without the genes that are not ``known``."""
+        (known,) = np.nonzero(self.known)
+        part = self.covariance[np.ix_(known, known)]
+        return GeneCovariance(tuple(self.free[k] for k in known), tuple(tuple(row) for row in part.tolist()))
+
+    @property
     def standing(self) -> dict[str, Standing]:
         """Standard errors of each free gene, by name, and whether the gene is identifiable."""
         errors = np.where(self.known, np.sqrt(np.diag(self.relative)), np.inf)
@@ -91,16 +119,19 @@ class Uncertainty:
 
 
 @one_blas_thread
-def standing(problem: Problem, evaluator: Evaluator) -> dict[str, Standing]:
-    """Return the standard errors of each free gene, by name, at the base genome; infinite if it cannot be simulated.
+def standing(problem: Problem, evaluator: Evaluator) -> tuple[dict[str, Standing], GeneCovariance | None]:
+    """Return the standard errors of each free gene, by name, at the base genome, and the covariance of the known ones.
+
+    Errors are infinite, and there is no covariance, if the genome cannot be simulated.
 
     For every displaced genome, the start of the simulated beat is aligned anew with each recording of tracks, so the
     errors include the uncertainty of this start.
     """
     try:
-        return uncertainty(problem, evaluator).standing
+        found = uncertainty(problem, evaluator)
     except ValueError:
-        return {name: Standing(np.inf, False, np.inf) for name in problem.free}
+        return {name: Standing(np.inf, False, np.inf) for name in problem.free}, None
+    return found.standing, found.of_known
 
 
 @one_blas_thread

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from wingfit.calibration.estimates.uncertainty import GeneCovariance
 from wingfit.calibration.result import GeneResult
 
 RelativeTo = Literal["noise", "range"]
@@ -83,6 +84,7 @@ class SeriesResult:
         held_out_after: the same of the best genome.
         remarks: warnings about the result.
         curves: values over time of the channels that fit worst (:mod:`wingfit.calibration.series.curves`).
+        covariance: of the genes whose standard errors are known.
     """
 
     genes: tuple[GeneResult, ...]
@@ -94,3 +96,4 @@ class SeriesResult:
     held_out_after: float | None
     remarks: tuple[str, ...] = ()
     curves: tuple[Curve, ...] = ()
+    covariance: GeneCovariance | None = None

@@ -19,6 +19,7 @@ from wingfit.diagnosis.location.series_law import series_law
 from wingfit.diagnosis.rig_subject import RigSubject
 from wingfit.diagnosis.search_state import SearchState
 from wingfit.diagnosis.subject import Subject
+from wingfit.diagnosis.verdict.fitted_models import fitted_models
 from wingfit.diagnosis.verdict.held_out import held_out_refutes
 from wingfit.diagnosis.verdict.locate_in_beat import locate_in_beat
 from wingfit.diagnosis.verdict.next_experiment import rank_conditions, separations
@@ -186,6 +187,7 @@ def _finding(
         advice=advice,
         outline=located.outline,
         channels=located.channels,
+        fitted=fitted_models(data, weights, best),
         remarks=(
             *state.fitted_nominal.remarks,
             *_refinement_remarks(state.fitted_nominal),

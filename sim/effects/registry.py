@@ -9,7 +9,7 @@ from wingfit.records import Vehicle, Wing
 from wingfit.sim.effects.contract import Effect
 
 # Files of the library, each of which declares EFFECT, by folder.
-_FILES = (
+FILES = (
     # changes of the springs before effects in proportion to their stiffness
     ("structure", "stiffness_drift damage cubic_stiffness rod_slip hysteresis viscoelastic tether cable"),
     ("inertia", "lumped_mass mass_offset"),
@@ -35,7 +35,7 @@ _FILES = (
 
 EFFECTS: dict[str, Effect] = {
     name: import_module(f"wingfit.sim.effects.library.{folder}.{name}").EFFECT
-    for folder, names in _FILES
+    for folder, names in FILES
     for name in names.split()
 }
 

@@ -25,7 +25,7 @@ from wingfit.sim.effects.ports.vehicle import ROTATION_POINT, Setting, VehicleSc
 from wingfit.sim.kernels import LANES
 from wingfit.sim.model import Observation, genome_batch
 from wingfit.sim.vehicle.elements import CURVE_ROWS, PEELED, ROWS, Constants, synthesise, synthesise_at, wing_forces
-from wingfit.sim.vehicle.motion import motion_genes
+from wingfit.sim.vehicle.motion import Angles, motion_genes
 from wingfit.sim.vehicle.rows import mirrored
 from wingfit.sim.vehicle.sampling import basis_of, passed, phases, series_of
 from wingfit.sim.vehicle.terms import SEARCHED, TERMS, chosen
@@ -120,6 +120,12 @@ class BladeElementWing:
                     out[block] = [_sum(w, row) for w, row in zip(weights, found, strict=True)]
         return out.transpose(0, 2, 1)
 
+    def angles(self, genome: ArrayLike, recording: Recording) -> Angles:
+        """Flap angle and wing pitch over one beat, with the effects of the drive that are on in ``genome`` [G]."""
+        batch = genome_batch(self.genes, np.asarray(genome, float)[None])
+        ((effects, _),) = self._by_active_effects(batch)
+        return self._changed_scene(effects, batch, recording).angles
+
     def term_forces(self, genome: ArrayLike, recording: Recording) -> dict[str, Array]:
         """Forces [n, 2] (N) by name of the term, for one ``genome`` [G]; they add up to those of :meth:`beat`.
 
@@ -177,13 +183,18 @@ class BladeElementWing:
 
         The force of the vehicle is the sum over the rows of weights times forces, plus the added forces.
         """
+        scene = self._changed_scene(effects, batch, recording)
+        return self._weights(scene.genes, len(batch)), self._wings(scene), scene.finish()
+
+    def _changed_scene(self, effects: tuple[Effect, ...], batch: Array, recording: Recording) -> VehicleScene:
+        """The scene of the individuals in ``batch`` [B, G] with all changes by ``effects``."""
         moving = {} if recording.motion else self._values(batch, self._motion_names)
         scene = self._scene(moving | self._values(batch, _COEFFICIENTS), len(batch), recording)
         for effect in effects:
             if effect.vehicle:
                 effect.vehicle(scene, effect.values(self.genes, batch))
         scene.settle()
-        return self._weights(scene.genes, len(batch)), self._wings(scene), scene.finish()
+        return scene
 
     def _observed(self, batch: Array, beat: Array, recording: Recording) -> tuple[Index, Sampling]:
         """Indices in ``batch`` [B, G] of individuals with an effect on the observation, and their changed sampling.
