@@ -27,6 +27,7 @@ from wingfit.cli.aligning import command as aligning
 from wingfit.cli.base.output import note
 from wingfit.cli.cameras import calibrate as cameras
 from wingfit.cli.cameras import track as films
+from wingfit.cli.exporting import command as exporting
 from wingfit.cli.forces import free_flight, kinematics
 from wingfit.cli.forces import runs as force_runs
 from wingfit.cli.importing import command as importing
@@ -60,6 +61,7 @@ app.add_typer(datasets.app, name="datasets")
 app.add_typer(runs.app, name="runs")
 app.command()(diagnose.diagnose)
 app.add_typer(diagnose.app, name="diagnoses")
+app.command()(exporting.export)
 app.command()(driving.drive)
 app.command()(simulate.simulate)
 app.command()(force_runs.models)

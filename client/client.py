@@ -25,7 +25,7 @@ from wingfit.client import force_answers as f
 from wingfit.client.diagnosis_client import DiagnosisCalls
 from wingfit.client.drive_client import DriveCalls
 from wingfit.client.effect_answers import Effect
-from wingfit.client.export_answers import Format
+from wingfit.client.export_answers import Format, ModelFormat
 from wingfit.client.films.calls import FilmCalls
 from wingfit.client.importing.calls import ImportCalls
 from wingfit.client.key_client import KeyCalls
@@ -171,6 +171,29 @@ class Client(DiagnosisCalls, DriveCalls, FilmCalls, ImportCalls, KeyCalls, ListC
         recording with its simulation. ``on_bytes(received, total)`` is called during the transfer.
         """
         return self._export(_run(run_id), format, Path(path), run_id, on_bytes)
+
+    def export_model(
+        self,
+        job_id: str,
+        format: ModelFormat,  # noqa: A002
+        path: str | Path,
+        *,
+        hypothesis: str | None = None,
+        on_bytes: OnBytes | None = None,
+    ) -> Path:
+        """Write the calibrated model of a run or diagnosis to the file or into the folder ``path``; return the file.
+
+        ``format``: "python": a file or package that needs no wingfit; "tables": CSV and JSON over the fitted range;
+        "mujoco": a wing as MuJoCo XML; "fmu": FMI 3.0; "json": all values. ``hypothesis``: effects joined by "+", or
+        "nominal", the model to take of a diagnosis that names none for certain.
+        """
+        kind = "diagnoses" if job_id.startswith("dx_") else "runs"
+        if kind == "runs" and hypothesis is not None:
+            raise WingfitError("not sent", f"{job_id} is a run, which has one model: give no hypothesis")
+        params = given(format=format, hypothesis=hypothesis)
+        return self._file(
+            f"/v1/{kind}/{part(job_id)}/model", Path(path), job_id, on_bytes, params=params, timeout=self.simulating
+        )
 
     def genome(self, run_id: str) -> a.GenomeInfo:
         """Fetch all genes of a run: value in the best genome so far, nominal value, unit and bounds."""

@@ -14,8 +14,8 @@ class FittedModel:
         added: of these, the effects of the hypothesis; empty for the nominal model.
         values: of all genes by name, in the order of the model.
         free: names of the F fitted genes.
-        covariance: [F][F] of the values of these genes, each in the product of the units; empty for improbable
-            hypotheses.
+        covariance: [F][F] of the values of these genes, each in the product of the units, widened so that normal
+            intervals allow for few recordings (Student's distribution); empty for improbable hypotheses.
         division: discretisation of a wing; "" for others.
         elements, instants: resolution of the blade elements of a vehicle; 0 for others.
     """

@@ -80,7 +80,7 @@ def gene_values(data: WhitenedData, refit: Refit) -> tuple[GeneValue, ...]:
     """Return values and 90 % intervals of all free genes; ``off`` is 0 for a size gene of an added suspect."""
     fit, variances = refit.fit, np.diag(covariance(data, refit.fit))
     errors = np.sqrt(variances)
-    wide = [standard_errors(one) for one in _freedom(data, fit, variances)]
+    wide = [standard_errors(one) for one in freedom(data, fit, variances)]
     off = {name: 0.0 for trial in refit.trials for name in trial.suspect.size_genes}
     found = []
     for gene, unit, error in zip(free_genes(fit.problem), fit.unit, wide * errors, strict=True):
@@ -91,7 +91,7 @@ def gene_values(data: WhitenedData, refit: Refit) -> tuple[GeneValue, ...]:
     return tuple(found)
 
 
-def _freedom(data: WhitenedData, fit: Fit, variances: Float[Array, " F"]) -> Float[Array, " F"]:
+def freedom(data: WhitenedData, fit: Fit, variances: Float[Array, " F"]) -> Float[Array, " F"]:
     """Return the degrees of freedom of the ``variances`` [F] of genes: few recordings show a disagreement roughly.
 
     The parts of a variance that are known have infinitely many (Satterthwaite 1946).

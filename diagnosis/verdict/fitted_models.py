@@ -7,7 +7,7 @@ import numpy as np
 from wingfit.calibration.estimates.linearised import free_genes
 from wingfit.diagnosis.evidence.fit import Fit
 from wingfit.diagnosis.evidence.fitted_model import FittedModel
-from wingfit.diagnosis.evidence.intervals import covariance
+from wingfit.diagnosis.evidence.intervals import covariance, freedom, standard_errors
 from wingfit.diagnosis.evidence.refit import Refit
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.finding import Table, table
@@ -50,5 +50,6 @@ def _covariance(data: WhitenedData, fit: Fit) -> Table:
             for gene, value in zip(genes, fit.individual[0], strict=True)
         ]
     )
+    slopes *= np.array([standard_errors(one) for one in freedom(data, fit, np.diag(found))]) / standard_errors()
     scaled = found * slopes * slopes[:, None]
     return table(0.5 * (scaled + scaled.T)) if np.isfinite(scaled).all() else ()

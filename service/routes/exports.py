@@ -1,4 +1,4 @@
-"""Routes that return runs and diagnoses as files: JSON, CSV, NetCDF."""
+"""Routes that return runs and diagnoses as files: JSON, CSV, NetCDF; and their calibrated models to take away."""
 
 from __future__ import annotations
 
@@ -12,11 +12,13 @@ from pydantic_core import to_json
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response, StreamingResponse
 
-from wingfit.client.export_answers import DiagnosisExport, Format, RunExport
+from wingfit.client.export_answers import DiagnosisExport, Format, ModelFormat, RunExport
+from wingfit.export.calibrated_model import CalibratedModel
 from wingfit.service.container import DOWNLOAD_SLOT, HeldSlots, Service, ServiceDep
 from wingfit.service.diagnoses import exports as diagnosis_exports
 from wingfit.service.http import csv_text
 from wingfit.service.http import responses as http
+from wingfit.service.outcomes import calibrated_models
 from wingfit.service.routes.diagnoses import finding_of
 from wingfit.service.runs import best_genome, run_netcdf
 from wingfit.service.runs import exports as run_exports
@@ -26,6 +28,21 @@ from wingfit.service.storage.tables import DiagnosisRow, RunRow
 router = APIRouter(prefix="/v1", tags=["exports"])
 LOOK_SECONDS = 1.0
 FormatQuery = Annotated[Format, Query(description="json: all of it; csv: a table; netcdf: series and maps")]
+
+ModelFormatQuery = Annotated[
+    ModelFormat,
+    Query(
+        description="python: a file or package without wingfit; tables: CSV and JSON over the fitted range; mujoco: "
+        "a wing as MuJoCo XML; fmu: FMI 3.0; json: all values in SI units"
+    ),
+]
+Hypothesis = Annotated[
+    str | None,
+    Query(
+        max_length=1000,
+        description='effects joined by "+", or "nominal": the model to take of a diagnosis that names none for certain',
+    ),
+]
 
 _HISTORY = """sequence,stage,generation,best_m2,mean_m2,diversity,best_mm,evaluations,failed,reasons,elapsed_seconds
 1,structural,0,0.00021,0.0013,0.29,1.84,50,0,,1.2
@@ -116,3 +133,56 @@ def export_diagnosis(
     else:
         body, media_type, name = to_json(diagnosis_exports.document(exported, found)), http.JSON, ".json"
     return Response(body, media_type=media_type, headers=http.attachment(f"{diagnosis_id}{name}"))
+
+
+def _model_described() -> dict[str, Any]:
+    saved = {"Content-Disposition": {"description": "name to save it under", "schema": {"type": "string"}}}
+    binary = {"schema": {"type": "string", "format": "binary"}}
+    types = ("text/x-python", "application/zip", "application/json", "application/xml", "application/octet-stream")
+    return {"description": "the model as a file", "headers": saved, "content": dict.fromkeys(types, binary)}
+
+
+@router.get(
+    "/runs/{run_id}/model",
+    response_class=Response,
+    responses={200: _model_described(), **http.errors(404, 409)},
+    summary="Take the calibrated model of a run away",
+)
+async def run_model(
+    service: ServiceDep,
+    held: HeldSlots,
+    run_id: str,
+    format: ModelFormatQuery = "python",  # noqa: A002
+) -> Response:
+    """Return the calibrated model of a run that has succeeded as a file that needs no wingfit."""
+    model = await run_in_threadpool(calibrated_models.of_run, service, run_id)
+    return await _model(service, held, model, format)
+
+
+@router.get(
+    "/diagnoses/{diagnosis_id}/model",
+    response_class=Response,
+    responses={200: _model_described(), **http.errors(404, 409)},
+    summary="Take the model of a diagnosis away",
+)
+async def diagnosis_model(
+    service: ServiceDep,
+    held: HeldSlots,
+    diagnosis_id: str,
+    format: ModelFormatQuery = "python",  # noqa: A002
+    hypothesis: Hypothesis = None,
+) -> Response:
+    """Return the model of a diagnosis, with the effects that it names, as a file that needs no wingfit.
+
+    A verdict that names no effects for certain has several models; ``hypothesis`` chooses one.
+    """
+    model = await run_in_threadpool(calibrated_models.of_diagnosis, service, diagnosis_id, hypothesis)
+    return await _model(service, held, model, format)
+
+
+async def _model(service: Service, held: HeldSlots, model: CalibratedModel, format_name: str) -> Response:
+    """Return ``model`` as a file; it may wait for other exports, as tables simulate many conditions."""
+    async with service.exports.slot():
+        file = await run_in_threadpool(calibrated_models.written, model, format_name)
+        await held.enter_async_context(service.answers.slot())
+    return Response(file.body, media_type=file.media_type, headers=http.attachment(file.name))

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+BEFORE, AFTER = 0, 1
+
 
 def strip_port(frame: Any) -> Any:
     """Raise NotImplementedError: the law of a flexible wing runs only compiled."""

@@ -1,0 +1,1 @@
+"""The command that takes a calibrated model away."""

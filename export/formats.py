@@ -1,0 +1,84 @@
+"""Write a calibrated model in one of the formats in which it can be taken away."""
+
+from __future__ import annotations
+
+import io
+import re
+import zipfile
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from wingfit.export.calibrated_model import CalibratedModel
+from wingfit.export.model_file import model_json
+from wingfit.export.python.vehicle_file import vehicle_file
+
+ZIP = "application/zip"
+FMU = "wingfit.export.fmu"
+# Of all files in an archive, so that equal models give equal bytes.
+EARLIEST = (1980, 1, 1, 0, 0, 0)
+
+
+class FormatError(ValueError):
+    """The model cannot be written in the requested format."""
+
+
+@dataclass(frozen=True)
+class ExportedFile:
+    """A file to save: its ``name``, ``media_type`` and ``body``."""
+
+    name: str
+    media_type: str
+    body: bytes
+
+
+def exported(model: CalibratedModel, format_name: str) -> ExportedFile:
+    """Return ``model`` as a file; FormatError for an unknown format, or one that does not fit the model."""
+    if format_name not in WRITERS:
+        raise FormatError(f"unknown format {format_name!r}; there are {', '.join(WRITERS)}")
+    return WRITERS[format_name](model)
+
+
+def stem(model: CalibratedModel) -> str:
+    """Return the name of the model for files and Python packages: lower case letters, digits and underscores."""
+    plain = re.sub(r"[^a-z0-9]+", "_", model.rig.name.lower()).strip("_") or "model"
+    return plain if plain[0].isalpha() else f"model_{plain}"
+
+
+def archive(files: Mapping[str, str | bytes]) -> bytes:
+    """Return a zip of ``files``, contents by path; equal contents give equal bytes."""
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as target:
+        for path, content in files.items():
+            entry = zipfile.ZipInfo(path, EARLIEST)
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            entry.external_attr = 0o644 << 16
+            target.writestr(entry, content)
+    return buffer.getvalue()
+
+
+def _json(model: CalibratedModel) -> ExportedFile:
+    return ExportedFile(f"{stem(model)}.json", "application/json", model_json(model).encode())
+
+
+def _python(model: CalibratedModel) -> ExportedFile:
+    return ExportedFile(f"{stem(model)}.py", "text/x-python", vehicle_file(model).encode())
+
+
+def _fmu(model: CalibratedModel) -> ExportedFile:
+    if find_spec(FMU) is None or not hasattr(import_module(FMU), "write_fmu"):
+        raise FormatError("this installation of wingfit writes no FMU: take the format python instead")
+    with TemporaryDirectory(prefix="wingfit-fmu-") as folder:
+        path = Path(folder) / f"{stem(model)}.fmu"
+        import_module(FMU).write_fmu(model, path)
+        return ExportedFile(path.name, "application/octet-stream", path.read_bytes())
+
+
+WRITERS: Mapping[str, Callable[[CalibratedModel], ExportedFile]] = {
+    "python": _python,
+    "json": _json,
+    "fmu": _fmu,
+}
