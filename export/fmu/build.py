@@ -14,6 +14,7 @@ from wingfit.export.calibrated_model import CalibratedModel
 from wingfit.export.fmu.description import documentation, header, model_description
 from wingfit.export.fmu.native import object_file
 from wingfit.export.fmu.product import NotExportedError, Product
+from wingfit.export.fmu.vehicle import vehicle_product
 from wingfit.export.fmu.wing import wing_product
 from wingfit.export.model_file import model_from_json
 
@@ -36,6 +37,8 @@ def product_of(model: CalibratedModel) -> Product:
     """Return the parts of an FMU of ``model``; NotExportedError with the remedy where there is none."""
     if model.kind == "tracks":
         return wing_product(model)
+    if model.kind == "forces":
+        return vehicle_product(model)
     raise NotExportedError(
         f"{model.rig.name!r} is simulated by a program of its user, of which wingfit has no code: export that program "
         "as an FMU with its own tool"

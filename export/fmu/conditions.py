@@ -32,16 +32,13 @@ def inputs_of(
 ) -> tuple[list[Variable], list[Limit]]:
     """Return the inputs and their fitted ranges, and set their starts on the ``board``."""
     first, variables, limits = memory.word(board.ctypes.data), list[Variable](), list[Limit]()
-    ranges = {one.name: one for one in model.ranges}
     for name, (place, unit, text, least, most) in INPUTS.items():
         if name == "phase_lag" and not isinstance(model.rig, Wing):
             continue
         value = getattr(start, name)
         board[place] = value
         variables.append(Variable(name, first + place, "input", unit, text, value, least, most))
-        known = ranges.get(name)
-        low, high = (known.low, known.high) if known else (value, value)
-        limits.append(Limit(name, first + place, unit, min(low, value), max(high, value)))
+        limits.append(Limit(name, first + place, unit, *fitted_range(model, start, name)))
     return variables, limits
 
 
@@ -51,3 +48,10 @@ def parameters_of(memory: Memory, board: Array, *parameters: Variable) -> list[V
     for one in parameters:
         board[one.word] = one.start
     return [replace(one, word=first + one.word) for one in parameters]
+
+
+def fitted_range(model: CalibratedModel, start: Condition, name: str) -> tuple[float, float]:
+    """Return the fitted range of the input ``name``, which contains its start."""
+    value = float(getattr(start, name))
+    known = next((one for one in model.ranges if one.name == name), None)
+    return (min(known.low, value), max(known.high, value)) if known else (value, value)

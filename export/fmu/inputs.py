@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import math
 
-from wingfit.sim.kernels.jit import inlined
+from wingfit.export.fmu import board as places
+from wingfit.records.array_types import Array
+from wingfit.sim.kernels.jit import allocating, inlined
 
 TURN = 2.0 * math.pi
 Followed = tuple[float, float, float, float, float]
@@ -32,3 +34,20 @@ def followed(value: float, rate: float, target: float, time: float, t: float) ->
     e3 = -pace * (2.0 * e2 + e1 * pace)
     past = time * (apart * (1.0 - left) + slope * (time * (1.0 - left) - t * left))
     return target + e, e1, e2, e3, target * t + past
+
+
+@allocating
+def turn_drive(board: Array, t: float) -> None:
+    """Advance the drive by ``t`` seconds: phase, flap frequency and phase lag."""
+    time = board[places.SMOOTHING]
+    f, f1, _, _, turned = followed(
+        board[places.FLAPPING], board[places.FLAPPING_RATE], board[places.FREQUENCY], time, t
+    )
+    lag, l1, _, _, _ = followed(board[places.LAGGING], board[places.LAGGING_RATE], board[places.LAG], time, t)
+    board[places.FLAPPING], board[places.FLAPPING_RATE] = f, f1
+    board[places.LAGGING], board[places.LAGGING_RATE] = lag, l1
+    board[places.PHASE] += TURN * turned
+    while board[places.PHASE] >= TURN:
+        board[places.PHASE] -= TURN
+        board[places.BEATS] += 1.0
+    board[places.TURN] = board[places.PHASE] / TURN

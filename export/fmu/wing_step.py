@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wingfit.export.fmu import board as places
-from wingfit.export.fmu.inputs import TURN, followed
+from wingfit.export.fmu.inputs import TURN, followed, turn_drive
 from wingfit.records.array_types import Array, Index, Mask
 from wingfit.sim.kernels import LANES, arrays
 from wingfit.sim.kernels.arrays import STAGES, Lanes, Setting, State, Trace, Wiring, Work
@@ -192,23 +192,6 @@ def step(wiring: Wiring, setting: Setting, lanes: Lanes, work: Work, state: Stat
             rods = work.rods
         solve_stage(wiring, setting, lanes, work, rods, stage)
     finish_step(work, state, parts.alive)
-
-
-@allocating
-def turn_drive(board: Array, t: float) -> None:
-    """Advance the drive by ``t`` seconds: phase, flap frequency and phase lag."""
-    time = board[places.SMOOTHING]
-    f, f1, _, _, turned = followed(
-        board[places.FLAPPING], board[places.FLAPPING_RATE], board[places.FREQUENCY], time, t
-    )
-    lag, l1, _, _, _ = followed(board[places.LAGGING], board[places.LAGGING_RATE], board[places.LAG], time, t)
-    board[places.FLAPPING], board[places.FLAPPING_RATE] = f, f1
-    board[places.LAGGING], board[places.LAGGING_RATE] = lag, l1
-    board[places.PHASE] += TURN * turned
-    while board[places.PHASE] >= TURN:
-        board[places.PHASE] -= TURN
-        board[places.BEATS] += 1.0
-    board[places.TURN] = board[places.PHASE] / TURN
 
 
 @allocating
