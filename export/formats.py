@@ -15,6 +15,8 @@ from tempfile import TemporaryDirectory
 from wingfit.export.calibrated_model import CalibratedModel
 from wingfit.export.model_file import model_json
 from wingfit.export.python.vehicle_file import vehicle_file
+from wingfit.export.python.wing_package import wing_package
+from wingfit.records import Wing
 
 ZIP = "application/zip"
 FMU = "wingfit.export.fmu"
@@ -65,6 +67,10 @@ def _json(model: CalibratedModel) -> ExportedFile:
 
 
 def _python(model: CalibratedModel) -> ExportedFile:
+    name = stem(model)
+    if isinstance(model.rig, Wing):
+        files = {f"{name}/{path}": text for path, text in wing_package(model, name).items()}
+        return ExportedFile(f"{name}.zip", ZIP, archive(files))
     return ExportedFile(f"{stem(model)}.py", "text/x-python", vehicle_file(model).encode())
 
 

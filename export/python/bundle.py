@@ -12,6 +12,7 @@ import importlib.util
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cache
 from pathlib import Path
+from typing import TypeGuard
 
 ROOT = "wingfit"
 
@@ -114,13 +115,20 @@ def _passed_on(module: str) -> Mapping[str, str]:
     path = _path(module)
     if path is None or path.name != "__init__.py":
         return {}
-    nodes = [node for node in ast.parse(path.read_text()).body if isinstance(node, ast.ImportFrom)]
+    body = ast.parse(path.read_text()).body
+    public: list[str] = next((ast.literal_eval(node.value) for node in body if _assigns(node, "__all__")), [])
     return {
-        alias.name: node.module
-        for node in nodes
-        if node.module and node.module.startswith(ROOT) and node.module != f"{module}.processor"
+        alias.name: node.module or ""
+        for node in body
+        if isinstance(node, ast.ImportFrom)
         for alias in node.names
+        if alias.name in public
     }
+
+
+def _assigns(node: ast.stmt, name: str) -> TypeGuard[ast.Assign]:
+    """Return whether ``node`` sets the variable ``name``."""
+    return isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name) and node.targets[0].id == name
 
 
 def source_of(module: str) -> str:
