@@ -93,6 +93,7 @@ def test_the_wheel_holds_one_package() -> None:
         "client",
         "diagnosis",
         "importers",
+        "planning",
         "plot",
         "records",
         "report",
