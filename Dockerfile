@@ -33,6 +33,7 @@ COPY --chown=wingfit:wingfit rigs rigs
 COPY --chown=wingfit:wingfit inference inference
 COPY --chown=wingfit:wingfit calibration calibration
 COPY --chown=wingfit:wingfit diagnosis diagnosis
+COPY --chown=wingfit:wingfit planning planning
 COPY --chown=wingfit:wingfit report report
 COPY --chown=wingfit:wingfit plot plot
 COPY --chown=wingfit:wingfit export export
@@ -46,7 +47,7 @@ RUN pip install --no-deps --no-build-isolation --editable .
 USER wingfit
 # Compiled kernels are kept beside the code. Where that cannot be written, they are copied to HOME at the first use; on
 # another kind of processor they are compiled again, and kept there too.
-RUN python -m compileall -q records tracking cameras sim checks calibration diagnosis report plot export workers service client cli \
+RUN python -m compileall -q records tracking cameras sim checks calibration diagnosis planning report plot export workers service client cli \
     && python -m wingfit.sim.warm
 
 # All that is written: /tmp and the data. The rest may be read-only.

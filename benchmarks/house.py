@@ -23,8 +23,8 @@ from typing import Any, NamedTuple
 
 ROOT = Path(__file__).parents[1]
 PARTS = (
-    "records", "importers", "tracking", "cameras", "sim", "inference", "calibration", "diagnosis", "report", "plot",
-    "export", "workers", "service", "client", "cli",
+    "records", "importers", "tracking", "cameras", "sim", "inference", "calibration", "diagnosis", "planning", "report",
+    "plot", "export", "workers", "service", "client", "cli",
 )  # fmt: skip
 PRODUCT = (*PARTS, "wingfit")
 CODE = (*PRODUCT, "benchmarks", "docs", "examples", "tests")

@@ -68,14 +68,10 @@ def prepare(spec: CalibrationSpec, dataset: Dataset) -> Prepared:
     """Choose model, stages and filters, without simulating; ValueError if ``spec`` does not fit ``dataset``."""
     spec = resolved(spec, dataset)
     model, coarse = model_for(dataset, spec), search_model(dataset, spec)
-    _refuse_genes(spec, model)
-    if isinstance(model, FlexibleWing):
-        _refuse_without_influence(spec, model)
+    free = searched_genes(spec, model)
     fitted = _fitted(spec, dataset)
     for recording in dataset.recordings:  # all of them are judged in the end
         _refuse_unusable(spec, dataset, recording, recording in fitted)
-    free = _free(spec, model)
-    refuse_idle({name: sizes(EFFECTS[name]) for name in spec.effects}, free, spec.fixed)
     stages = _stages(spec.mode, free, tuple(as_fitted(spec, recording) for recording in fitted))
     held_out = tuple(as_fitted(spec, one) for one in dataset.recordings if one.name in dataset.held_out)
     return Prepared(spec, model, stages, held_out, coarse)
@@ -103,6 +99,16 @@ def prepare_rig(spec: CalibrationSpec, rig: Rig, dataset: SeriesDataset) -> Prep
     free = _free(spec, model, _elsewhere(spec, model, dataset, [one.name for one in fitted]))
     refuse_idle({one.name: one.size_genes for one in model.added}, free, spec.fixed)
     return Prepared(spec, model, (Stage("joint", free, fitted),), dataset.select(dataset.held_out))
+
+
+def searched_genes(spec: CalibrationSpec, model: Model) -> tuple[str, ...]:
+    """Return the genes of a wing's or a vehicle's ``model`` that ``spec`` searches; ValueError if they do not fit."""
+    _refuse_genes(spec, model)
+    if isinstance(model, FlexibleWing):
+        _refuse_without_influence(spec, model)
+    free = _free(spec, model)
+    refuse_idle({name: sizes(EFFECTS[name]) for name in spec.effects}, free, spec.fixed)
+    return free
 
 
 def _elsewhere(spec: CalibrationSpec, model: RigModel, dataset: SeriesDataset, fitted: Sequence[str]) -> set[str]:

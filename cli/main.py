@@ -33,6 +33,7 @@ from wingfit.cli.forces import runs as force_runs
 from wingfit.cli.importing import command as importing
 from wingfit.cli.importing import forces as force_files
 from wingfit.cli.importing import template
+from wingfit.cli.planning.command import plan
 from wingfit.client.client import WingfitError
 from wingfit.sim.requested_lanes import requested_lanes
 
@@ -62,6 +63,7 @@ app.add_typer(runs.app, name="runs")
 app.command()(diagnose.diagnose)
 app.add_typer(diagnose.app, name="diagnoses")
 app.command()(exporting.export)
+app.command()(plan)
 app.command()(driving.drive)
 app.command()(simulate.simulate)
 app.command()(force_runs.models)

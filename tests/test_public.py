@@ -94,6 +94,7 @@ def test_the_wheel_holds_one_package() -> None:
         "diagnosis",
         "export",
         "importers",
+        "planning",
         "plot",
         "records",
         "report",

@@ -144,8 +144,8 @@ def uncertainty(problem: Problem, evaluator: Evaluator) -> Uncertainty:
     linear = replace(linear, known=linear.known & free)
     noise = Noise.of_each(problem.recordings, linear.residuals)
     unit, doubts = unit_covariance(problem, linear, noise)
-    per_value, per_cent = _slopes(genes, values)
-    to_shares = _share_map(genes, problem.base) * per_cent
+    per_value, per_cent = value_slopes(genes, values)
+    to_shares = share_map(genes, problem.base) * per_cent
     relative = to_shares @ unit @ to_shares.T
     (inside,) = np.nonzero(free)
     own = remarks([genes[k] for k in inside], relative[np.ix_(inside, inside)], linear.known[inside], IDENTIFIABLE)
@@ -282,7 +282,7 @@ def _from_samples(parts: list[_Part], bread: Array) -> Array:
     return total
 
 
-def _slopes(genes: list[Gene], values: Array) -> tuple[Array, Array]:
+def value_slopes(genes: list[Gene], values: Array) -> tuple[Array, Array]:
     """Return the derivatives [F] of the ``values`` [F] by the genes scaled to 0..1, and these divided by the values.
 
     The value of a linear gene counts as at least SMALL of its range in this division.
@@ -293,7 +293,7 @@ def _slopes(genes: list[Gene], values: Array) -> tuple[Array, Array]:
     return np.where(log, width * values, width), width / size
 
 
-def _share_map(genes: list[Gene], base: Genome) -> Array:
+def share_map(genes: list[Gene], base: Genome) -> Array:
     """Return the matrix [F, F] that converts relative changes of genes to those of the values that the model uses.
 
     Of weights of a group (``Gene.share_of``) the model uses weight / sum of weights, also of those not searched; other
