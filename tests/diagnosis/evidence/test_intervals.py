@@ -76,5 +76,5 @@ def test_recordings_that_disagree_on_a_gene_widen_its_interval(data: WhitenedDat
     fit = fitted(left, slopes)
     total = covariance(data, fit)
     assert total[0, 0] == pytest.approx(alike + by_recording, rel=1e-2)
-    freedom = freedom(data, fit, np.diag(total))
-    assert freedom == pytest.approx([2 * ((alike + by_recording) / by_recording) ** 2], rel=0.03), "Satterthwaite"
+    degrees = freedom(data, fit, np.diag(total))
+    assert degrees == pytest.approx([2 * ((alike + by_recording) / by_recording) ** 2], rel=0.03), "Satterthwaite"
