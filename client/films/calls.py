@@ -134,7 +134,8 @@ class FilmCalls(Watching):
             "recordings": [dict(one) for one in recordings],
             **given(**known),
         }
-        return cast(FilmedDataset, self._json("POST", "/v1/trackings/dataset", json=body, key=str(uuid.uuid4())))
+        answer = self._json("POST", "/v1/trackings/dataset", json=body, key=str(uuid.uuid4()), timeout=self.simulating)
+        return cast(FilmedDataset, answer)
 
     def tracking_report(self, tracking_id: str) -> str:
         """Fetch pictures of the tracks, as the text of one HTML file."""
