@@ -9,9 +9,9 @@ import numpy as np
 
 from wingfit.calibration.effects import absent
 from wingfit.calibration.estimates.drift_remark import drift_remark
-from wingfit.calibration.estimates.uncertainty import Standing, standing
+from wingfit.calibration.estimates.uncertainty import Correlations, Standing, gene_errors
 from wingfit.calibration.evaluator import Evaluator
-from wingfit.calibration.preparation import Stage, prepare
+from wingfit.calibration.preparation import prepare
 from wingfit.calibration.problem import Problem, base_genome
 from wingfit.calibration.spec import CalibrationSpec, wing_model
 from wingfit.inference.noise.harmonic import noise_distance
@@ -20,7 +20,6 @@ from wingfit.records.array_types import Array
 from wingfit.records.blas_threads import one_blas_thread
 from wingfit.sim.model import Solution
 from wingfit.sim.wing.alignment import recorded_crossing
-from wingfit.sim.wing.flexible_wing import FlexibleWing
 
 CONTRADICTION = 0.2  # spans: a larger misfit is no missing physics, but tracks that contradict the description
 ADEQUATE = 1.3  # times the tracking noise: the largest misfit that noise is taken to explain
@@ -83,6 +82,7 @@ class Result:
     ``before`` and ``after`` are the mean distances of the nominal and of the best genome on the fitted recordings,
     ``held_out_before`` and ``held_out_after`` on the held-out ones (None without any). ``noise`` is the mean distance
     by tracking noise alone, from the scatter between beats, None if unknown. ``remarks`` are warnings about the result.
+    ``correlations`` are those of the genes that were estimated together, for each stage.
     """
 
     genes: tuple[GeneResult, ...]
@@ -93,6 +93,7 @@ class Result:
     held_out_after: float | None
     noise: float | None
     remarks: tuple[str, ...] = ()
+    correlations: tuple[Correlations, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -161,8 +162,10 @@ def judge(spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, genome:
         )
     remarks += drift
     remarks += absent(best.as_dict(), ready.searched)
+    found = [gene_errors(Problem(model, stage.recordings, stage.free, best), evaluator) for stage in stages]
+    known = {name: one for errors in found for name, one in errors.standing.items()}
     return Result(
-        genes=_genes(model, stages, nominal, best, evaluator, adequate),
+        genes=gene_results(known, nominal, best, adequate),
         recordings=recordings,
         before=_mean(fitted, "before"),
         after=after,
@@ -170,6 +173,7 @@ def judge(spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, genome:
         held_out_after=_mean(held_out, "after") if held_out else None,
         noise=noise,
         remarks=tuple(remarks),
+        correlations=tuple(one.correlations for one in found if one.correlations),
     )
 
 
@@ -186,20 +190,6 @@ def compare(spec: CalibrationSpec, dataset: Dataset, genome: Mapping[str, float]
     return Comparison(
         recording, turns % 1.0, record.markers, record.positions, tracks, spec.accuracy, observed.solutions[0]
     )
-
-
-def _genes(
-    model: FlexibleWing,
-    stages: tuple[Stage, ...],
-    nominal: Genome,
-    best: Genome,
-    evaluator: Evaluator,
-    adequate: bool,
-) -> tuple[GeneResult, ...]:
-    known: dict[str, Standing] = {}
-    for stage in stages:
-        known |= standing(Problem(model, stage.recordings, stage.free, best), evaluator)
-    return gene_results(known, nominal, best, adequate)
 
 
 def gene_results(

@@ -307,6 +307,13 @@ class GeneInfo(TypedDict):
     standard_error: NotRequired[float | None]
 
 
+class Correlations(TypedDict):
+    """Correlation coefficients [F][F] of the estimates of ``genes``; null for genes whose error is not known."""
+
+    genes: list[str]
+    values: list[list[float | None]]
+
+
 class GenomeInfo(TypedDict):
     """All genes with their values in the best genome so far; ``final`` is true once the run has succeeded."""
 
@@ -333,7 +340,8 @@ class Result(TypedDict):
     """Result of a calibration on tracks: mean distance between simulated and recorded markers, and the genes.
 
     ``before_mm`` (nominal genome) and ``after_mm`` (best genome) are means over the fitted recordings, weighted by the
-    number of samples. ``noise_mm`` is the mean distance that tracking noise alone would cause.
+    number of samples. ``noise_mm`` is the mean distance that tracking noise alone would cause. ``correlations`` are
+    those of the genes of each stage; results of earlier versions have none.
     """
 
     kind: Literal["tracks"]
@@ -345,6 +353,7 @@ class Result(TypedDict):
     remarks: list[str]
     recordings: list[RecordingResult]
     genes: list[GeneInfo]
+    correlations: NotRequired[list[Correlations]]
 
 
 class Numerics(TypedDict):

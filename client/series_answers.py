@@ -6,7 +6,7 @@ from typing import Literal, NotRequired
 
 from typing_extensions import TypedDict
 
-from wingfit.client.answers import GeneInfo
+from wingfit.client.answers import Correlations, GeneInfo
 
 
 class ChannelResult(TypedDict):
@@ -70,3 +70,4 @@ class SeriesResult(TypedDict):
     recordings: list[SeriesRecordingResult]
     genes: list[GeneInfo]
     curves: NotRequired[list[Curve]]
+    correlations: NotRequired[list[Correlations]]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -40,6 +41,24 @@ class Standing:
     standard_error: float
     identifiable: bool
     absolute: float
+
+
+@dataclass(frozen=True)
+class Correlations:
+    """Correlation coefficients [F, F] of the estimated values of ``genes``; NaN for a gene whose error is not known.
+
+    Of a weight of a group (``Gene.share_of``) they are those of weight / sum of weights.
+    """
+
+    genes: tuple[str, ...]
+    values: tuple[tuple[float, ...], ...]
+
+
+class GeneErrors(NamedTuple):
+    """Standard errors of the free genes by name, and their correlations; None if the genome cannot be simulated."""
+
+    standing: dict[str, Standing]
+    correlations: Correlations | None
 
 
 @dataclass(frozen=True)
@@ -81,6 +100,14 @@ class Uncertainty:
         return np.asarray(self.covariance / scale / scale[:, None])
 
     @property
+    def correlations(self) -> Correlations:
+        """Correlations of the values, of weights of a group those of their shares."""
+        scale = np.where(self.known, np.sqrt(np.diag(self.relative)), np.nan)
+        scale[scale == 0.0] = np.nan
+        values = self.relative / scale / scale[:, None]
+        return Correlations(self.free, tuple(tuple(row) for row in values.tolist()))
+
+    @property
     def standing(self) -> dict[str, Standing]:
         """Standard errors of each free gene, by name, and whether the gene is identifiable."""
         errors = np.where(self.known, np.sqrt(np.diag(self.relative)), np.inf)
@@ -91,16 +118,17 @@ class Uncertainty:
 
 
 @one_blas_thread
-def standing(problem: Problem, evaluator: Evaluator) -> dict[str, Standing]:
-    """Return the standard errors of each free gene, by name, at the base genome; infinite if it cannot be simulated.
+def gene_errors(problem: Problem, evaluator: Evaluator) -> GeneErrors:
+    """Return the errors of the free genes at the base genome; infinite, and no correlations, if it cannot be simulated.
 
     For every displaced genome, the start of the simulated beat is aligned anew with each recording of tracks, so the
     errors include the uncertainty of this start.
     """
     try:
-        return uncertainty(problem, evaluator).standing
+        found = uncertainty(problem, evaluator)
     except ValueError:
-        return {name: Standing(np.inf, False, np.inf) for name in problem.free}
+        return GeneErrors({name: Standing(np.inf, False, np.inf) for name in problem.free}, None)
+    return GeneErrors(found.standing, found.correlations)
 
 
 @one_blas_thread

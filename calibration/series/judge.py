@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wingfit.calibration.estimates.likelihood import iterate
-from wingfit.calibration.estimates.uncertainty import Standing, uncertainty
+from wingfit.calibration.estimates.uncertainty import Correlations, Standing, uncertainty
 from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.preparation import Prepared
 from wingfit.calibration.problem import Evaluation, Problem, base_genome
@@ -62,6 +62,7 @@ def judge_series(
             *remarks.own_genes(own, dataset),
         ),
         curves=curves(everywhere, held_out, relative_to),
+        correlations=errors.correlations,
     )
 
 
@@ -79,6 +80,7 @@ class _Errors:
     standing: dict[str, Standing]
     remarks: tuple[str, ...] = ()
     unfinished: tuple[str, ...] = ()
+    correlations: tuple[Correlations, ...] = ()
 
 
 def _errors(ready: Prepared, best: Genome, evaluator: Evaluator) -> _Errors:
@@ -90,4 +92,4 @@ def _errors(ready: Prepared, best: Genome, evaluator: Evaluator) -> _Errors:
     except START_ERRORS:
         return _Errors({name: Standing(np.inf, False, np.inf) for name in stage.free})
     moved = {name: abs(step.values[name] - best[name]) / known.standard_errors[name] for name in stage.free}
-    return _Errors(known.standing, known.remarks, remarks.unfinished(moved, MOVED))
+    return _Errors(known.standing, known.remarks, remarks.unfinished(moved, MOVED), (known.correlations,))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from wingfit.calibration.estimates.uncertainty import Correlations
 from wingfit.calibration.result import GeneResult
 
 RelativeTo = Literal["noise", "range"]
@@ -83,6 +84,7 @@ class SeriesResult:
         held_out_after: the same of the best genome.
         remarks: warnings about the result.
         curves: values over time of the channels that fit worst (:mod:`wingfit.calibration.series.curves`).
+        correlations: those of the genes that were estimated together.
     """
 
     genes: tuple[GeneResult, ...]
@@ -94,3 +96,4 @@ class SeriesResult:
     held_out_after: float | None
     remarks: tuple[str, ...] = ()
     curves: tuple[Curve, ...] = ()
+    correlations: tuple[Correlations, ...] = ()
