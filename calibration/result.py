@@ -9,9 +9,9 @@ import numpy as np
 
 from wingfit.calibration.effects import absent
 from wingfit.calibration.estimates.drift_remark import drift_remark
-from wingfit.calibration.estimates.uncertainty import GeneCovariance, Standing, standing
+from wingfit.calibration.estimates.uncertainty import Correlations, GeneCovariance, Standing, gene_errors
 from wingfit.calibration.evaluator import Evaluator
-from wingfit.calibration.preparation import Stage, prepare
+from wingfit.calibration.preparation import prepare
 from wingfit.calibration.problem import Problem, base_genome
 from wingfit.calibration.spec import CalibrationSpec, wing_model
 from wingfit.inference.noise.harmonic import noise_distance
@@ -20,7 +20,6 @@ from wingfit.records.array_types import Array
 from wingfit.records.blas_threads import one_blas_thread
 from wingfit.sim.model import Solution
 from wingfit.sim.wing.alignment import recorded_crossing
-from wingfit.sim.wing.flexible_wing import FlexibleWing
 
 CONTRADICTION = 0.2  # spans: a larger misfit is no missing physics, but tracks that contradict the description
 ADEQUATE = 1.3  # times the tracking noise: the largest misfit that noise is taken to explain
@@ -84,6 +83,7 @@ class Result:
     ``held_out_before`` and ``held_out_after`` on the held-out ones (None without any). ``noise`` is the mean distance
     by tracking noise alone, from the scatter between beats, None if unknown. ``remarks`` are warnings about the result.
     ``covariance`` is that of the genes whose standard errors are known; those of different stages are independent.
+    ``correlations`` are those of the genes that were estimated together, for each stage.
     """
 
     genes: tuple[GeneResult, ...]
@@ -95,6 +95,7 @@ class Result:
     noise: float | None
     remarks: tuple[str, ...] = ()
     covariance: GeneCovariance | None = None
+    correlations: tuple[Correlations, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -163,7 +164,8 @@ def judge(spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, genome:
         )
     remarks += drift
     remarks += absent(best.as_dict(), ready.searched)
-    known, covariance = _errors(model, stages, best, evaluator)
+    found = [gene_errors(Problem(model, stage.recordings, stage.free, best), evaluator) for stage in stages]
+    known = {name: one for errors in found for name, one in errors.standing.items()}
     return Result(
         genes=gene_results(known, nominal, best, adequate),
         recordings=recordings,
@@ -173,7 +175,8 @@ def judge(spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, genome:
         held_out_after=_mean(held_out, "after") if held_out else None,
         noise=noise,
         remarks=tuple(remarks),
-        covariance=covariance,
+        covariance=GeneCovariance.of_independent([one.covariance for one in found if one.covariance]),
+        correlations=tuple(one.correlations for one in found if one.correlations),
     )
 
 
@@ -190,18 +193,6 @@ def compare(spec: CalibrationSpec, dataset: Dataset, genome: Mapping[str, float]
     return Comparison(
         recording, turns % 1.0, record.markers, record.positions, tracks, spec.accuracy, observed.solutions[0]
     )
-
-
-def _errors(
-    model: FlexibleWing, stages: tuple[Stage, ...], best: Genome, evaluator: Evaluator
-) -> tuple[dict[str, Standing], GeneCovariance | None]:
-    """Return the standard errors of the genes that any of ``stages`` searched, by name, and their covariance."""
-    known, parts = dict[str, Standing](), list[GeneCovariance]()
-    for stage in stages:
-        errors, part = standing(Problem(model, stage.recordings, stage.free, best), evaluator)
-        known |= errors
-        parts += [part] if part else []
-    return known, GeneCovariance.of_independent(parts)
 
 
 def gene_results(

@@ -307,6 +307,13 @@ class GeneInfo(TypedDict):
     standard_error: NotRequired[float | None]
 
 
+class Correlations(TypedDict):
+    """Correlation coefficients [F][F] of the estimates of ``genes``; null for genes whose error is not known."""
+
+    genes: list[str]
+    values: list[list[float | None]]
+
+
 class GenomeInfo(TypedDict):
     """All genes with their values in the best genome so far; ``final`` is true once the run has succeeded."""
 
@@ -341,7 +348,8 @@ class Result(TypedDict):
 
     ``before_mm`` (nominal genome) and ``after_mm`` (best genome) are means over the fitted recordings, weighted by the
     number of samples. ``noise_mm`` is the mean distance that tracking noise alone would cause. ``covariance`` is that
-    of the genes whose standard errors are known; results of earlier versions have none.
+    of the genes whose standard errors are known, and ``correlations`` are those of the genes of each stage; results of
+    earlier versions have none.
     """
 
     kind: Literal["tracks"]
@@ -354,6 +362,7 @@ class Result(TypedDict):
     recordings: list[RecordingResult]
     genes: list[GeneInfo]
     covariance: NotRequired[GeneCovariance | None]
+    correlations: NotRequired[list[Correlations]]
 
 
 class Numerics(TypedDict):

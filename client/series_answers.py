@@ -6,7 +6,7 @@ from typing import Literal, NotRequired
 
 from typing_extensions import TypedDict
 
-from wingfit.client.answers import GeneCovariance, GeneInfo
+from wingfit.client.answers import Correlations, GeneCovariance, GeneInfo
 
 
 class ChannelResult(TypedDict):
@@ -71,3 +71,4 @@ class SeriesResult(TypedDict):
     genes: list[GeneInfo]
     curves: NotRequired[list[Curve]]
     covariance: NotRequired[GeneCovariance | None]
+    correlations: NotRequired[list[Correlations]]

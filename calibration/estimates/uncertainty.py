@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -64,6 +65,28 @@ class GeneCovariance:
 
 
 @dataclass(frozen=True)
+class Correlations:
+    """Correlation coefficients [F, F] of the estimated values of ``genes``; NaN for a gene whose error is not known.
+
+    Of a weight of a group (``Gene.share_of``) they are those of weight / sum of weights.
+    """
+
+    genes: tuple[str, ...]
+    values: tuple[tuple[float, ...], ...]
+
+
+class GeneErrors(NamedTuple):
+    """Standard errors of the free genes by name, and what is known together; None if the genome cannot be simulated.
+
+    ``correlations`` are those of values and shares, ``covariance`` is that of the genes themselves.
+    """
+
+    standing: dict[str, Standing]
+    correlations: Correlations | None = None
+    covariance: GeneCovariance | None = None
+
+
+@dataclass(frozen=True)
 class Uncertainty:
     """Covariance of an estimate.
 
@@ -109,6 +132,14 @@ class Uncertainty:
         return GeneCovariance(tuple(self.free[k] for k in known), tuple(tuple(row) for row in part.tolist()))
 
     @property
+    def correlations(self) -> Correlations:
+        """Correlations of the values, of weights of a group those of their shares."""
+        scale = np.where(self.known, np.sqrt(np.diag(self.relative)), np.nan)
+        scale[scale == 0.0] = np.nan
+        values = self.relative / scale / scale[:, None]
+        return Correlations(self.free, tuple(tuple(row) for row in values.tolist()))
+
+    @property
     def standing(self) -> dict[str, Standing]:
         """Standard errors of each free gene, by name, and whether the gene is identifiable."""
         errors = np.where(self.known, np.sqrt(np.diag(self.relative)), np.inf)
@@ -119,10 +150,8 @@ class Uncertainty:
 
 
 @one_blas_thread
-def standing(problem: Problem, evaluator: Evaluator) -> tuple[dict[str, Standing], GeneCovariance | None]:
-    """Return the standard errors of each free gene, by name, at the base genome, and the covariance of the known ones.
-
-    Errors are infinite, and there is no covariance, if the genome cannot be simulated.
+def gene_errors(problem: Problem, evaluator: Evaluator) -> GeneErrors:
+    """Return the errors of the free genes at the base genome; infinite, and no correlations, if it cannot be simulated.
 
     For every displaced genome, the start of the simulated beat is aligned anew with each recording of tracks, so the
     errors include the uncertainty of this start.
@@ -130,8 +159,8 @@ def standing(problem: Problem, evaluator: Evaluator) -> tuple[dict[str, Standing
     try:
         found = uncertainty(problem, evaluator)
     except ValueError:
-        return {name: Standing(np.inf, False, np.inf) for name in problem.free}, None
-    return found.standing, found.of_known
+        return GeneErrors({name: Standing(np.inf, False, np.inf) for name in problem.free})
+    return GeneErrors(found.standing, found.correlations, found.of_known)
 
 
 @one_blas_thread

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wingfit.calibration.estimates.likelihood import iterate
-from wingfit.calibration.estimates.uncertainty import GeneCovariance, Standing, uncertainty
+from wingfit.calibration.estimates.uncertainty import Correlations, GeneCovariance, Standing, uncertainty
 from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.preparation import Prepared
 from wingfit.calibration.problem import Evaluation, Problem, base_genome
@@ -63,6 +63,7 @@ def judge_series(
         ),
         curves=curves(everywhere, held_out, relative_to),
         covariance=errors.covariance,
+        correlations=errors.correlations,
     )
 
 
@@ -81,6 +82,7 @@ class _Errors:
     remarks: tuple[str, ...] = ()
     unfinished: tuple[str, ...] = ()
     covariance: GeneCovariance | None = None
+    correlations: tuple[Correlations, ...] = ()
 
 
 def _errors(ready: Prepared, best: Genome, evaluator: Evaluator) -> _Errors:
@@ -92,4 +94,5 @@ def _errors(ready: Prepared, best: Genome, evaluator: Evaluator) -> _Errors:
     except START_ERRORS:
         return _Errors({name: Standing(np.inf, False, np.inf) for name in stage.free})
     moved = {name: abs(step.values[name] - best[name]) / known.standard_errors[name] for name in stage.free}
-    return _Errors(known.standing, known.remarks, remarks.unfinished(moved, MOVED), known.of_known)
+    unfinished = remarks.unfinished(moved, MOVED)
+    return _Errors(known.standing, known.remarks, unfinished, known.of_known, (known.correlations,))

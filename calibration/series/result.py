@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from wingfit.calibration.estimates.uncertainty import GeneCovariance
+from wingfit.calibration.estimates.uncertainty import Correlations, GeneCovariance
 from wingfit.calibration.result import GeneResult
 
 RelativeTo = Literal["noise", "range"]
@@ -85,6 +85,7 @@ class SeriesResult:
         remarks: warnings about the result.
         curves: values over time of the channels that fit worst (:mod:`wingfit.calibration.series.curves`).
         covariance: of the genes whose standard errors are known.
+        correlations: those of the genes that were estimated together.
     """
 
     genes: tuple[GeneResult, ...]
@@ -97,3 +98,4 @@ class SeriesResult:
     remarks: tuple[str, ...] = ()
     curves: tuple[Curve, ...] = ()
     covariance: GeneCovariance | None = None
+    correlations: tuple[Correlations, ...] = ()

@@ -16,7 +16,7 @@ from wingfit.client import series_answers as a
 from wingfit.records import SeriesDataset
 from wingfit.rigs.rig import Rig
 from wingfit.service.answers import answer
-from wingfit.service.runs.views import gene
+from wingfit.service.runs.views import correlations, gene
 
 
 def calibrate(
@@ -56,5 +56,6 @@ def result(outcome: SeriesResult) -> a.SeriesResult:
         outcome,
         kind="series",
         genes=genes,
+        correlations=correlations(outcome.correlations),
         curves=[answer(a.Curve, one, time_s=list(one.time)) for one in outcome.curves],
     )

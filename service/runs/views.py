@@ -10,6 +10,7 @@ import numpy.typing as npt
 from sqlalchemy.orm import class_mapper
 
 from wingfit.calibration import result as tracks_result
+from wingfit.calibration.estimates.uncertainty import Correlations
 from wingfit.checks import Mistake
 from wingfit.client import answers as a
 from wingfit.client.answers import Comparison, Numerics
@@ -155,9 +156,22 @@ def gene(estimated: tracks_result.GeneResult) -> a.GeneInfo:
     return answer(a.GeneInfo, estimated, standard_error=None if error is None else finite(error))
 
 
+def correlations(found: Sequence[Correlations]) -> list[a.Correlations]:
+    """Return the JSON answers about the ``found`` correlations of genes; numbers that are not finite become null."""
+    return [
+        {"genes": list(one.genes), "values": [[finite(value) for value in row] for row in one.values]} for one in found
+    ]
+
+
 def result(outcome: tracks_result.Result) -> a.Result:
     """Return the JSON answer with the result of a calibration on marker tracks."""
-    return answer(a.Result, outcome, kind="tracks", genes=[gene(one) for one in outcome.genes])
+    return answer(
+        a.Result,
+        outcome,
+        kind="tracks",
+        genes=[gene(one) for one in outcome.genes],
+        correlations=correlations(outcome.correlations),
+    )
 
 
 def comparison(tracks: tracks_result.Comparison) -> Comparison:

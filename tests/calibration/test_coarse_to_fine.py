@@ -13,7 +13,7 @@ import pytest
 
 from tests.calibration.test_search import THREE, Here, refused
 from wingfit.calibration.estimates.likelihood import iterate
-from wingfit.calibration.estimates.uncertainty import standing
+from wingfit.calibration.estimates.uncertainty import gene_errors
 from wingfit.calibration.evaluator import as_batch
 from wingfit.calibration.preparation import prepare
 from wingfit.calibration.problem import Evaluation, Problem, base_genome
@@ -84,7 +84,7 @@ def test_auto_ends_at_the_minimum_of_the_fine_wing(small: tuple[Dataset, Genome]
     *_, last = one_blas_thread(lambda: list(iterate(problem, Here(), truth.as_dict())))()
     costs = [end["cost"] for end in whole[-1].checkpoint["ends"]["done"]]
     assert min(costs) == pytest.approx(last.cost, abs=AGREE)
-    errors = standing(replace(problem, base=problem.base.replace(last.values)), Here())[0]
+    errors = gene_errors(replace(problem, base=problem.base.replace(last.values)), Here()).standing
     for name in THREE:
         assert abs(whole[-1].genome[name] - last.values[name]) < errors[name].absolute, name
     searched = whole[2].genome

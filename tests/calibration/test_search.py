@@ -11,7 +11,7 @@ import pytest
 from scipy.signal import lfilter
 
 from wingfit.calibration.estimates.linearised import linearise, unit_at
-from wingfit.calibration.estimates.uncertainty import standing
+from wingfit.calibration.estimates.uncertainty import gene_errors
 from wingfit.calibration.evaluator import as_batch, gather, run_unit, units
 from wingfit.calibration.problem import Evaluation, Problem, base_genome, misfit
 from wingfit.calibration.result import compare, judge
@@ -201,10 +201,10 @@ def test_standing_tells_what_the_data_ignore(small: tuple[Dataset, Genome]) -> N
     dataset, truth = small
     model = wing_model(dataset, SPEC)
     problem = Problem(model, dataset.recordings[:1], ("E_r", "G_f", "L_1"), truth)
-    known = standing(problem, Here())[0]
+    known = gene_errors(problem, Here()).standing
     assert known["E_r"].identifiable
     assert known["E_r"].standard_error < 0.02
-    alone = standing(Problem(model, dataset.recordings[:1], ("ID_b",), truth), Here())[0]
+    alone = gene_errors(Problem(model, dataset.recordings[:1], ("ID_b",), truth), Here()).standing
     assert not alone["ID_b"].identifiable
 
 
@@ -230,7 +230,7 @@ def test_standard_errors_are_honest(small: tuple[Dataset, Genome]) -> None:
         residual = misfit(drawn, np.array([[truth[n] for n in names]]), 0, residuals=True).residuals
         assert residual is not None
         fits.append(pull @ residual.ravel())
-    stated = standing(problem, Here())[0]
+    stated = gene_errors(problem, Here()).standing
     for gene, scatter in zip(_free(problem), np.std(fits, axis=0), strict=True):
         assert stated[gene.name].standard_error == pytest.approx(scatter, rel=0.5), gene.name
 
@@ -243,9 +243,9 @@ def test_a_share_searched_alone_keeps_the_rest_of_its_group(small: tuple[Dataset
     """With three of four weights fixed, the share still has an error; and it is smaller than with all four free."""
     dataset, truth = small
     model = wing_model(dataset, SPEC)
-    alone = standing(Problem(model, dataset.recordings[1:2], ("L_1",), truth), Here())[0]["L_1"]
+    alone = gene_errors(Problem(model, dataset.recordings[1:2], ("L_1",), truth), Here()).standing["L_1"]
     weights = ("L_1", "L_2", "L_3", "L_4")
-    among = standing(Problem(model, dataset.recordings[1:2], weights, truth), Here())[0]["L_1"]
+    among = gene_errors(Problem(model, dataset.recordings[1:2], weights, truth), Here()).standing["L_1"]
     assert 1e-4 < alone.standard_error < among.standard_error
 
 
@@ -265,7 +265,7 @@ def test_a_gene_whose_neighbours_fail_has_no_error_and_stops_nothing(small: tupl
             return Evaluation(tuple(parts))
 
     model = wing_model(dataset, SPEC)
-    known = standing(Problem(model, dataset.recordings[1:2], ("L_a", "L_b"), truth), Fragile())[0]
+    known = gene_errors(Problem(model, dataset.recordings[1:2], ("L_a", "L_b"), truth), Fragile()).standing
     assert known["L_a"].standard_error == np.inf
     assert not known["L_a"].identifiable
     assert known["L_b"].standard_error < 0.1

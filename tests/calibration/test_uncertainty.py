@@ -111,6 +111,7 @@ def test_a_gene_at_its_bound_leaves_the_others_their_errors() -> None:
     )
     errors = stopped.uncertainty.standard_errors
     assert errors["c"] == np.inf
+    assert np.isnan(stopped.uncertainty.correlations.values[2]).all()
     assert [errors["a"], errors["b"]] == pytest.approx(list(fixed.uncertainty.standard_errors.values()), rel=1e-2)
     assert any("c is at its upper bound 1.3" in remark for remark in stopped.remarks)
     assert not any("c has no known error" in remark for remark in stopped.remarks)
@@ -242,6 +243,9 @@ def test_the_ratio_of_twins_is_told_and_said() -> None:
     )
     assert any(remark.startswith("a and b compensate each other") or "a : b" in remark for remark in found.remarks)
     assert found.uncertainty.correlation[0, 1] > 0.99
+    together = found.uncertainty.correlations
+    assert together.genes == found.uncertainty.free
+    np.testing.assert_allclose(together.values, found.uncertainty.correlation, atol=1e-6)
     assert not any("c is not identifiable" in remark for remark in found.remarks)
 
 

@@ -17,6 +17,7 @@ from typing import Any, NoReturn
 
 import numpy as np
 
+from wingfit.calibration.estimates.uncertainty import Correlations
 from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.forces.estimation import Prediction
 from wingfit.calibration.forces.result import Agreement, ForceComparison, GlobalModel, Source
@@ -169,7 +170,8 @@ class ToyEngine(Engine):
         genes = tuple(
             GeneResult(name, "1", name, NOMINAL[name], genome[name], *BOUNDS[name], True, 0.02, True) for name in TARGET
         )
-        return Result(genes, records, 2e-3, misfit(genome), 2e-3, misfit(genome), None)
+        together = Correlations(tuple(TARGET), ((1.0, -0.95), (-0.95, float("nan"))))
+        return Result(genes, records, 2e-3, misfit(genome), 2e-3, misfit(genome), None, correlations=(together,))
 
     def compare(
         self,

@@ -4,6 +4,7 @@ import { call, follow, get, history, isFinal, part } from "../base/api.js";
 import { copy, curl, python } from "../base/copying.js";
 import { $, plural, toast, when } from "../base/format.js";
 import { hideForces, redrawForces, setUpForces, showForces } from "./forces.js";
+import { showGeneCorrelations } from "../base/correlations.js";
 import { redrawCurves, setUpCurves, showCurves } from "../parts/curves.js";
 import { showWaiting } from "../parts/driving.js";
 import { aboutHistory, drawHistory } from "../parts/history.js";
@@ -53,6 +54,7 @@ export async function selectRun(id) {
   stopFollowing = () => {};
   [run, dataset, result, items, genesAt] = [null, null, null, new Map(), 0];
   drawGenes(null);
+  showGeneCorrelations($("gene-correlations"), null);
   drawMisfit(null);
   drawSeriesMisfit(null);
   showCurves(null);
@@ -147,6 +149,7 @@ async function update() {
       drawNumbers(run, result);
       showResult();
       drawGenes({ genes: result.genes, final: true }, isForces(run));
+      showGeneCorrelations($("gene-correlations"), result.correlations);
     }, (error) => toast(error.message));
   } else if (!result && run.generations > 0 && (isFinal(run) || Date.now() - genesAt > GENES_MS)) {
     genesAt = Date.now();

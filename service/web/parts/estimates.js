@@ -1,9 +1,8 @@
 // Coefficients: by condition with their intervals, their correlation, and the global model drawn through them.
 
-import { $, correlation, el, fixed, rounded, plain, plural, significant } from "../base/format.js";
+import { $, el, fixed, rounded, plain, plural, significant } from "../base/format.js";
 import { axis, draw } from "../base/plots.js";
-
-const STRONG = 0.9;
+import { fillCorrelations, STRONG, strongPairs } from "../base/correlations.js";
 
 const names = (result) => result.estimates[0].coefficients.map((coefficient) => coefficient.name);
 
@@ -103,15 +102,11 @@ export function fillEstimates(result) {
   $("estimate").replaceChildren(...result.estimates.map((estimate) => new Option(estimate.name, estimate.name)));
 }
 
-// A table, so that the values can be read, also by a screen reader; the shade shows the strength.
 export function drawCorrelation(result, name) {
   const estimate = result.estimates.find((one) => one.name === name);
   const genes = estimate.coefficients.map((coefficient) => coefficient.name);
-  $("correlation").tHead.replaceChildren(el("tr", {}, el("td"), ...genes.map((gene) => el("th", { scope: "col" }, gene))));
-  $("correlation").tBodies[0].replaceChildren(...estimate.correlation.map((row, i) =>
-    el("tr", {}, el("th", { scope: "row" }, genes[i]), ...row.map((value) => shaded(value)))));
-  const pairs = genes.flatMap((gene, i) => genes.slice(i + 1).map((other, j) => ({ gene, other, value: estimate.correlation[i][i + 1 + j] })));
-  const strong = pairs.filter((pair) => Math.abs(pair.value) > STRONG).map((pair) => `${pair.gene} and ${pair.other}`);
+  fillCorrelations($("correlation"), genes, estimate.correlation);
+  const strong = strongPairs(genes, estimate.correlation).map((pair) => `${pair.name} and ${pair.other}`);
   const noise = estimate.noise_mn2.map((matrix) => significant(Math.sqrt(matrix[0][0]), 3));
   const ofEach = noise.length > 1 ? noise.map((value, i) => `${estimate.recordings[i]} ${value}`).join(", ") : noise[0];
   $("correlation-note").textContent = [
@@ -119,13 +114,4 @@ export function drawCorrelation(result, name) {
     `Standard deviation of the residuals of the first fitted force: ${ofEach} mN.`,
     ...estimate.remarks.map((remark) => `Note: ${remark}.`),
   ].join(" ");
-}
-
-function shaded(value) {
-  const cell = el("td", {}, correlation(value));
-  if (value !== null) {
-    const colour = value < 0 ? "var(--series-2)" : "var(--accent)";
-    cell.style.background = `color-mix(in srgb, ${colour} ${Math.round(45 * Math.abs(value))}%, transparent)`;
-  }
-  return cell;
 }

@@ -11,7 +11,7 @@ import pytest
 from tests.diagnosis.evidence.test_position_errors import HAND, SPEC, described
 from wingfit.diagnosis.evidence.fit import PRIOR_SD, Fit
 from wingfit.diagnosis.evidence.frame_error import changes_by_frame
-from wingfit.diagnosis.evidence.intervals import freedom, covariance
+from wingfit.diagnosis.evidence.intervals import covariance, freedom
 from wingfit.diagnosis.evidence.position_errors import _own, _rigid, changes_by_errors
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.rigs import subject_of

@@ -77,6 +77,12 @@ def test_a_finished_run_is_shown_in_full(seen: Seen, server: ServerProcess, data
     assert seen.page.locator("#misfit .badge.held").count() == 1
     assert seen.page.locator("#genes tbody tr").count() == len(toy.TARGET)
     assert "yes" in seen.page.inner_text("#genes tbody tr:first-child")
+    assert seen.page.inner_text("#gene-correlations summary") == (
+        "Correlations: 1 pair beyond 0.9: stiffness and damping"
+    )
+    seen.page.click("#gene-correlations summary")
+    cells = seen.page.locator("#gene-correlations td").all_inner_texts()
+    assert cells == ["", "1.0000", "-0.9500", "-0.9500", "–"]
     assert "solved to 0.1 mm" in seen.page.inner_text("#run-about")
     assert "144 steps per beat, estimated error 0.02 mm" in seen.page.inner_text("#wing-note")
     assert seen.errors == []
