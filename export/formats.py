@@ -16,6 +16,7 @@ from wingfit.export.calibrated_model import CalibratedModel
 from wingfit.export.model_file import model_json
 from wingfit.export.python.vehicle_file import vehicle_file
 from wingfit.export.python.wing_package import wing_package
+from wingfit.export.tables import tables
 from wingfit.records import Wing
 
 ZIP = "application/zip"
@@ -83,8 +84,13 @@ def _fmu(model: CalibratedModel) -> ExportedFile:
         return ExportedFile(path.name, "application/octet-stream", path.read_bytes())
 
 
+def _tables(model: CalibratedModel) -> ExportedFile:
+    return ExportedFile(f"{stem(model)}_tables.zip", ZIP, archive(dict(tables(model))))
+
+
 WRITERS: Mapping[str, Callable[[CalibratedModel], ExportedFile]] = {
     "python": _python,
+    "tables": _tables,
     "json": _json,
     "fmu": _fmu,
 }

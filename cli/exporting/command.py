@@ -45,5 +45,7 @@ def export(
     with Client(url) as client:
         path = client.export_model(job_id, cast(ModelFormat, format_name), output, hypothesis=hypothesis)
     note(f"{path}, {size(path.stat().st_size)}")
-    if path.suffix == ".py":
-        next_step(f"python {path} --about")
+    if format_name == "python":
+        next_step(f"wingfit export {job_id} --format tables")
+    else:
+        next_step(f"wingfit export {job_id} --format python")

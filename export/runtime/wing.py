@@ -93,8 +93,8 @@ class Motion:
             values = getattr(self, array)
             ends = (None, None) if self.errors is None else self.interval(array, level)
             for index, name in _names(array, self.markers):
-                low, high = (None if end is None else end[..., *index] for end in ends)
-                parts.append((name, values[..., *index], low, high))
+                low, high = (None if end is None else _at(end, index) for end in ends)
+                parts.append((name, _at(values, index), low, high))
         return parts
 
 
@@ -270,6 +270,11 @@ def _names(array: str, markers: tuple[str, ...]) -> list[tuple[tuple[int, ...], 
         ((r, k), f"{rod}_rod_{what}_{axis}_{unit}") for r, rod in enumerate(("front", "rear"))
         for k, axis in enumerate(AXES)
     ]  # fmt: skip
+
+
+def _at(values: Array, index: tuple[int, ...]) -> Array:
+    """Return the series [n] at ``index`` of the other axes."""
+    return np.asarray(values.reshape(len(values), -1)[:, np.ravel_multi_index(index, values.shape[1:])])
 
 
 def _split(name: str) -> tuple[str, str]:

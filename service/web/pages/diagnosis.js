@@ -83,14 +83,27 @@ function update() {
   $("diagnosis-progress").textContent = [done ? null : `${Math.round(100 * diagnosis.progress)} %`, timeLeft(diagnosis),
     diagnosis.state === "RUNNING" ? diagnosis.stage : null,
     plural(diagnosis.evaluations, "evaluation")].filter(Boolean).join(" · ");
-  for (const id of ["report-link", "finding-exports"]) $(id).hidden = !done;
+  for (const id of ["report-link", "finding-exports", "finding-model"]) $(id).hidden = !done;
   $("report-link").href = `${path}/report`;
   for (const format of ["csv", "netcdf", "json"]) $(`finding-${format}`).href = `${path}/export?format=${format}`;
+  offerModel(path);
   if (done && !fetched) fetchReport();
   for (const button of $("diagnosis-actions").querySelectorAll("[data-action]")) {
     button.hidden = isFinal(diagnosis) !== (button.dataset.action === "delete");
     button.disabled = Boolean(diagnosis.pending_action);
   }
+}
+
+// A verdict that names no effects for certain has several models; the page offers the one without effects.
+function offerModel(path) {
+  const open = ["ambiguous", "unnamed"].includes(diagnosis.verdict);
+  const title = open ? "The nominal model without effects; wingfit export --hypothesis chooses another" : "The model with the effects that the verdict names";
+  for (const format of ["python", "tables", "json"]) {
+    const link = $(`finding-model-${format}`);
+    link.title = title;
+    link.href = `${path}/model?format=${format}${open ? "&hypothesis=nominal" : ""}`;
+  }
+  $("finding-model-tables").hidden = diagnosis.kind === "series";
 }
 
 async function fetchReport() {

@@ -119,6 +119,8 @@ def test_nobody_sees_data_of_other_owners(as_: As) -> None:
     ):
         assert bob.client.get(f"/v1/{path}").status_code == 404, path
         assert ann.client.get(f"/v1/{path}").status_code == 200, path
+    for path in (f"runs/{run}", f"diagnoses/{diagnosis}"):
+        assert bob.client.get(f"/v1/{path}/model").status_code == 404, path
     for method, path in (
         ("DELETE", f"datasets/{dataset}"),
         ("DELETE", f"runs/{run}"),
