@@ -158,7 +158,8 @@ def documentation(model: CalibratedModel, product: Product) -> str:
 <h1>{html.escape(model.rig.name)}</h1>
 <p>A model that wingfit {html.escape(source.wingfit_version)} calibrated ({source.origin} {html.escape(source.id)},
 {html.escape(source.source)}) on the dataset {html.escape(source.dataset)}
-(SHA-256 {source.dataset_sha256 or "unknown"}). resources/model.json has all of it: values, their covariance, effects, conditions and provenance.</p>
+(SHA-256 {source.dataset_sha256 or "unknown"}). resources/model.json has all of it: values, their covariance,
+effects, conditions and provenance.</p>
 <p>{html.escape(product.remark)}</p>
 <h2>Fitted range of the inputs</h2>
 <p>Other inputs are refused unless the parameter extrapolate is true.</p>

@@ -104,7 +104,7 @@ class DirectVehicle:
 
     @cached_property
     def laws(self) -> Array:
-        """Law [WEIGHTS, LAW] of the factor on the force of each row (:mod:`wingfit.export.fmu.kernels.vehicle_step`)."""
+        """Law [WEIGHTS, LAW] of the factor on the force of each row; see :func:`.kernels.vehicle_step._weight`."""
         f, pitch = (
             np.array([getattr(c, name) for c in self.conditions]) for name in ("flap_frequency", "angle_of_attack")
         )
