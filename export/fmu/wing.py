@@ -23,11 +23,8 @@ from wingfit.records.array_types import Array
 from wingfit.sim.effects.ports.wing import WingScene
 from wingfit.sim.kernels import LANES, laws
 from wingfit.sim.kernels.arrays import FRAME, STAGES, Lanes, Laws, Setting, State, Trace, Wiring, Work, new_work
-from wingfit.sim.solver.numerics import LADDER
 from wingfit.sim.solver.scene import at_rest, new_trace
-from wingfit.sim.solver.simulate import periodic_beats
 from wingfit.sim.wing.flexible_wing import FlexibleWing
-from wingfit.sim.wing.loads import LOAD_ACCURACY
 
 _CLOSE = 1e-9  # relative: what a law of the inputs may differ from the arrays of a scene
 _LAW_CLOSE = 1e-4  # the same of a law's parameters: a mirror plane lies at the highest of sampled angles
@@ -36,8 +33,8 @@ _CLASSES = (Wiring, Setting, Lanes, Laws, Work, State, Trace, Parts)
 _ARGUMENTS = "wiring setting lanes work state trace parts"
 
 
-def wing_product(model: CalibratedModel) -> Product:
-    """Return the parts of an FMU of a wing.
+def wing_product(model: CalibratedModel, steps: int) -> Product:
+    """Return the parts of an FMU of a wing, with at least ``steps`` of time per beat.
 
     NotExportedError if the wing is rigid, if an effect depends on an input in a way that the FMU does not have, or if
     the wing cannot be simulated under any fitted condition.
@@ -49,7 +46,6 @@ def wing_product(model: CalibratedModel) -> Product:
             "(structure: sheet), calibrate, and export that model"
         )
     genome = np.array(model.genome(condition))
-    steps = _steps(wing, genome, model)
     scene = wing.scene(genome, condition)
     lanes, setting = scene.frozen(), scene.setting(steps)
     wiring = scene.structure.wiring
@@ -81,22 +77,6 @@ def wing_product(model: CalibratedModel) -> Product:
         remark=f"Air of {condition.pressure:.6g} Pa and {condition.temperature:.5g} K, gravity {condition.gravity:g} "
         "m/s^2. The wing starts at rest; its stroke grows over the first beats. Axes: x aft, y outboard, z up.",
     )  # fmt: skip
-
-
-def _steps(wing: FlexibleWing, genome: Array, model: CalibratedModel) -> int:
-    """Return the steps per beat at which loads are accurate, at the fitted conditions of lowest and highest frequency.
-
-    That is one step of the ladder beyond those that the tracks need, because communication steps lie anywhere.
-    """
-    fitted = [one.condition for one in model.recordings if one.condition is not None]
-    ends = {min(fitted, key=lambda one: one.flap_frequency), max(fitted, key=lambda one: one.flap_frequency)}
-    fine = replace(wing, numerics=replace(wing.numerics, accuracy=min(LOAD_ACCURACY, wing.numerics.accuracy)))
-    needed = []
-    for condition in ends:
-        subject = fine.subject(fine._switched_on(genome), condition)
-        (beat,) = periodic_beats(subject, genome[None], fine.numerics)
-        needed.append(len(beat.tracks) if beat.reason is None else LADDER[-1])
-    return max(needed)
 
 
 def _functions(memory: Memory, values: tuple[Any, ...], own: Laws) -> dict[str, Exported]:

@@ -54,7 +54,7 @@ def change_errors(model: CalibratedModel, fmu: Fmu, first: Condition, second: Co
 def _by_kernels(
     wing: FlexibleWing, genome: tuple[float, ...], first: Condition, second: Condition, dt: float, count: int
 ) -> tuple[Array, Array]:
-    """Markers [count, M, 3] and air force [count, 3] from the periodic motion at ``first``, with inputs of ``second``."""
+    """Markers [count, M, 3] and air force [count, 3] from the motion at ``first``, with the inputs of ``second``."""
     fine = replace(wing, numerics=replace(wing.numerics, steps=648, periodic=1e-7))
     motion = fine.beat(genome, blank_recording(wing.wing, first), with_motion=True).motion
     if motion is None:

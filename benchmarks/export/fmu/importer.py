@@ -60,7 +60,7 @@ class Fmu:
         wanted = ",".join(str(self.references[name]) for name in outputs)
         given = [f"{self.references[name]}={value!r}" for name, value in values.items()]
         done = subprocess.run(  # noqa: S603
-            [str(program), str(self.library), self.description.instantiationToken, repr(dt), str(count), wanted, *given],
+            [str(program), str(self.library), self.description.guid, repr(dt), str(count), wanted, *given],
             capture_output=True, text=True, check=False, env={},
         )  # fmt: skip
         if done.returncode:
@@ -72,7 +72,7 @@ class Fmu:
 
 @dataclass(frozen=True)
 class Driven:
-    """Outputs [count, N] after every step, whether the state was restored bit for bit, and whether Python was loaded."""
+    """Outputs [count, N] after every step, whether the state was restored exactly, and whether Python was loaded."""
 
     outputs: Array
     identical: bool
@@ -95,9 +95,10 @@ class Running:
             guid=described.guid, unzipDirectory=self.fmu.folder, instanceName="wing",
             modelIdentifier=described.coSimulation.modelIdentifier,
         )  # fmt: skip
-        self.logger = fmpy.fmi3.fmi3LogMessageCallback(
-            lambda _, status, category, message: self.messages.append(message.decode())
-        )
+
+    def logger(self, *message: Any) -> None:
+        """Keep a message of the FMU; its text is the last argument."""
+        self.messages.append(message[-1].decode())
 
     def set(self, values: Mapping[str, float]) -> None:
         """Set inputs, or parameters before the start."""
