@@ -9,6 +9,11 @@ ENV PYTHONUNBUFFERED=1 \
     PIP_DISABLE_PIP_VERSION_CHECK=1 \
     RAY_USAGE_STATS_ENABLED=0
 
+# An exported FMU contains machine code, which a C compiler links.
+RUN apt-get update \
+    && apt-get install --yes --no-install-recommends gcc libc6-dev \
+    && rm -rf /var/lib/apt/lists/*
+
 RUN useradd --uid 10001 --create-home --shell /usr/sbin/nologin wingfit \
     && install -d -o wingfit -g wingfit -m 0700 /data /run/ray-token \
     && install -d -o wingfit -g wingfit /opt/wingfit

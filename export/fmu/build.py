@@ -21,9 +21,9 @@ from wingfit.export.model_file import model_from_json
 REFUSED = 3  # exit status after a NotExportedError, whose text is the output
 
 
-def build(model: CalibratedModel, folder: Path) -> None:
+def build(model: CalibratedModel, folder: Path, steps: int) -> None:
     """Write model.o, memory.bin, model.h, modelDescription.xml and index.html to ``folder``."""
-    product = product_of(model)
+    product = product_of(model, steps)
     code, image = object_file(product.functions), product.memory.image()
     token = hashlib.sha256(code + image + repr(product.limits).encode()).hexdigest()
     (folder / "model.o").write_bytes(code)
@@ -33,10 +33,10 @@ def build(model: CalibratedModel, folder: Path) -> None:
     (folder / "index.html").write_text(documentation(model, product))
 
 
-def product_of(model: CalibratedModel) -> Product:
-    """Return the parts of an FMU of ``model``; NotExportedError with the remedy where there is none."""
+def product_of(model: CalibratedModel, steps: int) -> Product:
+    """Return the parts of an FMU of ``model``, with ``steps`` per beat; NotExportedError if there is none."""
     if model.kind == "tracks":
-        return wing_product(model)
+        return wing_product(model, steps)
     if model.kind == "forces":
         return vehicle_product(model)
     raise NotExportedError(
@@ -46,9 +46,9 @@ def product_of(model: CalibratedModel) -> Product:
 
 
 def main() -> None:
-    """Read a model as JSON from the standard input, and build it in the folder that is the argument."""
+    """Read a model as JSON from the standard input; build it in the folder given as argument, with the steps given."""
     try:
-        build(model_from_json(sys.stdin.read()), Path(sys.argv[1]))
+        build(model_from_json(sys.stdin.read()), Path(sys.argv[1]), int(sys.argv[2]))
     except NotExportedError as error:
         sys.stdout.write(str(error))
         sys.exit(REFUSED)

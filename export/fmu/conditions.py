@@ -1,15 +1,21 @@
-"""The condition of an FMU: its fixed pressure, temperature and gravity, and where its inputs start."""
+"""The condition of an FMU: fixed pressure, temperature and gravity, where inputs start, and the steps of time."""
 
 from __future__ import annotations
 
 from collections import Counter
 from dataclasses import replace
 
+import numpy as np
+
 from wingfit.export.calibrated_model import CalibratedModel
 from wingfit.export.fmu.memory import Memory
 from wingfit.export.fmu.variables import INPUTS, Limit, Variable
 from wingfit.records import Condition, Wing
 from wingfit.records.array_types import Array
+from wingfit.sim.solver.numerics import LADDER
+from wingfit.sim.solver.simulate import periodic_beats
+from wingfit.sim.wing.flexible_wing import FlexibleWing
+from wingfit.sim.wing.loads import LOAD_ACCURACY
 
 _FIXED = ("pressure", "temperature", "gravity")
 
@@ -55,3 +61,23 @@ def fitted_range(model: CalibratedModel, start: Condition, name: str) -> tuple[f
     value = float(getattr(start, name))
     known = next((one for one in model.ranges if one.name == name), None)
     return (min(known.low, value), max(known.high, value)) if known else (value, value)
+
+
+def steps_for(model: CalibratedModel) -> int:
+    """Return the steps of time per beat at which loads are accurate, at the lowest and the highest fitted frequency.
+
+    It is 1 for a vehicle, whose forces need none, and the largest number for a wing that does not become periodic.
+    """
+    wing = model.simulation() if model.kind == "tracks" else None
+    if not isinstance(wing, FlexibleWing) or wing.wing.structure == "rigid":
+        return 1
+    fitted = [one.condition for one in model.recordings if one.condition is not None]
+    ends = {min(fitted, key=lambda one: one.flap_frequency), max(fitted, key=lambda one: one.flap_frequency)}
+    fine = replace(wing, numerics=replace(wing.numerics, accuracy=min(LOAD_ACCURACY, wing.numerics.accuracy)))
+    needed = []
+    for condition in ends:
+        genome = np.array(model.genome(condition))
+        subject = fine.subject(fine._switched_on(genome), condition)
+        (beat,) = periodic_beats(subject, genome[None], fine.numerics)
+        needed.append(len(beat.tracks) if beat.reason is None else LADDER[-1])
+    return max(needed)

@@ -1,7 +1,7 @@
 """Forces of effects that an FMU does not compute at each instant, as a table over conditions and the beat.
 
-The table holds, at Chebyshev nodes of flap frequency, airspeed and body pitch, the difference of the whole model and the
-part that is computed directly, over a steady beat. Between nodes it is the polynomial through all of them
+The table holds, at Chebyshev nodes of flap frequency, airspeed and body pitch, the difference of the whole model and
+the part that is computed directly, over a steady beat. Between nodes it is the polynomial through all of them
 (Berrut and Trefethen, *Barycentric Lagrange Interpolation*, SIAM Review 46, 2004).
 """
 
@@ -25,7 +25,7 @@ _NARROW = 1e-9  # relative: a range that is one value
 
 @dataclass(frozen=True)
 class Correction:
-    """A table [M1, M2, M3, n, 2] of forces (N); see :class:`wingfit.export.fmu.vehicle_step.Parts`."""
+    """A table [M1, M2, M3, n, 2] of forces (N); see :class:`wingfit.export.fmu.kernels.vehicle_step.Parts`."""
 
     nodes: Array
     barycentric: Array
@@ -60,8 +60,8 @@ def correction_of(direct: DirectVehicle) -> Correction:
             return found
     raise NotExportedError(
         f"the forces of {', '.join(direct.corrected)} vary too fast with the condition for an FMU: the error is "
-        f"{100 * worst:.2g} % of the amplitude, the limit {100 * ACCURACY:g} %: export the model for a narrower range of "
-        "recordings, or without these effects"
+        f"{100 * worst:.2g} % of the amplitude, the limit {100 * ACCURACY:g} %: export the model for a narrower range "
+        "of recordings, or without these effects"
     )
 
 

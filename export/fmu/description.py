@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from xml.sax.saxutils import quoteattr
 
 from wingfit.export.calibrated_model import CalibratedModel
-from wingfit.export.fmu.board import EXTRAPOLATE
+from wingfit.export.fmu.kernels.board import EXTRAPOLATE
 from wingfit.export.fmu.memory import WORD
 from wingfit.export.fmu.product import Product
 from wingfit.export.fmu.variables import Variable
@@ -28,8 +28,9 @@ def identifier(model: CalibratedModel) -> str:
 
 def model_description(model: CalibratedModel, product: Product, token: str) -> str:
     """Return modelDescription.xml (FMI 3.0)."""
-    told = model.provenance
-    about = f"{model.rig.name}, calibrated by wingfit ({told.origin} {told.id}, {told.source})"
+    source = model.provenance
+    about = f"{model.rig.name}, calibrated by wingfit ({source.origin} {source.id}, {source.source})"
+    date = f"generationDateAndTime={quoteattr(source.created_at)} " if source.created_at else ""
     outputs = [FIRST + k for k, one in enumerate(product.variables) if one.causality == "output"]
     units = "\n".join(
         f"    <Unit name={quoteattr(name)}><BaseUnit {base}/></Unit>"
@@ -42,8 +43,8 @@ def model_description(model: CalibratedModel, product: Product, token: str) -> s
     )
     return f"""<?xml version="1.0" encoding="UTF-8"?>
 <fmiModelDescription fmiVersion="3.0" modelName={quoteattr(identifier(model))} instantiationToken="{token}"
-    description={quoteattr(about)} generationTool={quoteattr("wingfit " + told.wingfit_version)}
-    generationDateAndTime={quoteattr(told.created_at)} variableNamingConvention="structured">
+    description={quoteattr(about)} generationTool={quoteattr("wingfit " + source.wingfit_version)}
+    {date}variableNamingConvention="structured">
   <CoSimulation modelIdentifier={quoteattr(identifier(model))} canHandleVariableCommunicationStepSize="true"
       canGetAndSetFMUState="true" canSerializeFMUState="true"/>
   <UnitDefinitions>
@@ -149,15 +150,16 @@ def size_of(product: Product) -> int:
 
 def documentation(model: CalibratedModel, product: Product) -> str:
     """Return documentation/index.html."""
-    told = model.provenance
+    source = model.provenance
     rows = [(one.name, f"{one.value:.6g}", one.unit, one.description) for one in model.parameters]
     limits = [(one.name, f"{one.low:.6g} to {one.high:.6g}", one.unit, "") for one in product.limits]
     return f"""<!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8"><title>{html.escape(model.rig.name)}</title></head><body>
 <h1>{html.escape(model.rig.name)}</h1>
-<p>A model that wingfit {html.escape(told.wingfit_version)} calibrated ({told.origin} {html.escape(told.id)},
-{html.escape(told.source)}) on the dataset {html.escape(told.dataset)} (SHA-256 {told.dataset_sha256 or "unknown"}).
-resources/model.json has all of it: values, their covariance, effects, conditions and provenance.</p>
+<p>A model that wingfit {html.escape(source.wingfit_version)} calibrated ({source.origin} {html.escape(source.id)},
+{html.escape(source.source)}) on the dataset {html.escape(source.dataset)}
+(SHA-256 {source.dataset_sha256 or "unknown"}). resources/model.json has all of it: values, their covariance,
+effects, conditions and provenance.</p>
 <p>{html.escape(product.remark)}</p>
 <h2>Fitted range of the inputs</h2>
 <p>Other inputs are refused unless the parameter extrapolate is true.</p>

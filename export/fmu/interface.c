@@ -1,7 +1,7 @@
 /* FMI 3.0 for co-simulation, around the compiled functions of a calibrated model.
 
    The names and types of the interface are those of the FMI standard, version 3.0 (Modelica Association). The model is
-   one block of memory, whose image is part of this library, and two functions: wingfit_start and wingfit_advance. A
+   one block of memory, whose image is part of this library, and one function, wingfit_run. A
    header, model.h, which the export writes, has the tables: variables, limits, addresses and laws. */
 
 #include <math.h>
@@ -33,8 +33,7 @@ extern const double wingfit_image[];
 __asm__(".section .rodata\n.balign 64\n.globl wingfit_image\nwingfit_image:\n.incbin \"memory.bin\"\n.previous\n");
 
 /* numba's convention: a result, an error that is not used, then the arguments; not zero if memory is exhausted */
-int32_t wingfit_start(int64_t *result, void **error, int64_t memory);
-int32_t wingfit_advance(int64_t *result, void **error, int64_t memory, double dt);
+int32_t wingfit_run(int64_t *result, void **error, int64_t memory, double dt);
 
 typedef struct {
     char *name;
@@ -95,7 +94,7 @@ static Status outputs_of_now(Instance *own) {
     if (!own->stale || own->mode == TERMINATED) return OK;
     int64_t result = 0;
     void *error = NULL;
-    if (wingfit_start(&result, &error, (int64_t)own->memory)) return said(own, ERROR, "memory is exhausted");
+    if (wingfit_run(&result, &error, (int64_t)own->memory, 0.0)) return said(own, ERROR, "memory is exhausted");
     own->stale = false;
     return OK;
 }
@@ -111,7 +110,7 @@ static Status within(Instance *own, Status refusal) {
     if (own->memory[EXTRAPOLATE] != 0.0) return OK;
     for (size_t k = 0; k < LIMIT_COUNT; k++) {
         const Limit *one = &LIMITS[k];
-        double value = own->memory[one->word], margin = 1e-9 * (fabs(one->low) + fabs(one->high)) + 1e-12;
+        double value = own->memory[one->word], margin = 1e-6 * fmax(fmax(fabs(one->low), fabs(one->high)), 1e-3);
         if (value < one->low - margin || value > one->high + margin)
             return said(own, refusal, "%s is %.9g %s; the model was fitted from %.9g to %.9g %s: set it within this range, "
                         "or set the parameter extrapolate to true if you accept an extrapolation",
@@ -123,7 +122,7 @@ static Status within(Instance *own, Status refusal) {
 static Status advance(Instance *own, double dt) {
     int64_t result = 0;
     void *error = NULL;
-    if (wingfit_advance(&result, &error, (int64_t)own->memory, dt)) return said(own, ERROR, "memory is exhausted");
+    if (wingfit_run(&result, &error, (int64_t)own->memory, dt)) return said(own, ERROR, "memory is exhausted");
     if (result != 0)
         return said(own, ERROR, "the wing diverged between %g s and %g s: a body turned more than 1 rad within one step. "
                     "It flutters, or steps_per_beat is too small", own->time, own->time + dt);

@@ -13,6 +13,7 @@ from pathlib import Path
 
 from wingfit.export.calibrated_model import CalibratedModel
 from wingfit.export.fmu.build import REFUSED
+from wingfit.export.fmu.conditions import steps_for
 from wingfit.export.fmu.description import identifier
 from wingfit.export.fmu.native import environment
 from wingfit.export.fmu.product import NotExportedError
@@ -78,7 +79,7 @@ def platform_tuple() -> str:
 
 
 def _build(model: CalibratedModel, folder: Path) -> None:
-    command = [sys.executable, "-m", "wingfit.export.fmu.build", str(folder)]
+    command = [sys.executable, "-m", "wingfit.export.fmu.build", str(folder), str(steps_for(model))]
     done = subprocess.run(  # noqa: S603  (this program)
         command, input=model_json(model), env=environment(), capture_output=True, text=True, check=False
     )

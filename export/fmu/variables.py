@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from wingfit.export.fmu import board as places
+from wingfit.export.fmu.kernels import board as places
 
 Kind = Literal["Float64", "Boolean", "Int32"]
 Causality = Literal["input", "parameter", "tunable", "output"]
@@ -46,7 +46,7 @@ INPUTS = {
     "phase_lag": (places.LAG, "rad", "lag of the rear driving rod behind the front one, in drive phase", -7.0, 7.0),
     "airspeed": (places.AIRSPEED, "m/s", "speed of the stream", 0.0, 1e3),
     "angle_of_attack": (
-        places.PITCH, "rad", "angle of attack of the wing's frame, or body pitch of a vehicle, in the stream", -7.0, 7.0,
+        places.PITCH, "rad", "angle of attack of the wing's frame in the stream, or body pitch of a vehicle", -7.0, 7.0,
     ),
 }  # fmt: skip
 EXTRAPOLATE = Variable(

@@ -8,17 +8,17 @@ import numpy as np
 from numba import carray, types
 
 from wingfit.export.calibrated_model import CalibratedModel
-from wingfit.export.fmu import board as places
-from wingfit.export.fmu import vehicle_step as step
-from wingfit.export.fmu import views
 from wingfit.export.fmu.conditions import inputs_of, parameters_of, reference_condition
 from wingfit.export.fmu.correction import Correction, correction_of
+from wingfit.export.fmu.kernels import board as places
+from wingfit.export.fmu.kernels import vehicle_step as step
+from wingfit.export.fmu.kernels import views
+from wingfit.export.fmu.kernels.vehicle_step import FIXED, Parts, run_vehicle
 from wingfit.export.fmu.memory import Memory
 from wingfit.export.fmu.native import Exported
 from wingfit.export.fmu.product import Product
 from wingfit.export.fmu.variables import EXTRAPOLATE, SMOOTHING, Variable, output
 from wingfit.export.fmu.vehicle_laws import DirectVehicle
-from wingfit.export.fmu.vehicle_step import FIXED, Parts, advance_vehicle, start_vehicle
 from wingfit.records import PassivePitch
 from wingfit.records.array_types import Array, Complex
 from wingfit.sim.effects.ports.vehicle import VehicleScene
@@ -36,22 +36,14 @@ def vehicle_product(model: CalibratedModel) -> Product:
     changing = (parts.board, parts.rows, parts.found, parts.peel)
     memory.add(changing, changing=True)
     memory.add(parts, changing=False)
-    source = (
-        "def start(memory):\n    return start_vehicle({0})\ndef advance(memory, dt):\n    return advance_vehicle({0}, dt)\n"
-    ).format(memory.text(parts, lambda part: type(part).__name__))
-    space: dict[str, Any] = {
-        "Parts": Parts, "carray": carray, "floats": views.floats, "start_vehicle": start_vehicle,
-        "advance_vehicle": advance_vehicle,
-    }  # fmt: skip
-    exec(source, space)  # noqa: S102  (text of numbers and names, made above)
+    made = memory.text(parts, lambda part: type(part).__name__)
+    space: dict[str, Any] = {"Parts": Parts, "carray": carray, "floats": views.floats, "run_vehicle": run_vehicle}
+    exec(f"def run(memory, dt):\n    return run_vehicle({made}, dt)\n", space)  # noqa: S102  (numbers and names)
     inputs, limits = inputs_of(model, condition, memory, parts.board)
     parameters = parameters_of(memory, parts.board, EXTRAPOLATE, SMOOTHING)
     return Product(
         memory=memory, addresses=[], laws=[], board=parts.board, limits=limits,
-        functions={
-            "wingfit_start": Exported(space["start"], types.int64(types.int64)),
-            "wingfit_advance": Exported(space["advance"], types.int64(types.int64, types.float64)),
-        },
+        functions={"wingfit_run": Exported(space["run"], types.int64(types.int64, types.float64))},
         variables=[*inputs, *parameters, *_outputs(memory.word(parts.board.ctypes.data))],
         stop=20.0 / condition.flap_frequency, step=0.0025 / condition.flap_frequency, remark=direct.remark,
     )  # fmt: skip
@@ -71,7 +63,7 @@ def _outputs(first: int) -> list[Variable]:
 
 
 def _parts(direct: DirectVehicle, correction: Correction) -> Parts:
-    scene, vehicle, model = direct.scene, direct.simulation.vehicle, direct.simulation
+    scene, model = direct.scene, direct.simulation
     _, chord, mass, _ = model._span
     followed = _pitch_series(scene)
     k, psi = np.arange(len(followed)), 2j * np.pi * np.arange(model.instants) / model.instants
@@ -102,7 +94,7 @@ def _pitch_series(scene: VehicleScene) -> Complex:
 
 
 def _fixed(direct: DirectVehicle) -> Array:
-    """The numbers of a vehicle that do not change, in the order of :mod:`wingfit.export.fmu.vehicle_step`."""
+    """The numbers of a vehicle that do not change, in the order of :mod:`wingfit.export.fmu.kernels.vehicle_step`."""
     scene, model = direct.scene, direct.simulation
     vehicle, motion, pitch = model.vehicle, scene.setting.motion, scene.setting.motion.pitch
     r, width = model._span[0], model._span[3]

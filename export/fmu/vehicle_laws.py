@@ -9,8 +9,8 @@ from itertools import product
 import numpy as np
 
 from wingfit.export.calibrated_model import CalibratedModel
-from wingfit.export.fmu import vehicle_step as step
 from wingfit.export.fmu.conditions import fitted_range
+from wingfit.export.fmu.kernels import vehicle_step as step
 from wingfit.export.fmu.product import NotExportedError
 from wingfit.records import Condition, Recording
 from wingfit.records.array_types import Array
@@ -46,13 +46,13 @@ class DirectVehicle:
         """What a user of the FMU must know."""
         here = self.condition
         text = (
-            f"Air of {here.pressure:.6g} Pa and {here.temperature:.5g} K. Forces of the wings on the body, not filtered; "
-            "the model has no moments."
+            f"Air of {here.pressure:.6g} Pa and {here.temperature:.5g} K. Forces of the wings on the body, not "
+            "filtered; the model has no moments."
         )
         if self.corrected:
             text += (
-                f" The effects {', '.join(self.corrected)} act as in a steady beat under the present inputs: their flow "
-                "does not remember earlier inputs, and beyond the fitted range they stay as at its edge."
+                f" The effects {', '.join(self.corrected)} act as in a steady beat under the present inputs: their "
+                "flow does not remember earlier inputs, and beyond the fitted range they stay as at its edge."
             )
         return text
 
@@ -104,7 +104,7 @@ class DirectVehicle:
 
     @cached_property
     def laws(self) -> Array:
-        """Law [WEIGHTS, LAW] of the factor on the force of each row (:mod:`wingfit.export.fmu.vehicle_step`)."""
+        """Law [WEIGHTS, LAW] of the factor on the force of each row; see :func:`.kernels.vehicle_step._weight`."""
         f, pitch = (
             np.array([getattr(c, name) for c in self.conditions]) for name in ("flap_frequency", "angle_of_attack")
         )

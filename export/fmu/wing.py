@@ -10,32 +10,31 @@ import numpy as np
 from numba import carray, types
 
 from wingfit.export.calibrated_model import CalibratedModel
-from wingfit.export.fmu import board as places
-from wingfit.export.fmu import views
-from wingfit.export.fmu.conditions import inputs_of, parameters_of, reference_condition
+from wingfit.export.fmu.conditions import fitted_range, inputs_of, parameters_of, reference_condition
+from wingfit.export.fmu.kernels import board as places
+from wingfit.export.fmu.kernels import views
+from wingfit.export.fmu.kernels.wing_step import ORDERS, TERMS, Parts, run_wing
 from wingfit.export.fmu.memory import Memory, relocated
 from wingfit.export.fmu.native import Exported
 from wingfit.export.fmu.product import NotExportedError, Product
 from wingfit.export.fmu.variables import EXTRAPOLATE, RAMP, SMOOTHING, STEPS, Variable, output, vector
-from wingfit.export.fmu.wing_step import ORDERS, Parts, advance_wing, start_wing
 from wingfit.records import Condition
 from wingfit.records.array_types import Array
 from wingfit.sim.effects.ports.wing import WingScene
 from wingfit.sim.kernels import LANES, laws
 from wingfit.sim.kernels.arrays import FRAME, STAGES, Lanes, Laws, Setting, State, Trace, Wiring, Work, new_work
-from wingfit.sim.solver.numerics import LADDER
 from wingfit.sim.solver.scene import at_rest, new_trace
-from wingfit.sim.solver.simulate import periodic_beats
 from wingfit.sim.wing.flexible_wing import FlexibleWing
-from wingfit.sim.wing.loads import LOAD_ACCURACY
 
 _CLOSE = 1e-9  # relative: what a law of the inputs may differ from the arrays of a scene
+_LAW_CLOSE = 1e-4  # the same of a law's parameters: a mirror plane lies at the highest of sampled angles
+_LEAST_LAG = 0.05  # rad: the laws hold for phase lags up to this size at least
 _CLASSES = (Wiring, Setting, Lanes, Laws, Work, State, Trace, Parts)
 _ARGUMENTS = "wiring setting lanes work state trace parts"
 
 
-def wing_product(model: CalibratedModel) -> Product:
-    """Return the parts of an FMU of a wing.
+def wing_product(model: CalibratedModel, steps: int) -> Product:
+    """Return the parts of an FMU of a wing, with at least ``steps`` of time per beat.
 
     NotExportedError if the wing is rigid, if an effect depends on an input in a way that the FMU does not have, or if
     the wing cannot be simulated under any fitted condition.
@@ -47,14 +46,14 @@ def wing_product(model: CalibratedModel) -> Product:
             "(structure: sheet), calibrate, and export that model"
         )
     genome = np.array(model.genome(condition))
-    steps = _steps(wing, genome, model)
     scene = wing.scene(genome, condition)
     lanes, setting = scene.frozen(), scene.setting(steps)
     wiring = scene.structure.wiring
     work = new_work(wiring, setting, lanes)
     state = at_rest(scene.structure, len(lanes.laws.size))
     trace = new_trace(scene.structure, 1, states=len(lanes.laws.size))
-    parts = _parts(wing, genome, condition, scene)
+    lag = max(map(abs, fitted_range(model, condition, "phase_lag")))
+    parts = _parts(_Followed(wing, genome, condition, lag), scene)
     memory = Memory()
     frames = work.strip_frames, work.connector_frames, work.point_frames
     for value in (frames, lanes.laws.strip, lanes.laws.connector, lanes.laws.point):
@@ -80,41 +79,18 @@ def wing_product(model: CalibratedModel) -> Product:
     )  # fmt: skip
 
 
-def _steps(wing: FlexibleWing, genome: Array, model: CalibratedModel) -> int:
-    """Return the steps per beat at which loads are accurate, at the fitted conditions of lowest and highest frequency.
-
-    That is one step of the ladder beyond those that the tracks need, because communication steps lie anywhere.
-    """
-    fitted = [one.condition for one in model.recordings if one.condition is not None]
-    ends = {min(fitted, key=lambda one: one.flap_frequency), max(fitted, key=lambda one: one.flap_frequency)}
-    fine = replace(wing, numerics=replace(wing.numerics, accuracy=min(LOAD_ACCURACY, wing.numerics.accuracy)))
-    needed = []
-    for condition in ends:
-        subject = fine.subject(fine._switched_on(genome), condition)
-        (beat,) = periodic_beats(subject, genome[None], fine.numerics)
-        needed.append(len(beat.tracks) if beat.reason is None else LADDER[-1])
-    return max(needed)
-
-
 def _functions(memory: Memory, values: tuple[Any, ...], own: Laws) -> dict[str, Exported]:
-    """Functions of the object file by their names: start, advance, and the laws of effects."""
+    """Functions of the object file by their names: run, and the laws of effects."""
     names = {one.__name__: one for one in _CLASSES}
     texts = [memory.text(value, lambda part: type(part).__name__) for value in values]
     made = "\n".join(f"    {name} = {text}" for name, text in zip(_ARGUMENTS.split(), texts, strict=True))
-    arguments = ", ".join(_ARGUMENTS.split())
-    source = (
-        f"def start(memory):\n{made}\n    return start_wing({arguments})\n"
-        f"def advance(memory, dt):\n{made}\n    return advance_wing({arguments}, dt)\n"
-    )
+    source = f"def run(memory, dt):\n{made}\n    return run_wing({', '.join(_ARGUMENTS.split())}, dt)\n"
     space: dict[str, Any] = {
         **names, "carray": carray, "floats": views.floats, "integers": views.integers, "flags": views.flags,
-        "start_wing": start_wing, "advance_wing": advance_wing,
+        "run_wing": run_wing,
     }  # fmt: skip
     exec(source, space)  # noqa: S102  (text of numbers and names, made above)
-    found = {
-        "wingfit_start": Exported(space["start"], types.int64(types.int64)),
-        "wingfit_advance": Exported(space["advance"], types.int64(types.int64, types.float64)),
-    }
+    found = {"wingfit_run": Exported(space["run"], types.int64(types.int64, types.float64))}
     used = {int(row[0]) for rows in (own.strip, own.connector, own.point) for row in rows}
     known = {int(compiled.address): law for law, compiled in laws._COMPILED.items()}
     for k, address in enumerate(sorted(used)):
@@ -154,32 +130,34 @@ def _outputs(memory: Memory, wing: FlexibleWing, board: Array, trace: Trace) -> 
     return found
 
 
-def _parts(model: FlexibleWing, genome: Array, condition: Condition, scene: WingScene) -> Parts:
+def _parts(own: _Followed, scene: WingScene) -> Parts:
     """Arrays by which the scene follows the inputs, each verified under other conditions."""
-    own = _Followed(model, genome, condition)
-    parameters, motor = own.linear()
-    rows = np.flatnonzero(np.any(parameters[1] != 0.0, axis=1))
-    compliant = 6 if len(scene.motor) else 3
+    parameters, motor = own.varying()
+    rows = np.flatnonzero(np.any(parameters[1:] != 0.0, axis=(0, 2)))
+    columns = 6 if len(scene.motor) else 3
     return Parts(
         board=np.zeros(places.BOARD), series=own.series(), wind=own.wind(), rows=rows.astype(np.int64),
-        constant=parameters[0][rows].copy(), slope=parameters[1][rows].copy(), motor=motor,
-        profile=np.zeros((STAGES, 2, compliant, LANES)), angles=np.zeros((2, ORDERS)), alive=np.ones(LANES, bool),
+        varying=np.ascontiguousarray(parameters[:, rows]), motor=motor,
+        profile=np.zeros((STAGES, 2, columns, LANES)), angles=np.zeros((2, ORDERS)), alive=np.ones(LANES, bool),
     )  # fmt: skip
 
 
 class _Followed:
     """How the inputs of the kernels depend on the condition, from scenes under several conditions."""
 
-    def __init__(self, model: FlexibleWing, genome: Array, condition: Condition) -> None:
+    def __init__(self, model: FlexibleWing, genome: Array, condition: Condition, reach: float) -> None:
         self.condition = replace(condition, airspeed=max(condition.airspeed, 1.0), phase_lag=0.0)
+        self.reach = reach
         self.scene_at = lambda **changed: model.scene(genome, replace(self.condition, **changed))
+        self.frozen = lambda **changed: self.scene_at(**changed).frozen()
         self.effects = ", ".join(one.name for one in model._switched_on(genome)) or "none"
 
     def wind(self) -> Array:
         """Parts [3, 3] of the stream: constant, and by speed along and across the body."""
         still, along, across = (
-            self.scene_at(airspeed=u, angle_of_attack=a).wind[:, 0] for u, a in ((0.0, 0.0), (1.0, 0.0), (1.0, 0.5 * np.pi))
-        )  # fmt: skip
+            self.scene_at(airspeed=u, angle_of_attack=a).wind[:, 0]
+            for u, a in ((0.0, 0.0), (1.0, 0.0), (1.0, 0.5 * np.pi))
+        )
         found = np.stack([still, along - still, across - still])
         for speed, angle in ((3.0, 0.4), (0.7, -1.1)):
             law = found[0] + speed * (np.cos(angle) * found[1] + np.sin(angle) * found[2])
@@ -195,28 +173,45 @@ class _Followed:
             self._check("the drive", late, seen)
         return np.ascontiguousarray(np.stack([found.real, found.imag], axis=2))
 
-    def linear(self) -> tuple[Array, Array]:
-        """Parameters of the laws [2, P, W] and of the motor [2, MOTOR, W]: constant part, and slope by frequency."""
-        f = self.condition.flap_frequency
-        first, second = (self.scene_at(flap_frequency=rate).frozen() for rate in (f, 2.0 * f))
+    def varying(self) -> tuple[Array, Array]:
+        """Coefficients of the laws' parameters [TERMS, P, W] and of the motor [TERMS, MOTOR, W].
+
+        They are those of one, the flap frequency, and the powers of the phase lag.
+        """
+        f, order = self.condition.flap_frequency, TERMS - 2
+        reach = max(self.reach, _LEAST_LAG)
+        nodes = reach * np.cos(np.pi * np.arange(order + 1) / order)
+        vander = np.linalg.inv(np.vander(nodes, order + 1, increasing=True))
         found = []
-        for one, other in ((first.laws.parameters, second.laws.parameters), (first.laws.motor, second.laws.motor)):
+        for kind in ("parameters", "motor"):
+            late = np.array([getattr(self.frozen(phase_lag=lag).laws, kind) for lag in nodes])
+            one, other = late[order // 2], getattr(self.frozen(flap_frequency=2.0 * f).laws, kind)
             slope = np.where(np.isclose(one, other, rtol=_CLOSE, atol=0.0), 0.0, (other - one) / f)
-            found.append(np.stack([np.where(slope == 0.0, one, one - f * slope), slope]))
+            powers = np.tensordot(vander, late, axes=1)[1:]
+            powers[np.broadcast_to(np.ptp(late, axis=0) <= _CLOSE * np.abs(one), powers.shape)] = 0.0
+            constant = np.where(slope == 0.0, one, one - f * slope)
+            found.append(np.stack([constant, slope, *powers]))
+        self._verify(found)
+        return found[0], found[1]
+
+    def _verify(self, found: list[Array]) -> None:
+        """Compare the laws with scenes under other conditions, and check that nothing else depends on the inputs."""
+        f, first = self.condition.flap_frequency, self.frozen()
         for changed in (
-            {"flap_frequency": 0.4 * f}, {"airspeed": 2.7, "flap_frequency": 1.3 * f}, {"phase_lag": 0.3}, {"angle_of_attack": 0.6},
+            {"flap_frequency": 0.4 * f}, {"airspeed": 2.7, "flap_frequency": 1.3 * f},
+            {"phase_lag": 0.77 * max(self.reach, _LEAST_LAG), "flap_frequency": 0.7 * f}, {"angle_of_attack": 0.6},
         ):  # fmt: skip
-            seen, rate = self.scene_at(**changed).frozen(), changed.get("flap_frequency", f)
+            seen, lag = self.frozen(**changed), changed.get("phase_lag", 0.0)
+            terms = [1.0, changed.get("flap_frequency", f), *(lag**k for k in range(1, TERMS - 1))]
             for law, values in zip(found, (seen.laws.parameters, seen.laws.motor), strict=True):
-                self._check("a law", law[0] + rate * law[1], values)
+                self._check("a law", np.tensordot(terms, law, axes=1), values, _LAW_CLOSE)
             for name in Lanes._fields:
                 if name != "laws":
                     self._check(name, getattr(first, name), getattr(seen, name))
-        return found[0], found[1]
 
-    def _check(self, what: str, law: Any, seen: Any) -> None:
+    def _check(self, what: str, law: Any, seen: Any, close: float = _CLOSE) -> None:
         size = np.abs(np.asarray(seen)).max(initial=1e-300)
-        if not np.allclose(law, seen, rtol=_CLOSE, atol=_CLOSE * size):
+        if not np.allclose(law, seen, rtol=close, atol=close * size):
             raise NotExportedError(
                 f"{what} depends on flap frequency, phase lag, airspeed or angle of attack in a way that an FMU does "
                 f"not have; effects: {self.effects}: export the model without the effect that does"

@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wingfit.export.fmu import board as places
-from wingfit.export.fmu.inputs import TURN, followed, turn_drive
+from wingfit.export.fmu.kernels import board as places
+from wingfit.export.fmu.kernels.inputs import TURN, followed, turn_drive
 from wingfit.records.array_types import Array, Index, Mask
 from wingfit.sim.kernels import LANES, arrays
 from wingfit.sim.kernels.arrays import STAGES, Lanes, Setting, State, Trace, Wiring, Work
@@ -31,6 +31,7 @@ from wingfit.sim.kernels.jit import allocating
 from wingfit.sim.kernels.motor import motor_rates, rods_of
 
 ORDERS = 5  # angle and four derivatives by time
+TERMS = 6  # of a law of the inputs: one, the flap frequency, and the first four powers of the phase lag
 
 
 class Parts(NamedTuple):
@@ -38,17 +39,17 @@ class Parts(NamedTuple):
 
     ``series`` [2, K + 1, 2]: Fourier series of both rods' angle without lag (rod, harmonic, real and imaginary part),
     rad; ``wind`` [3, 3]: parts of the stream (world axes) that are constant, and per metre a second along and across
-    the body; ``rows`` [L] of the laws' parameters that depend on the flap frequency, with their ``constant`` and
-    ``slope`` (by Hz) [L, W]; ``motor`` [2, MOTOR or 0, W]: the same of a compliant drive; ``profile`` [STAGES, 2, 3 or
-    6, W]: of the rods within a step; ``angles`` [2, ORDERS]: of both rods now; ``alive`` [W].
+    the body; ``rows`` [L] of the laws' parameters that depend on flap frequency or phase lag; ``varying`` [TERMS, L,
+    W]: their coefficients of one, the flap frequency (Hz), and powers of the phase lag (rad); ``motor`` [TERMS, MOTOR
+    or 0, W]: the same of a compliant drive; ``profile`` [STAGES, 2, 3 or 6, W]: of the rods within a step; ``angles``
+    [2, ORDERS]: of both rods now; ``alive`` [W].
     """
 
     board: Array
     series: Array
     wind: Array
     rows: Index
-    constant: Array
-    slope: Array
+    varying: Array
     motor: Array
     profile: Array
     angles: Array
@@ -110,7 +111,7 @@ def angles_at(series: Array, board: Array, t: float, out: Array) -> float:
 
 @allocating
 def _chain(a1: float, a2: float, a3: float, a4: float, p1: float, p2: float, p3: float, p4: float, out: Array) -> None:
-    """Set ``out[1:]`` to the derivatives by time of a function with the derivatives a1... by a phase (p1... by time)."""
+    """Set ``out[1:]`` to the derivatives by time of a function; a1...: its own by a phase, p1...: the phase's."""
     out[1] = a1 * p1
     out[2] = a2 * p1 * p1 + a1 * p2
     out[3] = a3 * p1**3 + 3.0 * a2 * p1 * p2 + a1 * p3
@@ -123,18 +124,28 @@ def set_conditions(parts: Parts, setting: Setting, lanes: Lanes) -> None:
     board, laws = parts.board, lanes.laws
     along = board[places.AIRSPEED] * math.cos(board[places.PITCH])
     across = board[places.AIRSPEED] * math.sin(board[places.PITCH])
-    f = board[places.FLAPPING]
     for w in range(LANES):
         for i in range(3):
             setting.wind[i, w] = parts.wind[0, i] + parts.wind[1, i] * along + parts.wind[2, i] * across
         for k in range(len(parts.rows)):
-            laws.parameters[parts.rows[k], w] = parts.constant[k, w] + f * parts.slope[k, w]
+            laws.parameters[parts.rows[k], w] = _law_of(parts.varying[:, k, w], board)
         for k in range(len(laws.motor)):
-            laws.motor[k, w] = parts.motor[0, k, w] + f * parts.motor[1, k, w]
+            laws.motor[k, w] = _law_of(parts.motor[:, k, w], board)
 
 
 @allocating
-def _enter(parts: Parts, setting: Setting, lanes: Lanes, work: Work, state: State) -> None:
+def _law_of(terms: Array, board: Array) -> float:
+    """Return a parameter at the present flap frequency and phase lag, from its coefficients [TERMS]."""
+    lag = board[places.LAGGING]
+    return (
+        terms[0]
+        + terms[1] * board[places.FLAPPING]
+        + lag * (terms[2] + lag * (terms[3] + lag * (terms[4] + lag * terms[5])))
+    )
+
+
+@allocating
+def _enter(parts: Parts, lanes: Lanes, work: Work, state: State) -> None:
     """Place the rods of the state at the drive's angles now, and copy the state to the working arrays."""
     rods = parts.profile[0]
     if len(lanes.laws.motor):
@@ -146,6 +157,15 @@ def _enter(parts: Parts, setting: Setting, lanes: Lanes, work: Work, state: Stat
     work.p[:] = state.p
     work.V[:] = state.V
     work.z[:] = state.z
+
+
+@allocating
+def _put(angles: Array, share: float, profile: Array) -> None:
+    """Set the ``profile`` [3 or 6, W] of a rod to ``angles`` [ORDERS] and the term for explicit dependence on time."""
+    for w in range(LANES):
+        for k in range(min(len(profile), ORDERS)):
+            profile[k, w] = angles[k]
+        profile[len(profile) - 1, w] = share if len(profile) > ORDERS else angles[2] + share
 
 
 @allocating
@@ -168,15 +188,8 @@ def step(wiring: Wiring, setting: Setting, lanes: Lanes, work: Work, state: Stat
     for stage in range(STAGES):
         phases[stage] = angles_at(parts.series, board, NODES[stage] * setting.step, angles)
         for rod in range(2):
-            share = SLOPES[stage] * setting.step * jerk[rod]
-            for w in range(LANES):
-                for k in range(5 if compliant else 3):
-                    profile[stage, rod, k, w] = angles[rod, k]
-                if compliant:
-                    profile[stage, rod, 5, w] = share
-                else:
-                    profile[stage, rod, 2, w] += share
-    _enter(parts, setting, lanes, work, state)
+            _put(angles[rod], SLOPES[stage] * setting.step * jerk[rod], profile[stage, rod])
+    _enter(parts, lanes, work, state)
     for stage in range(STAGES):
         if stage > 0:
             _to_stage(work, state, stage)
@@ -203,66 +216,60 @@ def observe(
     set_conditions(parts, setting, lanes)
     phase = angles_at(parts.series, board, 0.0, parts.angles)
     for rod in range(2):
-        for w in range(LANES):
-            for k in range(5 if compliant else 3):
-                parts.profile[0, rod, k, w] = parts.angles[rod, k]
-            if compliant:
-                parts.profile[0, rod, 5, w] = 0.0
-    _enter(parts, setting, lanes, work, state)
+        _put(parts.angles[rod], 0.0, parts.profile[0, rod])
+    _enter(parts, lanes, work, state)
     _clock(parts, work, phase, 0.0, 0)
     forces(wiring, setting, lanes, work)
     if compliant:
         motor_rates(lanes.laws.motor, work)
     record_step(wiring, setting, lanes, work, trace, 0)
+    board[places.POWER] = 0.0
     for i in range(3):
         board[places.FORCE + i] = board[places.MOMENT + i] = 0.0
         board[places.AIR + i] = trace.air[0, i, 0]
-    n, load, arm, turning = len(wiring.mass), np.zeros(3), np.zeros(3), np.zeros(3)
-    board[places.POWER] = 0.0
     for rod in range(2):
-        board[places.POWER] += trace.power[0, arrays.FRONT_MOTOR + rod, 0]
-        torque = 0.0
-        for i in range(3):
-            load[i] = turning[i] = 0.0
-            arm[i] = state.p[n + rod, i, 0] - lanes.hinge[6 + i, 0]
-            torque -= trace.rods[0, rod, i, 0] * lanes.hinge[i, 0]
-            for j in range(3):
-                load[i] += state.R[n + rod, 3 * i + j, 0] * trace.rods[0, rod, 3 + j, 0]
-                turning[i] += state.R[n + rod, 3 * i + j, 0] * trace.rods[0, rod, j, 0]
-        off = lanes.hinge[3:6, 0]
-        for i in range(3):
-            j, k = (i + 1) % 3, (i + 2) % 3
-            board[places.FORCE + i] += load[i]
-            board[places.MOMENT + i] += turning[i] + arm[j] * load[k] - arm[k] * load[j]
-            # about the true hinge, which lies at ``off`` in the rod's axes
-            lever = trace.rods[0, rod, 3 + j, 0] * off[k] - trace.rods[0, rod, 3 + k, 0] * off[j]
-            torque -= lanes.hinge[i, 0] * lever
-        board[places.FRONT_TORQUE + rod] = torque
+        _add_load(state, lanes, trace, len(wiring.mass) + rod, rod, board)
         board[places.FRONT_ANGLE + rod] = parts.angles[rod, 0]
 
 
 @allocating
-def start_wing(
-    wiring: Wiring, setting: Setting, lanes: Lanes, work: Work, state: State, trace: Trace, parts: Parts
-) -> int:
-    """Let the drive have the flap frequency and the phase lag of the inputs, and set the outputs."""
-    board = parts.board
-    board[places.FLAPPING], board[places.LAGGING] = board[places.FREQUENCY], board[places.LAG]
-    observe(wiring, setting, lanes, work, state, trace, parts)
-    return places.FINE
+def _add_load(state: State, lanes: Lanes, trace: Trace, row: int, rod: int, board: Array) -> None:
+    """Add the load of the wing on a driving rod, which is body number ``row``, to the outputs on the ``board``."""
+    moment, force, torque = np.zeros(3), np.zeros(3), 0.0
+    for i in range(3):
+        for j in range(3):
+            force[i] += state.R[row, 3 * i + j, 0] * trace.rods[0, rod, 3 + j, 0]
+            moment[i] += state.R[row, 3 * i + j, 0] * trace.rods[0, rod, j, 0]
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        arm, other = state.p[row, j, 0] - lanes.hinge[6 + j, 0], state.p[row, k, 0] - lanes.hinge[6 + k, 0]
+        board[places.FORCE + i] += force[i]
+        board[places.MOMENT + i] += moment[i] + arm * force[k] - other * force[j]
+        # about the axis through the true hinge, in the rod's axes
+        turned = lanes.hinge[3 + j, 0] * trace.rods[0, rod, 3 + k, 0]
+        turned -= lanes.hinge[3 + k, 0] * trace.rods[0, rod, 3 + j, 0]
+        torque += lanes.hinge[i, 0] * (turned - trace.rods[0, rod, i, 0])
+    board[places.FRONT_TORQUE + rod] = torque
+    board[places.POWER] += trace.power[0, arrays.FRONT_MOTOR + rod, 0]
 
 
 @allocating
-def advance_wing(
+def run_wing(
     wiring: Wiring, setting: Setting, lanes: Lanes, work: Work, state: State, trace: Trace, parts: Parts, dt: float
 ) -> int:
-    """Advance the wing by ``dt`` seconds in equal steps, whose number per beat is that of the board or a little more."""
-    board = parts.board
-    fastest = max(board[places.FLAPPING], board[places.FREQUENCY], board[places.LEAST])
-    count = max(math.ceil(dt * fastest * board[places.STEPS] - 1e-6), 1)
-    here = Setting(setting.density, setting.wind, setting.gravity, dt / count)
+    """Advance the wing by ``dt`` seconds in equal steps, at least as many per beat as the board says; set the outputs.
+
+    At ``dt`` = 0 the drive takes flap frequency and phase lag of the inputs instead.
+    """
+    board, count = parts.board, 0
+    if dt > 0.0:
+        fastest = max(board[places.FLAPPING], board[places.FREQUENCY], board[places.LEAST])
+        count = max(math.ceil(dt * fastest * board[places.STEPS] - 1e-6), 1)
+    else:
+        board[places.FLAPPING], board[places.LAGGING] = board[places.FREQUENCY], board[places.LAG]
     for _ in range(count):
         set_conditions(parts, setting, lanes)
+        here = Setting(setting.density, setting.wind, setting.gravity, dt / count)
         step(wiring, here, lanes, work, state, parts)
         turn_drive(board, dt / count)
         for w in range(LANES):

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from wingfit.export.fmu import board as places
+from wingfit.export.fmu.kernels import board as places
 from wingfit.records.array_types import Array
 from wingfit.sim.kernels.jit import allocating, inlined
 

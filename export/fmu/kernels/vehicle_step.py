@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wingfit.export.fmu import board as places
-from wingfit.export.fmu.inputs import TURN, followed, turn_drive
+from wingfit.export.fmu.kernels import board as places
+from wingfit.export.fmu.kernels.inputs import TURN, followed, turn_drive
 from wingfit.records.array_types import Array
 from wingfit.sim.kernels.jit import allocating
 from wingfit.sim.vehicle import elements
@@ -67,7 +67,7 @@ class Parts(NamedTuple):
 
 @allocating
 def _series_at(series: Array, phase: float, out: Array) -> None:
-    """Set ``out`` [4] to a Fourier series (real and imaginary parts) and its three derivatives by phase at ``phase``."""
+    """Set ``out`` [4] to a Fourier series [K + 1, 2] and its three derivatives by phase at ``phase``."""
     out[:] = 0.0
     dc, ds = math.cos(phase), math.sin(phase)
     c, s = 1.0, 0.0
@@ -192,7 +192,7 @@ def _correct(parts: Parts, turn: float, force: Array) -> None:
             shares[d, k] = (1.0 if k == hit else 0.0) if hit >= 0 else shares[d, k] / total
     n = table.shape[3]
     at = turn * n
-    k = int(math.floor(at))
+    k = math.floor(at)
     x = at - k
     # cubic between the instants before and behind
     c0, c1 = -x * (x - 1.0) * (x - 2.0) / 6.0, (x + 1.0) * (x - 1.0) * (x - 2.0) / 2.0
@@ -284,16 +284,14 @@ def observe(parts: Parts) -> None:
 
 
 @allocating
-def start_vehicle(parts: Parts) -> int:
-    """Let the drive have the flap frequency of the input, and set the outputs."""
-    parts.board[places.FLAPPING] = parts.board[places.FREQUENCY]
-    observe(parts)
-    return places.FINE
+def run_vehicle(parts: Parts, dt: float) -> int:
+    """Advance the drive by ``dt`` seconds, exactly, and set the outputs: the forces have no memory of their own.
 
-
-@allocating
-def advance_vehicle(parts: Parts, dt: float) -> int:
-    """Advance the drive by ``dt`` seconds, exactly, and set the outputs: the forces have no memory of their own."""
-    turn_drive(parts.board, dt)
+    At ``dt`` = 0 the drive takes the flap frequency of the input instead.
+    """
+    if dt > 0.0:
+        turn_drive(parts.board, dt)
+    else:
+        parts.board[places.FLAPPING] = parts.board[places.FREQUENCY]
     observe(parts)
     return places.FINE
