@@ -33,17 +33,20 @@ class Information:
         assumed: Z^T W Z [P, P], the information if the noise were independent, of the covariance W^-1.
         scores: Z^T W N W Z [P, P], the covariance of the scores Z^T W v under the true noise v of covariance N.
         true: Z^T N^-1 Z [P, P], the information of the likelihood with the true noise.
+        fixed: [P, P] covariance of the scores by disturbances that are constant in a recording, such as a wrong zero:
+            they do not average out with more samples.
     """
 
     assumed: Float[Array, "P P"]
     scores: Float[Array, "P P"]
     true: Float[Array, "P P"]
+    fixed: Float[Array, "P P"]
 
     @classmethod
     def none(cls, size: int) -> Information:
         """Return no information about ``size`` parameters."""
         zero = np.zeros((size, size))
-        return cls(zero, zero, zero)
+        return cls(zero, zero, zero, zero)
 
     @classmethod
     def of(
@@ -53,14 +56,18 @@ class Information:
         shared: Float[Array, "n K"] | None = None,
         shift: tuple[Float[Array, " n"], Float[Array, " n"]] | None = None,
         weight: Float[Array, " n"] | None = None,
+        constant: Float[Array, "n L"] | None = None,
+        times: float = 1.0,
     ) -> Information:
         """Return the information of ``changes`` [n, P] with noise of covariance diag(variance) + shared shared^T.
 
         ``shared`` [n, K]: changes by one standard deviation of each of K random disturbances. ``shift`` = (u, w): the
         recording is aligned by an offset that is estimated from it, so that noise v enters as v + u (w . v).
-        ``weight`` [n] of the squares in a least-squares fit; None: 1.
+        ``weight`` [n] of the squares in a least-squares fit; None: 1. ``constant`` [n, L]: changes by L disturbances
+        that do not average out. The recording has ``times`` as many samples as the changes.
         """
-        common = np.zeros((len(variance), 0)) if shared is None else shared
+        none = np.zeros((len(variance), 0))
+        common, steady = none if shared is None else shared, none if constant is None else constant
         weighted = changes if weight is None else changes * weight[:, None]
         spread = weighted
         if shift is not None:
@@ -70,30 +77,40 @@ class Information:
         across = spread.T @ common
         white = changes / variance[:, None]
         true = changes.T @ white
-        lost = common if shift is None else np.column_stack([common, shift[0] * UNKNOWN])
+        moved = none if shift is None else shift[0][:, None] * UNKNOWN
+        lost = np.hstack([common, steady * np.sqrt(times), moved])
         if lost.shape[1]:
             light = lost.T @ white
             own = np.eye(lost.shape[1]) + lost.T @ (lost / variance[:, None])
             true = true - light.T @ np.linalg.solve(own, light)
-        return cls(changes.T @ weighted, scores + across @ across.T, true)
+        always = spread.T @ steady
+        return cls(changes.T @ weighted, scores + across @ across.T, true, always @ always.T).times(times)
 
     def __add__(self, other: Information) -> Information:
         """Return the information of both sets of recordings."""
-        return Information(self.assumed + other.assumed, self.scores + other.scores, self.true + other.true)
+        return Information(
+            self.assumed + other.assumed,
+            self.scores + other.scores,
+            self.true + other.true,
+            self.fixed + other.fixed,
+        )
 
     def times(self, factor: float) -> Information:
-        """Return the information of ``factor`` times as many samples."""
-        return Information(factor * self.assumed, factor * self.scores, factor * self.true)
+        """Return the information of recordings with ``factor`` times as many samples.
+
+        ``true`` is then that of the same weight of constant disturbances.
+        """
+        return Information(factor * self.assumed, factor * self.scores, factor * self.true, factor**2 * self.fixed)
 
     def about(self, columns: Int[Index, " Q"]) -> Information:
         """Return the information about the parameters ``columns`` [Q] alone, the others being known."""
         part = np.ix_(columns, columns)
-        return Information(self.assumed[part], self.scores[part], self.true[part])
+        return Information(self.assumed[part], self.scores[part], self.true[part], self.fixed[part])
 
     def covariance(self, prior: Float[Array, " P"]) -> Float[Array, "P P"]:
         """Return the covariance [P, P] of least-squares estimates; ``prior`` [P]: information of a normal prior."""
         bread = np.linalg.inv(self.assumed + np.diag(prior))
-        return np.asarray(bread @ (self.scores + np.diag(prior)) @ bread)
+        return np.asarray(bread @ (self.scores + self.fixed + np.diag(prior)) @ bread)
 
 
 def after_fit(true: Float[Array, "P P"], genes: Int[Index, " F"], prior: Float[Array, " F"]) -> Float[Array, "P P"]:

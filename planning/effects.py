@@ -119,7 +119,7 @@ class Evidence:
 
     @classmethod
     def of(cls, assumed: Float[Array, "P P"], columns: Columns, values: float, recordings: int) -> Evidence:
-        """Return the evidence of ``recordings`` of so many ``values``; ``assumed`` [P, P] is the sum of their squares."""
+        """Return the evidence of ``recordings`` of so many ``values``, whose squares add up to ``assumed`` [P, P]."""
         genes = columns.of_genes
         rest = after_fit(assumed, genes, np.full(len(genes), PRIOR**-2))
         return cls(np.diag(rest) / values, recordings, len(columns.effects))

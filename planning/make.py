@@ -39,7 +39,7 @@ def plan_dataset(dataset: Dataset, spec: PlanSpec, evaluator: Evaluator, on_prog
 
     ``dataset`` may be the description of recordings without values (:mod:`wingfit.planning.description`).
     """
-    return _Making(dataset.name, BeatRig.of(dataset, spec, evaluator), spec, on_progress).plan()
+    return Making(dataset.name, BeatRig.of(dataset, spec, evaluator), spec, on_progress).plan()
 
 
 @one_blas_thread
@@ -47,12 +47,12 @@ def plan_rig(
     rig: Rig, dataset: SeriesDataset, spec: PlanSpec, evaluator: Evaluator, on_progress: OnProgress | None = None
 ) -> Plan:
     """Plan for a rig that the user simulates; ValueError as in :func:`plan_dataset`."""
-    return _Making(dataset.name, SeriesRig.of(rig, dataset, spec, evaluator), spec, on_progress).plan()
+    return Making(dataset.name, SeriesRig.of(rig, dataset, spec, evaluator), spec, on_progress).plan()
 
 
 @dataclass(eq=False)
-class _Making:
-    """A plan that is being made."""
+class Making:
+    """A plan that is being made; ``contrasts`` compares the effects once it is."""
 
     name: str
     rig: PlannedRig
@@ -62,12 +62,14 @@ class _Making:
     responses: list[tuple[Response, Sampling]] = field(default_factory=list)
 
     def plan(self) -> Plan:
+        """Simulate, compare, and return the plan."""
         rig, spec, simulator = self.rig, self.spec, self.rig.simulator
         suspects = [] if spec.effects is None else select_suspects(simulator.subject, spec.effects)
         columns = columns_of(simulator.free, suspects)
         genes = [gene for gene in simulator.subject.model.genes if gene.name in simulator.free]
         errors = GeneErrors(genes, simulator.genome)
         said, contrasts = self._planned(suspects, columns)
+        self.contrasts = contrasts
         usual = typical_sampling(rig.samplings)
         target = spec.target_percent / 100.0
         confused = confused_pairs(contrasts)

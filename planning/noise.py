@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 
 from wingfit.calibration.problem import compared
+from wingfit.inference.noise.between_beats import TAPER
 from wingfit.inference.noise.harmonic import harmonic_fit, whole_markers
 from wingfit.inference.noise.mean_beat import fourier_basis
 from wingfit.planning.spec import PlanSpec
@@ -21,7 +22,11 @@ TRACKS_CORRELATION = 0.6  # of successive frames: the filter of a tracker
 FORCES_MN = 3.0  # white noise of the same density as the vibrations of a clamped vehicle at low frequencies
 SCATTER = 0.015  # of the force from beat to beat
 MEMORY = 0.3  # correlation of the scatter of successive beats
+TIMING = 0.0005  # beats: the start of a beat, known from a sensor on the drive
+ZERO_MN = 0.5  # of each axis: drift since the zero was measured
+TRUSTED_BEATS = 20.0  # beats whose scatter says as much about its memory as is known without
 LEAST_BEATS = 6  # from which the scatter of a recording is measured
+STEP = 1e-4  # beats, of a derivative
 HARMONICS = 3  # of forces: those of which the noise is measured, as a calibration's filter passes them
 
 
@@ -35,6 +40,8 @@ class NoiseLevel:
         correlation: of successive samples.
         scatter: relative standard deviation of the amplitude of a beat; 0 for tracks.
         memory: correlation of the amplitudes of successive beats.
+        timing: standard deviation of the start of a beat, in beats; 0 for tracks.
+        zero: standard deviation of the zero of a recording, N; 0 for tracks.
         source: of the deviation, and of the scatter.
     """
 
@@ -42,6 +49,8 @@ class NoiseLevel:
     correlation: float
     scatter: float
     memory: float
+    timing: float
+    zero: float
     source: Source
     source_of_scatter: Source = "default"
 
@@ -67,14 +76,16 @@ def noise_for(dataset: Dataset, recordings: Sequence[Recording], spec: PlanSpec)
     if spec.correlation is not None:
         found = replace(found, correlation=spec.correlation)
     if spec.scatter_percent is not None:
-        found = replace(found, scatter=spec.scatter_percent / 100.0, source_of_scatter="stated")
+        found = replace(found, scatter=spec.scatter_percent / 100.0, memory=MEMORY, source_of_scatter="stated")
+    if spec.zero_mn is not None:
+        found = replace(found, zero=1e-3 * spec.zero_mn)
     return found
 
 
 def _default(*, tracks: bool) -> NoiseLevel:
     if tracks:
-        return NoiseLevel(np.full(3, 1e-3 * TRACKS_MM), TRACKS_CORRELATION, 0.0, 0.0, "default")
-    return NoiseLevel(np.full(2, 1e-3 * FORCES_MN), 0.0, SCATTER, MEMORY, "default")
+        return NoiseLevel(np.full(3, 1e-3 * TRACKS_MM), TRACKS_CORRELATION, 0.0, 0.0, 0.0, 0.0, "default")
+    return NoiseLevel(np.full(2, 1e-3 * FORCES_MN), 0.0, SCATTER, MEMORY, TIMING, 1e-3 * ZERO_MN, "default")
 
 
 def _seen_tracks(recordings: Sequence[Recording]) -> NoiseLevel:
@@ -85,49 +96,97 @@ def _seen_tracks(recordings: Sequence[Recording]) -> NoiseLevel:
         square.append(np.mean((fit.noise**2).reshape(-1, 3)[fit.used[::3]], axis=0))
         lags.append(fit.lag1)
     correlation = float(np.clip(np.mean(lags), 0.0, 0.95))
-    return NoiseLevel(np.sqrt(np.mean(square, axis=0)), correlation, 0.0, 0.0, "recordings")
+    return NoiseLevel(np.sqrt(np.mean(square, axis=0)), correlation, 0.0, 0.0, 0.0, 0.0, "recordings")
 
 
 def _seen_forces(recordings: Sequence[Recording]) -> NoiseLevel:
-    """Return the noise of unfiltered ``recordings`` of forces: the scatter of their beats, and the rest."""
-    found = [beats for one in recordings if (beats := _beats(one)) is not None]
+    """Return the noise of unfiltered ``recordings`` of forces: the scatter of their beats, and the rest.
+
+    The zero of a recording cannot be seen in it, so that its standard deviation is the default.
+    """
+    found = [beats for one in recordings if (beats := _Beats.of(one)) is not None]
     if not found:
         return _default(tracks=False)
-    level = np.sqrt(np.mean([square for square, _, _ in found], axis=0))
-    scatter, memory = (float(np.mean([one[k] for one in found])) for k in (1, 2))
-    return NoiseLevel(level, 0.0, scatter, float(np.clip(memory, 0.0, 0.8)), "recordings", "recordings")
+    level = np.sqrt(np.mean([one.square for one in found], axis=0))
+    beats = float(sum(one.beats for one in found))
+    scatter = sum(one.power[0] * one.beats for one in found) / beats
+    lasting, timing = (sum(one.lasting[k] * one.beats for one in found) / beats for k in (0, 1))
+    usual = (1.0 + MEMORY) / (1.0 - MEMORY)
+    lasting = _shrunk(lasting, usual * scatter, beats)
+    memory = float(np.clip((lasting - scatter) / max(lasting + scatter, 1e-300), 0.0, 0.9))
+    spread, start = float(np.sqrt(scatter)), float(np.sqrt(timing))
+    return NoiseLevel(level, 0.0, spread, memory, start, 1e-3 * ZERO_MN, "recordings", "recordings")
 
 
-def _beats(recording: Recording) -> tuple[Array, float, float] | None:
-    """Return the square of the noise [2] (N^2), the scatter, and its correlation; None for too few beats.
+def _shrunk(found: float, usual: float, beats: float) -> float:
+    """Return the weighted mean of what so many ``beats`` show and of the ``usual`` value."""
+    return (found * beats + usual * TRUSTED_BEATS) / (beats + TRUSTED_BEATS)
 
-    The amplitude of each beat is that of its least-squares fit to the mean beat. The noise is the spectral density of
-    the rest between the harmonics, times the samples per second.
+
+@dataclass(frozen=True)
+class _Beats:
+    """What differs between the beats of a recording of forces.
+
+    Attributes:
+        beats: whole beats.
+        square: [2] of the noise along x and z, N^2: the spectral density of the rest between the harmonics, times the
+            samples per second; NaN for an axis that was not recorded.
+        power: variances of the amplitude of a beat, and of its start (beats).
+        lasting: of both, the variance of the mean of many beats, times their number.
     """
-    fit = harmonic_fit(recording, compared(recording, recording.forces))
-    turns = recording.condition.flap_frequency * recording.times
-    number = np.floor(turns - turns[0] + 1e-9).astype(int)
-    beats = int(np.floor(turns[-1] - turns[0] + 1e-6))
-    if beats < LEAST_BEATS:
-        return None
-    values = np.where(recording.valid, recording.values, 0.0)
-    steady = ~fit.trend
-    mean = fourier_basis(2 * np.pi * turns, int(fit.order.max())) @ fit.coefficients[:, steady].T
-    mean = np.where(recording.valid, mean, 0.0)
-    amplitude = np.array([_ratio(values[number == k], mean[number == k]) for k in range(beats)])
-    rest = values - mean * np.interp(turns - turns[0], np.arange(beats) + 0.5, amplitude)[:, None]
-    between = (np.arange(HARMONICS) + 0.5)[:, None] * 2 * np.pi * turns
-    power = np.abs(np.exp(-1j * between) @ rest) ** 2 / max(len(turns), 1)
-    own = amplitude - amplitude.mean()
-    spread = float(np.sqrt(own @ own / (beats - 1)))
-    lag = float(own[1:] @ own[:-1] / max(own @ own, 1e-300)) + 1.0 / beats
-    deviation = np.mean(power, axis=0)
-    return (
-        np.array([deviation[recording.forces.index(a)] if a in recording.forces else np.nan for a in "xz"]),
-        (spread),
-        lag,
-    )
+
+    beats: int
+    square: Float[Array, " 2"]
+    power: tuple[float, float]
+    lasting: tuple[float, float]
+
+    @classmethod
+    def of(cls, recording: Recording) -> _Beats | None:
+        """Fit amplitude and start of every beat of ``recording`` by least squares; None for too few beats."""
+        fit = harmonic_fit(recording, compared(recording, recording.forces))
+        turns = recording.condition.flap_frequency * recording.times
+        since = turns - turns[0]
+        number, beats = np.floor(since + 1e-9).astype(int), int(np.floor(since[-1] + 1e-6))
+        if beats < LEAST_BEATS:
+            return None
+        seen = recording.valid
+        order, series = int(fit.order.max()), fit.coefficients[:, ~fit.trend]
+        mean = fourier_basis(2 * np.pi * turns, order) @ series.T
+        values = np.where(seen, recording.values - mean, 0.0)
+        # Vibrations are large at the higher harmonics, which a calibration's filter does not pass.
+        slow = series[:, fit.order[~fit.trend] <= HARMONICS]
+        now, later = (fourier_basis(2 * np.pi * (turns + step), HARMONICS) @ slow.T for step in (0.0, STEP))
+        shapes = np.stack([np.where(seen, now, 0.0), np.where(seen, (later - now) / STEP, 0.0)])
+        own, inverse = np.empty((beats, 2)), np.zeros((2, 2))
+        for k in range(beats):
+            part = shapes[:, number == k].reshape(2, -1)
+            gram = part @ part.T
+            own[k] = np.linalg.solve(gram, part @ values[number == k].ravel())
+            inverse += np.linalg.inv(gram) / beats
+        moved = np.stack([np.interp(since, np.arange(beats) + 0.5, one) for one in own.T])
+        rest = values - np.einsum("ktc,kt->tc", shapes, moved)
+        between = (np.arange(HARMONICS) + 0.5)[:, None] * 2 * np.pi * turns
+        density = np.mean(np.abs(np.exp(-1j * between) @ rest) ** 2 / len(turns), axis=0)
+        square = dict(zip(recording.forces, density.tolist(), strict=True))
+        noise = np.diag(inverse) * float(density.mean())
+        power, lasting = _variances(own)
+        return cls(
+            beats,
+            np.array([square.get(axis, np.nan) for axis in ("x", "z")]),
+            tuple(np.maximum(power - noise, 0.0).tolist()),
+            tuple(np.maximum(lasting - noise, 0.0).tolist()),
+        )
 
 
-def _ratio(values: Array, mean: Array) -> float:
-    return float(np.sum(values * mean) / max(float(np.sum(mean**2)), 1e-300))
+def _variances(own: Float[Array, "B K"]) -> tuple[Float[Array, " K"], Float[Array, " K"]]:
+    """Return the variance [K] of ``own`` [B, K], values of B beats, and that of the mean of many, times their number.
+
+    With the taper of :mod:`wingfit.inference.noise.between_beats`.
+    """
+    count, about = len(own), own - own.mean(axis=0)
+    power = (about**2).sum(axis=0)
+    total, pairs = TAPER[0] * power, TAPER[0] * count
+    for lag, weight in enumerate(TAPER[1:], 1):
+        total = total + 2.0 * weight * (about[lag:] * about[:-lag]).sum(axis=0)
+        pairs += 2.0 * weight * (count - lag)
+    return power / (count - 1), np.maximum(total / count / (1.0 - pairs / count**2), 0.0)

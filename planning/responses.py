@@ -61,17 +61,36 @@ class Response:
         deviation = noise.deviation[_axes(self.recording)][kept]
         variance = np.repeat(noise.density(self.cycles[usable] / sampling.frames)[:, None], len(deviation), axis=1)
         changes = (self.changes[usable][:, kept] / deviation[:, None]).reshape(variance.size, -1)
-        shared = None
-        if noise.scatter > 0.0:
-            size = noise.scatter_of_mean * np.sqrt(sampling.frames / (self.frames * self.beats))
-            shared = size * (self.base[usable][:, kept] / deviation).reshape(-1, 1)
         shift = None
         if self.shift is not None:
-            along, weight = (one[usable][:, kept] for one in self.shift)
-            shift = (along / deviation).ravel(), (weight * deviation).ravel()
+            along, offset = (one[usable][:, kept] for one in self.shift)
+            shift = (along / deviation).ravel(), (offset * deviation).ravel()
         weight = np.repeat((deviation**2 / self._assumed(noise, sampling, kept))[None], len(variance), axis=0)
-        found = Information.of(changes, variance.ravel(), shared, shift, weight.ravel())
-        return found.times(sampling.samples / len(self.recording.times))
+        beats, zero = (np.moveaxis(one[usable][:, kept] / deviation[:, None], -1, 0) for one in self._disturbed(noise))
+        beats = beats * np.sqrt(sampling.frames / (self.frames * self.beats))
+        return Information.of(
+            changes,
+            variance.ravel(),
+            beats.reshape(len(beats), variance.size).T,
+            shift,
+            weight.ravel(),
+            zero.reshape(len(zero), variance.size).T,
+            sampling.samples / len(self.recording.times),
+        )
+
+    def _disturbed(self, noise: NoiseLevel) -> tuple[Float[Array, "n C K"], Float[Array, "n C L"]]:
+        """Return changes that differ from beat to beat, and changes that are constant in a recording.
+
+        Both by one standard deviation: of the amplitude and the start of a beat, and of the zero of each axis.
+        """
+        shape = self.base.shape
+        if self.recording.kind == "tracks":
+            return np.zeros((*shape, 0)), np.zeros((*shape, 0))
+        rate = _rate(self.recording)
+        beats = np.stack([noise.scatter_of_mean * self.base, noise.timing * coefficients(rate)], axis=-1)
+        zero = np.zeros((*shape, shape[1]))
+        zero[0] = np.diag(np.full(shape[1], noise.zero * np.sqrt(shape[0])))
+        return beats, zero
 
     def _assumed(self, noise: NoiseLevel, sampling: Sampling, kept: Mask) -> Float[Array, " c"]:
         """Return the variances of a sample that a fit will find: noise that a low-pass lets pass, and scatter."""
@@ -83,7 +102,7 @@ class Response:
         return np.asarray(square + noise.scatter**2 * np.mean(self.recording.values[:, kept] ** 2, axis=0))
 
 
-def coefficients(values: Float[Array, "T *C"]) -> Float[Array, "T *C"]:  # noqa: F821
+def coefficients(values: Array) -> Array:
     """Return the coefficients [T, ...] of ``values`` [T, ...] in an orthonormal basis: mean, cosines, sines."""
     count = len(values)
     wave = np.fft.rfft(values, axis=0) * np.sqrt(2.0 / count)
@@ -107,6 +126,14 @@ def _axes(recording: Recording) -> Array:
     return np.tile(np.arange(3), len(recording.markers))
 
 
+def _rate(recording: Recording) -> Array:
+    """Return the derivative [T, C] of the values of ``recording`` by the time in beats."""
+    count = len(recording.times)
+    beats = count * float(recording.times[1] - recording.times[0]) * recording.condition.flap_frequency
+    wave = np.fft.rfft(recording.values, axis=0) * (2j * np.pi * np.arange(count // 2 + 1))[:, None]
+    return np.asarray(np.fft.irfft(wave, n=count, axis=0) / beats)
+
+
 def _shift(wing: Wing, recording: Recording) -> tuple[Array, Array]:
     """Return the change of each coefficient by the phase (rad), and what its noise adds to the phase that is found.
 
@@ -115,9 +142,7 @@ def _shift(wing: Wing, recording: Recording) -> tuple[Array, Array]:
     """
     count = len(recording.times)
     psi = 2 * np.pi * recording.condition.flap_frequency * recording.times
-    wave = np.fft.rfft(recording.values, axis=0) * (2j * np.pi * np.arange(count // 2 + 1))[:, None]
-    step = psi[1] - psi[0]
-    along = np.fft.irfft(wave, n=count, axis=0) / (step * count)
+    along = _rate(recording) / (2 * np.pi)
     start = recorded_crossing(wing, recording)
     order = np.arange(1, REFERENCE_HARMONICS + 1)
     window = (1.0 + 2.0 * np.cos(np.outer(psi - start, order)).sum(axis=1)) / count

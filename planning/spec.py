@@ -16,6 +16,7 @@ REAL = {
     "noise_mn": (1e-6, 1e6, "mN"),
     "correlation": (0.0, 0.99, ""),
     "scatter_percent": (0.0, 100.0, "%"),
+    "zero_mn": (0.0, 1e6, "mN"),
     "power": (0.5, 0.999, ""),
     "target_percent": (0.01, 100.0, "%"),
 }
@@ -24,6 +25,7 @@ KINDS: dict[str, tuple[AnyKind, str]] = {
     "markers": ("tracks", "marker tracks of a wing"),
     "noise_mn": ("forces", "forces of a vehicle"),
     "scatter_percent": ("forces", "forces of a vehicle"),
+    "zero_mn": ("forces", "forces of a vehicle"),
 }
 
 
@@ -39,6 +41,7 @@ class PlanSpec:
         noise_mn: standard deviation of a sample of white noise of the force, mN.
         correlation: of the noise of successive frames or samples.
         scatter_percent: standard deviation of the force's amplitude from beat to beat, in per cent.
+        zero_mn: standard deviation of the zero of a recording of forces, by drift since it was measured, mN.
         beats: recorded beats of each recording (tracks: apparent ones under a strobe); of another rig: repeats of each.
         frames: frames or samples per beat; not for other rigs.
         markers: number of markers, spread over the wing; None: all.
@@ -54,6 +57,7 @@ class PlanSpec:
     noise_mn: float | None = None
     correlation: float | None = None
     scatter_percent: float | None = None
+    zero_mn: float | None = None
     beats: int | None = None
     frames: int | None = None
     markers: int | None = None
