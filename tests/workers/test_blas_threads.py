@@ -35,7 +35,7 @@ GUARDED: tuple[Callable[..., object], ...] = (
     agreement.agreements, agreement.comparison,
     evaluator.run_unit, global_model.fit_global, global_model.at, likelihood.iterate, likelihood.estimate,
     harmonic.noise_distance, summary.summarise, result.judge, result.compare, search.calibrate,
-    uncertainty.standing, uncertainty.uncertainty,
+    uncertainty.gene_errors, uncertainty.uncertainty,
     diagnosis.check, diagnosis.diagnose, diagnosis.diagnose_subject,
     free_flight.free_flight, free_flight.recording, rigid_body.poses,
     smoothing.fit_periodic, smoothing.PeriodicFit.at, smoothing.PeriodicFit.error_at,
