@@ -86,6 +86,8 @@ def test_recorded_and_simulated_never_hide_each_other() -> None:
     assert residual.y == pytest.approx([1.0] * 8)  # mN
     assert residual.yaxis != modelled.yaxis
     assert figure.layout.yaxis2.title.text == "residual, mN"
+    both = plot.forces(forces()).layout
+    assert [both.xaxis2.title.text, both.xaxis4.title.text] == ["", style.PHASE], "below the last pair alone"
     band = [one for one in figure.data if one.fill == "tonexty"]
     assert band[0].y == pytest.approx(np.array(recorded.y) + 10)
 
