@@ -12,12 +12,14 @@ those of the web page and of the report. plotly is imported with the first figur
 - :func:`ranking`: the hypotheses of a finding.
 - :func:`intervals`: estimates of genes with their intervals and bounds.
 - :func:`conditions`: the conditions of the recordings of a dataset.
+- :func:`dark`: any of these figures in dark colours.
 """
 
 from wingfit.plot.beats import comparison, forces, residual
 from wingfit.plot.estimates import intervals, ranking
 from wingfit.plot.recordings import conditions
 from wingfit.plot.search import history
+from wingfit.plot.themes import dark
 from wingfit.plot.tracks import wing
 
-__all__ = ["comparison", "conditions", "forces", "history", "intervals", "ranking", "residual", "wing"]
+__all__ = ["comparison", "conditions", "dark", "forces", "history", "intervals", "ranking", "residual", "wing"]

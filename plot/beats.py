@@ -60,7 +60,9 @@ def comparison(source: object, recording: str | None = None, channels: Sequence[
         2 * len(shown), row_heights=[VALUES, RESIDUAL] * len(shown), subplot_titles=titles, vertical_spacing=gap
     )
     for k, one in enumerate(shown):
-        _pair(figure, one, 2 * k + 1, first=k == 0)
+        # A title of the axis would reach into the title of the next channel.
+        below = shown[k + 1].x_label if k + 1 < len(shown) else ""
+        _pair(figure, one, 2 * k + 1, x_title="" if one.x_label == below else one.x_label)
     left = len(curves) - len(shown)
     more = f"; {left} more channels are not drawn" if left else ""
     return finish(
@@ -135,8 +137,9 @@ def forces(source: Mapping[str, Any], quantities: Sequence[str] | None = None) -
     return finish(figure, "Simulated forces over the beat", TOP + BOTTOM + int(1.3 * ROW), hovermode="x unified")
 
 
-def _pair(figure: Figure, one: Curves, row: int, *, first: bool) -> None:
+def _pair(figure: Figure, one: Curves, row: int, *, x_title: str) -> None:
     """Draw the curves of one channel into ``row``, and their residuals into the row below."""
+    first = row == 1
     trace = objects().Scatter
     if one.spread is not None:
         for sign, fill in ((-1, None), (1, "tonexty")):
@@ -157,7 +160,7 @@ def _pair(figure: Figure, one: Curves, row: int, *, first: bool) -> None:
             left.update(mode="markers", marker={"size": 4, "color": look["color"], "symbol": SYMBOLS[k % 2]})
         figure.add_trace(left, row + 1, 1)
     _axes(figure, row, "", one.unit, one)
-    _axes(figure, row + 1, one.x_label, f"residual{', ' if one.unit else ''}{one.unit}", one, zero=True)
+    _axes(figure, row + 1, x_title, f"residual{', ' if one.unit else ''}{one.unit}", one, zero=True)
     figure.update_xaxes(showticklabels=False, row=row, col=1)
 
 

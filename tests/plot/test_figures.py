@@ -14,7 +14,7 @@ from tests.plot.samples import HISTORY, forces, gene, series, tracks
 from tests.report.findings import force_finding, wing_finding, with_verdict
 from wingfit import plot
 from wingfit.calibration.forces.result import LocalEstimate
-from wingfit.plot import style
+from wingfit.plot import style, themes
 from wingfit.report import finding_json
 
 ROOT = Path(__file__).parents[2]
@@ -33,6 +33,24 @@ def test_the_colours_are_those_of_the_page_and_of_the_report() -> None:
     for name, colour in (("ink", style.INK), ("quiet", style.QUIET), ("faint", style.FAINT), ("line", style.LINE)):
         assert f"--{name}: {colour};" in page
     assert f"--before:{style.BEFORE};--after:{style.AFTER};" in report
+
+
+def test_dark_figures_have_the_dark_colours_of_the_page_and_of_the_report() -> None:
+    page = (ROOT / "service" / "web" / "style.css").read_text().partition("color-scheme: dark")[2].partition("* {")[0]
+    report = (ROOT / "report" / "templates" / "style.css").read_text()
+    for k, colour in enumerate(themes.SERIES, 1):
+        assert f"--series-{k}: {colour};" in page
+    for name, colour in (("ink", themes.INK), ("quiet", themes.QUIET), ("faint", themes.FAINT), ("line", themes.LINE)):
+        assert f"--{name}: {colour};" in page
+    assert f"--ground: {themes.GROUND};" in page
+    assert f"--before:{themes.BEFORE};--after:{themes.AFTER};" in report
+    for light in (plot.history(HISTORY), plot.wing(tracks()), plot.forces(forces()), plot.ranking(wing_finding())):
+        found = plot.dark(light)
+        assert light.layout.paper_bgcolor == style.GROUND, "the figure itself stays light"
+        assert [len(found.data), len(found.frames)] == [len(light.data), len(light.frames)]
+        assert found.layout.paper_bgcolor == themes.GROUND
+        drawn = {"data": found.to_plotly_json()["data"], "layout": {**found.to_plotly_json()["layout"], "template": 0}}
+        assert not [colour for colour in themes.DARK if f"'{colour}'" in str(drawn)], "none is left"
 
 
 def test_the_history_has_a_gap_between_stages_and_no_mean_of_one_individual() -> None:
@@ -68,6 +86,8 @@ def test_recorded_and_simulated_never_hide_each_other() -> None:
     assert residual.y == pytest.approx([1.0] * 8)  # mN
     assert residual.yaxis != modelled.yaxis
     assert figure.layout.yaxis2.title.text == "residual, mN"
+    both = plot.forces(forces()).layout
+    assert [both.xaxis2.title.text, both.xaxis4.title.text] == ["", style.PHASE], "below the last pair alone"
     band = [one for one in figure.data if one.fill == "tonexty"]
     assert band[0].y == pytest.approx(np.array(recorded.y) + 10)
 

@@ -44,7 +44,8 @@ function chart(look, { unit, time_s: time, recorded, nominal, best }) {
     ["recorded", recorded, { color: look.ink, width: 1.5 }], ["nominal genome", nominal, { color: look.faint, width: 1.5, dash: "dot" }],
     ["best genome", best, { color: look.accent, width: 1.75, dash: "dash" }],
   ];
-  const residual = [["nominal genome", nominal, { line: { color: look.faint, width: 1.25, dash: "dot" } }], ["best genome", best, {}]];
+  // That of the nominal genome is so much larger that nothing would be seen of the other.
+  const residual = best ? [["best genome", best, {}]] : [["nominal genome", nominal, { line: { color: look.faint, width: 1.25, dash: "dot" } }]];
   return withResidual(look, {
     traces: shown.filter(([, y]) => y).map(([name, y, line]) => ({
       x: time, y, name, type: "scatter", mode: "lines", line, hovertemplate: `%{y:.4g}<extra>${name}</extra>`,

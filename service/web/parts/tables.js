@@ -135,11 +135,11 @@ export function drawGenes(genome, means = false) {
 
 function geneRow(gene) {
   const vague = gene.searched && gene.identifiable === false;
-  const name = el("abbr", { title: gene.description }, gene.name);
   return el("tr", { className: gene.searched ? (vague ? "vague" : "") : "off" },
-    el("td", {}, name), el("td", { className: "n" }, significant(gene.nominal)),
+    el("td", {}, gene.name), el("td", { className: "n" }, significant(gene.nominal)),
     el("td", { className: "n" }, significant(gene.best)), el("td", {}, gene.unit === "1" ? "" : gene.unit),
-    el("td", { className: "wide" }, boundsBar(gene)), el("td", {}, identifiable(gene)));
+    el("td", { className: "wide" }, boundsBar(gene)), el("td", {}, identifiable(gene)),
+    el("td", { className: "prose" }, el("small", {}, gene.description)));
 }
 
 function boundsBar(gene) {

@@ -77,6 +77,8 @@ def test_a_finished_run_is_shown_in_full(seen: Seen, server: ServerProcess, data
     assert seen.page.locator("#misfit .badge.held").count() == 1
     assert seen.page.locator("#genes tbody tr").count() == len(toy.TARGET)
     assert "yes" in seen.page.inner_text("#genes tbody tr:first-child")
+    described = [gene["description"] for gene in server.api.get(f"/v1/runs/{run_id}/genome")["genes"]]
+    assert [row[-1] for row in seen.rows("genes")] == described, "also for those who cannot point at a name"
     assert seen.page.inner_text("#gene-correlations summary") == (
         "Correlations: 1 pair beyond 0.9: stiffness and damping"
     )

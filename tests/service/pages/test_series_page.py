@@ -248,10 +248,12 @@ def test_lines_end_where_samples_are_missing(seen: Seen, run: str) -> None:
 
     seen.page.route("**/result", without_a_block)
     seen.open(run)
-    seen.wait(DRAWN.format("curve-plot", 4))
-    for trace in range(5):
+    seen.wait(DRAWN.format("curve-plot", 3))
+    for trace in range(4):
         values = seen.data("curve-plot", trace, "y")
         assert [k for k, value in enumerate(values) if value is None] == [10]
+    residual = np.subtract(seen.data("curve-plot", 0, "y")[:10], seen.data("curve-plot", 2, "y")[:10])
+    assert seen.data("curve-plot", 3, "y")[:10] == pytest.approx(residual), "of the best genome alone"
     assert "as stated" in seen.page.inner_text("#series-misfit-note")
 
 
