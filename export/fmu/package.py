@@ -11,11 +11,10 @@ import tempfile
 from pathlib import Path
 
 from wingfit.export.calibrated_model import CalibratedModel
-from wingfit.export.fmu.build import REFUSED
 from wingfit.export.fmu.conditions import steps_for
 from wingfit.export.fmu.description import identifier
 from wingfit.export.fmu.native import environment
-from wingfit.export.fmu.product import NotExportedError
+from wingfit.export.fmu.product import REFUSED, NotExportedError
 from wingfit.export.formats import archive
 from wingfit.export.model_file import model_json
 
