@@ -12,8 +12,9 @@ from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from wingfit.export.calibrated_model import CalibratedModel
+from wingfit.export.calibrated_model import AnyRig, CalibratedModel
 from wingfit.export.model_file import model_json
+from wingfit.export.python.rig_file import rig_file
 from wingfit.export.python.vehicle_file import vehicle_file
 from wingfit.export.python.wing_package import wing_package
 from wingfit.export.tables import tables
@@ -72,7 +73,8 @@ def _python(model: CalibratedModel) -> ExportedFile:
     if isinstance(model.rig, Wing):
         files = {f"{name}/{path}": text for path, text in wing_package(model, name).items()}
         return ExportedFile(f"{name}.zip", ZIP, archive(files))
-    return ExportedFile(f"{stem(model)}.py", "text/x-python", vehicle_file(model).encode())
+    text = rig_file(model) if isinstance(model.rig, AnyRig) else vehicle_file(model)
+    return ExportedFile(f"{name}.py", "text/x-python", text.encode())
 
 
 def _fmu(model: CalibratedModel) -> ExportedFile:
@@ -85,6 +87,8 @@ def _fmu(model: CalibratedModel) -> ExportedFile:
 
 
 def _tables(model: CalibratedModel) -> ExportedFile:
+    if isinstance(model.rig, AnyRig):
+        raise FormatError(f"rig {model.rig.name!r} is simulated by its own program: take the format python or json")
     return ExportedFile(f"{stem(model)}_tables.zip", ZIP, archive(dict(tables(model))))
 
 

@@ -34,19 +34,32 @@ def vehicle_file(model: CalibratedModel) -> str:
     vehicle, simulation = model.vehicle, model.simulation()
     if not isinstance(simulation, BladeElementWing):
         raise TypeError("a vehicle is simulated by blade elements")
-    package = f"_wingfit_model_{hashlib.sha256(repr(model).encode()).hexdigest()[:12]}"
     folders = effect_folders(model.settings.effects)
-    starts = [RUNTIME, "wingfit.export.runtime.command_line", *folders]
-    modules = collect(starts, _replaced(simulation.instants, folders), package)
-    return TEMPLATE.format(
-        title=title(model),
-        package=package,
-        modules="".join(f"    {name!r}: {_quoted(source)},\n" for name, source in modules.items()),
+    settings = (simulation.terms, simulation.elements, simulation.instants, simulation.peel_width, simulation.effects)
+    body = VEHICLE_BODY.format(
         vehicle=pformat(vehicle, width=LINE, sort_dicts=False),
         calibrated=pformat(model.calibrated, width=LINE, sort_dicts=False),
-        settings=repr(
-            (simulation.terms, simulation.elements, simulation.instants, simulation.peel_width, simulation.effects)
-        ),
+        settings=repr(settings),
+    )
+    starts = [RUNTIME, "wingfit.export.runtime.command_line", *folders]
+    return bundled(model, starts, folders, body, VEHICLE_ABOUT, simulation.instants)
+
+
+def bundled(
+    model: CalibratedModel, starts: list[str], folders: tuple[str, ...], body: str, about: str, instants: int = 8
+) -> str:
+    """Return the text of a file with the modules ``starts`` and all that they import, in front of ``body``.
+
+    ``folders``: modules of its effects; ``about``: how to use the file; ``body`` names the package {package}.
+    """
+    package = f"_wingfit_model_{hashlib.sha256(repr(model).encode()).hexdigest()[:12]}"
+    modules = collect(starts, _replaced(instants, folders), package)
+    return TEMPLATE.format(
+        title=title(model),
+        about=about.strip(),
+        package=package,
+        modules="".join(f"    {name!r}: {_quoted(source)},\n" for name, source in modules.items()),
+        body=body.replace("{package}", package),
     )
 
 
@@ -122,12 +135,7 @@ def _quoted(source: str) -> str:
 TEMPLATE = '''#!/usr/bin/env python3
 """{title}
 
-    from model import Model
-    found = Model().forces(flap_frequency_hz=12.0)      # found.force_n [n, 2], found.mean_n, found.interval()
-
-or on the command line: python model.py --help. Conditions outside the fitted range are refused, unless
-extrapolate=True (--extrapolate). The file needs Python 3.11 and numpy. The code of the simulation, part of wingfit,
-is under the MIT licence.
+{about} The code of wingfit in it is under the MIT licence.
 """
 
 import importlib.abc
@@ -170,9 +178,19 @@ class _Modules(importlib.abc.MetaPathFinder, importlib.abc.Loader):
 if not any(getattr(one, "package", "") == _Modules.package for one in sys.meta_path):
     sys.meta_path.insert(0, _Modules())
 
-from {package}.export.runtime.command_line import run  # noqa: E402
-from {package}.export.runtime.conditions import OutsideRangeError  # noqa: E402, F401
-from {package}.export.runtime.parts import (  # noqa: E402, F401
+{body}'''
+
+VEHICLE_ABOUT = """
+    from model import Model
+    found = Model().forces(flap_frequency_hz=12.0)      # found.force_n [n, 2], found.mean_n, found.interval()
+
+or on the command line: python model.py --help. Conditions outside the fitted range are refused, unless
+extrapolate=True (--extrapolate). The file needs Python 3.11 and numpy.
+"""
+
+VEHICLE_BODY = '''from {{package}}.export.runtime.command_line import run  # noqa: E402
+from {{package}}.export.runtime.conditions import OutsideRangeError  # noqa: E402, F401
+from {{package}}.export.runtime.parts import (  # noqa: E402, F401
     Calibrated,
     Covariance,
     FittedRange,
@@ -180,9 +198,9 @@ from {package}.export.runtime.parts import (  # noqa: E402, F401
     Parameter,
     Provenance,
 )
-from {package}.export.runtime.vehicle import Forces, VehicleModel  # noqa: E402, F401
-from {package}.records.dataset import Condition  # noqa: E402, F401
-from {package}.records.vehicle import (  # noqa: E402, F401
+from {{package}}.export.runtime.vehicle import Forces, VehicleModel  # noqa: E402, F401
+from {{package}}.records.dataset import Condition  # noqa: E402, F401
+from {{package}}.records.vehicle import (  # noqa: E402, F401
     ChordStation,
     FourierFlap,
     FourierPitch,

@@ -7,7 +7,7 @@ uncertain parameters change, but neither the noise of an instrument nor physics 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from statistics import NormalDist
 
 import numpy as np
@@ -49,20 +49,42 @@ def gene_covariance(calibrated: Calibrated, condition: Condition) -> tuple[list[
     return places, np.asarray(to_values @ matrix @ to_values.T + scatter)
 
 
+def covariance_of_values(calibrated: Calibrated, places: Sequence[int]) -> tuple[list[int], Array]:
+    """Return the indices [F] in ``places`` of the uncertain parameters, and the covariance [F, F] of their values.
+
+    ``places``: indices of parameters. For models without slopes.
+    """
+    known = calibrated.covariance
+    if known is None:
+        return [], np.zeros((0, 0))
+    names = [calibrated.parameters[k].name for k in places]
+    uncertain = [k for k, name in enumerate(names) if name in known.names]
+    rows = [known.names.index(names[k]) for k in uncertain]
+    return uncertain, np.array(known.matrix)[np.ix_(rows, rows)]
+
+
 def with_errors(
     simulate: Callable[[Array], Array], calibrated: Calibrated, condition: Condition, genome: npt.ArrayLike
 ) -> tuple[Array, Array | None]:
-    """Return ``simulate`` at ``genome`` [G], and the standard errors of its numbers; None without a covariance.
+    """Return ``simulate`` at ``genome`` [G] under a condition, and standard errors; as :func:`with_covariance`."""
+    places, covariance = gene_covariance(calibrated, condition)
+    bounds = calibrated.parameters
+    return with_covariance(simulate, np.asarray(genome, float), places, covariance, bounds)
+
+
+def with_covariance(
+    simulate: Callable[[Array], Array], base: Array, places: Sequence[int], covariance: Array,
+    parameters: Sequence[Parameter],
+) -> tuple[Array, Array | None]:  # fmt: skip
+    """Return ``simulate`` at ``base`` [G], and the standard errors of its numbers; None if nothing is uncertain.
 
     ``simulate`` returns an array [B, ...] for genomes [B, G]; the parts of the answer have its shape without B.
+    ``covariance`` [F, F] is that of the values at ``places`` [F]; ``parameters`` [G] have the bounds.
     """
-    base = np.asarray(genome, float)
-    places, covariance = gene_covariance(calibrated, condition)
-    if not places:
+    if not len(places):
         return simulate(base[None])[0], None
     steps = [
-        _steps(calibrated.parameters[k], float(base[k]), float(np.sqrt(covariance[row, row])))
-        for row, k in enumerate(places)
+        _steps(parameters[k], float(base[k]), float(np.sqrt(covariance[row, row]))) for row, k in enumerate(places)
     ]
     batch = np.tile(base, (1 + 2 * len(places), 1))
     for row, (k, (down, up)) in enumerate(zip(places, steps, strict=True)):

@@ -6,14 +6,16 @@ from wingfit.diagnosis.finding import Finding
 from wingfit.export.calibrated_model import CalibratedModel, Provenance
 from wingfit.export.formats import ExportedFile, FormatError, exported
 from wingfit.export.from_finding import ChoiceError, of_finding
+from wingfit.export.from_rig import of_series, of_series_finding
 from wingfit.export.from_run import of_forces, of_tracks
 from wingfit.export.runtime.parts import Origin
-from wingfit.records import wing_or_vehicle
+from wingfit.records import SeriesDataset, wing_or_vehicle
 from wingfit.report.finding_file import finding_from_json
 from wingfit.service.container import Service
 from wingfit.service.diagnoses import views as diagnosis_views
 from wingfit.service.http.problems import conflict, error_item, invalid
 from wingfit.service.outcomes import force_views
+from wingfit.service.rigs.stored_rig import rig_of
 from wingfit.service.runs import best_genome
 from wingfit.service.storage import store
 from wingfit.service.storage.tables import DatasetRow, DiagnosisRow, RunRow
@@ -31,6 +33,8 @@ def of_run(service: Service, run_id: str) -> CalibratedModel:
         )
     spec, loaded = store.spec(row), service.datasets.get(row.dataset_id)
     source = _provenance("run", row, dataset_row, spec.seed)
+    if isinstance(loaded, SeriesDataset) and row.rig is not None:
+        return of_series(spec, rig_of(row.rig), loaded, best_genome.best(row), row.result, source)
     dataset = wing_or_vehicle(loaded)
     if row.kind == "tracks":
         return of_tracks(spec, dataset, best_genome.best(row), row.result, source)
@@ -50,10 +54,11 @@ def of_diagnosis(service: Service, diagnosis_id: str, hypothesis: str | None) ->
         finding: Finding = finding_from_json(store.finding(session, diagnosis_id))
     spec = diagnosis_views.spec(row)
     source = _provenance("diagnosis", row, dataset_row, spec.calibration.seed)
+    loaded, nominal = service.datasets.get(row.dataset_id), spec.calibration
     try:
-        return of_finding(
-            spec.calibration, wing_or_vehicle(service.datasets.get(row.dataset_id)), finding, hypothesis, source
-        )
+        if isinstance(loaded, SeriesDataset) and row.rig is not None:
+            return of_series_finding(nominal, rig_of(row.rig), loaded, finding, hypothesis, source)
+        return of_finding(nominal, wing_or_vehicle(loaded), finding, hypothesis, source)
     except ChoiceError as error:
         if hypothesis is None:
             raise conflict(str(error), verdict=finding.verdict) from None

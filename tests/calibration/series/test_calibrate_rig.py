@@ -60,6 +60,9 @@ def test_every_method_recovers_the_truth(method: str) -> None:
     own = genes(found)
     for name, truth in {**TRUTH, "start[a]": STARTS["a"], "start[b]": STARTS["b"], "speed[a]": 0.1}.items():
         assert distance(own[name], truth) < 3.5, name
+    assert found.covariance is not None
+    for name, row, k in zip(found.covariance.names, found.covariance.matrix, range(len(own)), strict=False):
+        assert row[k] == pytest.approx((own[name].absolute_error or 0.0) ** 2)
         assert own[name].searched
     assert own["stiffness"].absolute_error == pytest.approx(0.02, rel=0.5)
     assert own["stiffness"].identifiable
