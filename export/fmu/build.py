@@ -13,12 +13,10 @@ from pathlib import Path
 from wingfit.export.calibrated_model import CalibratedModel
 from wingfit.export.fmu.description import documentation, header, model_description
 from wingfit.export.fmu.native import object_file
-from wingfit.export.fmu.product import NotExportedError, Product
+from wingfit.export.fmu.product import REFUSED, NotExportedError, Product
 from wingfit.export.fmu.vehicle import vehicle_product
 from wingfit.export.fmu.wing import wing_product
 from wingfit.export.model_file import model_from_json
-
-REFUSED = 3  # exit status after a NotExportedError, whose text is the output
 
 
 def build(model: CalibratedModel, folder: Path, steps: int) -> None:

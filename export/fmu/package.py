@@ -8,18 +8,16 @@ import shutil
 import subprocess
 import sys
 import tempfile
-import zipfile
 from pathlib import Path
 
 from wingfit.export.calibrated_model import CalibratedModel
-from wingfit.export.fmu.build import REFUSED
 from wingfit.export.fmu.conditions import steps_for
 from wingfit.export.fmu.description import identifier
 from wingfit.export.fmu.native import environment
-from wingfit.export.fmu.product import NotExportedError
+from wingfit.export.fmu.product import REFUSED, NotExportedError
+from wingfit.export.formats import archive
 from wingfit.export.model_file import model_json
 
-_DATE = (1980, 1, 1, 0, 0, 0)  # so that the same model gives the same file
 _VISIBLE = "{ global: fmi3*; local: *; };\n"
 _FLAGS = ("-std=gnu11", "-O2", "-fPIC", "-shared", "-fvisibility=hidden", "-ffp-contract=off")
 
@@ -46,13 +44,7 @@ def write_fmu(model: CalibratedModel, path: str | os.PathLike[str]) -> None:
             "modelDescription.xml": "modelDescription.xml", f"binaries/{platform_tuple()}/{library}": library,
             "resources/model.json": "model.json", "documentation/index.html": "index.html",
         }  # fmt: skip
-        whole = folder / "model.fmu"
-        with zipfile.ZipFile(whole, "w", zipfile.ZIP_DEFLATED) as archive:
-            for name, source in members.items():
-                entry = zipfile.ZipInfo(name, _DATE)
-                entry.compress_type, entry.external_attr = zipfile.ZIP_DEFLATED, 0o644 << 16
-                archive.writestr(entry, (folder / source).read_bytes())
-        shutil.copyfile(whole, path)
+        Path(path).write_bytes(archive({name: (folder / source).read_bytes() for name, source in members.items()}))
 
 
 def c_compiler() -> str:

@@ -10,6 +10,8 @@ from wingfit.export.fmu.variables import Limit, Variable
 from wingfit.export.formats import FormatError
 from wingfit.records.array_types import Array
 
+REFUSED = 3  # exit status of the process that builds, after a NotExportedError whose text is its output
+
 
 class NotExportedError(FormatError):
     """A model cannot be exported as an FMU, or this machine cannot make one; the text has the remedy."""

@@ -148,9 +148,16 @@ class _Followed:
     def __init__(self, model: FlexibleWing, genome: Array, condition: Condition, reach: float) -> None:
         self.condition = replace(condition, airspeed=max(condition.airspeed, 1.0), phase_lag=0.0)
         self.reach = reach
-        self.scene_at = lambda **changed: model.scene(genome, replace(self.condition, **changed))
-        self.frozen = lambda **changed: self.scene_at(**changed).frozen()
+        self.model, self.genome = model, genome
         self.effects = ", ".join(one.name for one in model._switched_on(genome)) or "none"
+
+    def scene_at(self, **changed: float) -> WingScene:
+        """Return the scene under the condition with some fields ``changed``."""
+        return self.model.scene(self.genome, replace(self.condition, **changed))
+
+    def frozen(self, **changed: float) -> Lanes:
+        """Return the inputs of the kernels under the condition with some fields ``changed``."""
+        return self.scene_at(**changed).frozen()
 
     def wind(self) -> Array:
         """Parts [3, 3] of the stream: constant, and by speed along and across the body."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -45,6 +45,9 @@ def wing_errors(model: CalibratedModel, fmu: Fmu, condition: Condition, beats: i
     assert isinstance(wing, FlexibleWing)  # noqa: S101
     genome, recording = model.genome(condition), blank_recording(wing.wing, condition)
     tracks, loads = wing.beat(genome, recording).tracks, simulate_outputs(wing, genome, recording)
+    # loads of the strips contain the force of added mass, which a beat, like the FMU, does not
+    same = replace(wing, numerics=replace(wing.numerics, steps=len(loads.phase)))
+    wanted = same.beat(genome, recording).air
     markers = [f"marker.{one.name}.{axis}" for one in wing.wing.markers for axis in "xyz"]
     forces = [f"air_force.{axis}" for axis in "xyz"]
     torques = ["front.torque", "rear.torque"]
@@ -59,7 +62,7 @@ def wing_errors(model: CalibratedModel, fmu: Fmu, condition: Condition, beats: i
     apart = np.linalg.norm(own - tracks[:: len(tracks) // shared], axis=2).max()
     air, motors = found[:, -5:-2], found[:, -2:]
     torque = np.stack([one.torque for one in loads.motors], axis=1)
-    return Errors(1e3 * float(apart), max(percent(air, loads.air), percent(motors, torque)))
+    return Errors(1e3 * float(apart), max(percent(air, wanted), percent(motors, torque)))
 
 
 def vehicle_errors(model: CalibratedModel, fmu: Fmu, condition: Condition) -> Errors:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shutil
+import subprocess
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
@@ -86,6 +88,17 @@ def test_an_importer_in_c_needs_no_python_and_restores_states(
         running.series(outputs, dt, count)
         assert np.array_equal(running.get(outputs), driven.outputs[-1])
         running.close()
+
+
+def test_the_libraries_need_nothing_but_the_c_library(wing_fmu: Fmu, vehicle_fmu: Fmu) -> None:
+    tool = shutil.which("nm")
+    if tool is None:
+        pytest.skip("nm, which lists symbols, is not installed: apt install binutils")
+    for fmu in (wing_fmu, vehicle_fmu):
+        listed = subprocess.run([tool, "-D", str(fmu.library)], check=True, capture_output=True, text=True).stdout
+        kinds = [line.split()[-2:] for line in listed.splitlines()]
+        assert [name for kind, name in kinds if kind == "U" and "@GLIBC" not in name] == []
+        assert [name for kind, name in kinds if kind == "T" and not name.startswith("fmi3")] == []
 
 
 def test_a_state_is_restored_after_inputs_have_changed(wing_fmu: Fmu, wing: CalibratedModel) -> None:
