@@ -104,13 +104,14 @@ def _seen_forces(recordings: Sequence[Recording]) -> NoiseLevel:
 
     The zero of a recording cannot be seen in it, so that its standard deviation is the default.
     """
-    found = [beats for one in recordings if (beats := _Beats.of(one)) is not None]
+    found = [fit for one in recordings if (fit := _Beats.of(one)) is not None]
     if not found:
         return _default(tracks=False)
     level = np.sqrt(np.mean([one.square for one in found], axis=0))
-    beats = float(sum(one.beats for one in found))
-    scatter = sum(one.power[0] * one.beats for one in found) / beats
-    lasting, timing = (sum(one.lasting[k] * one.beats for one in found) / beats for k in (0, 1))
+    weights = np.array([float(one.beats) for one in found])
+    beats, part = float(weights.sum()), weights / weights.sum()
+    scatter = float(part @ np.array([one.power[0] for one in found]))
+    lasting, timing = (float(part @ np.array([one.lasting[k] for one in found])) for k in (0, 1))
     usual = (1.0 + MEMORY) / (1.0 - MEMORY)
     lasting = _shrunk(lasting, usual * scatter, beats)
     memory = float(np.clip((lasting - scatter) / max(lasting + scatter, 1e-300), 0.0, 0.9))

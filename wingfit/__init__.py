@@ -13,7 +13,7 @@ raises :class:`DatasetError`, which lists what is wrong.
 - :func:`wing_template` describes a wing by an outline of its planform, and returns :class:`WingTemplate`;
 :func:`wing_drawing` draws a described wing as SVG.
 - :func:`calibrate` estimates the genes of a model in this process, without a server; :func:`diagnose` reports which
-physics the model is missing.
+physics the model is missing; :func:`plan` predicts which genes and effects an experiment will identify.
 - :func:`drive` simulates a rig of the user's own for a job on a server, which knows only its :func:`declaration`.
 - :class:`Rig` is a rig with a simulation of the user's own; :class:`Suspect` an effect that it may be missing,
 :class:`Port` a place where laws may act, :class:`Run` what its simulation computes.
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from wingfit._align import align_recordings, align_tracks
     from wingfit._drive import drive
     from wingfit._film import track_film
-    from wingfit._local import calibrate, diagnose
+    from wingfit._local import calibrate, diagnose, plan
     from wingfit.calibration.forces.result import ForceResult
     from wingfit.calibration.result import GeneResult, RecordingResult, Result
     from wingfit.calibration.series.result import SeriesResult
@@ -46,6 +46,8 @@ if TYPE_CHECKING:
     from wingfit.importers import ImportedTracks, import_tracks
     from wingfit.importers.forces import ImportedForces, import_forces
     from wingfit.importers.planform import WingTemplate, wing_template
+    from wingfit.planning.outcome import Plan
+    from wingfit.planning.spec import PlanSpec
     from wingfit.records import (
         Channel,
         Condition,
@@ -88,6 +90,8 @@ __all__ = [
     "ImportedTracks",
     "MarkerNoise",
     "Mistake",
+    "Plan",
+    "PlanSpec",
     "Port",
     "Quantity",
     "Recording",
@@ -118,6 +122,7 @@ __all__ = [
     "import_tracks",
     "load_dataset",
     "marker_noise",
+    "plan",
     "plot",
     "save_dataset",
     "track_film",
@@ -129,7 +134,7 @@ _MODULES = {
     "wingfit._align": ("align_recordings", "align_tracks"),
     "wingfit._drive": ("drive",),
     "wingfit._film": ("track_film",),
-    "wingfit._local": ("calibrate", "diagnose"),
+    "wingfit._local": ("calibrate", "diagnose", "plan"),
     "wingfit.calibration.forces.result": ("ForceResult",),
     "wingfit.calibration.result": ("GeneResult", "RecordingResult", "Result"),
     "wingfit.calibration.series.result": ("SeriesResult",),
@@ -143,6 +148,8 @@ _MODULES = {
     "wingfit.importers": ("ImportedTracks", "import_tracks"),
     "wingfit.importers.forces": ("ImportedForces", "import_forces"),
     "wingfit.importers.planform": ("WingTemplate", "wing_template"),
+    "wingfit.planning.outcome": ("Plan",),
+    "wingfit.planning.spec": ("PlanSpec",),
     "wingfit.records": (
         "Channel",
         "Condition",

@@ -18,6 +18,8 @@ from wingfit.checks.examine import examine
 from wingfit.checks.load import refuse
 from wingfit.diagnosis import DiagnosisSpec, Finding, Progress, diagnose_rig
 from wingfit.diagnosis import diagnose as steps_of
+from wingfit.planning import Plan, PlanSpec, plan_dataset, plan_rig
+from wingfit.planning.description import load_planned
 from wingfit.records import AnyDataset, Dataset, SeriesDataset, wing_or_vehicle
 from wingfit.records.files.assemble import checked_description
 from wingfit.rigs.rig import Rig, required_rig
@@ -135,6 +137,35 @@ def _series_of(dataset: AnyDataset, rig: Rig | None) -> tuple[SeriesDataset, Rig
     if rig is not None:
         raise ValueError(f"dataset {dataset.name!r} describes a {dataset.kind} rig of its own; leave out rig")
     return None
+
+
+def plan(
+    dataset: AnyDataset | str | Path,
+    spec: PlanSpec | None = None,
+    *,
+    rig: Rig | None = None,
+    workers: int = 1,
+    on_progress: OnProgress | None = None,
+) -> Plan:
+    """Plan an experiment: which genes and effects its recordings will identify, and which recordings add most.
+
+    Args:
+        dataset: recordings, or the path of a dataset, or of a description of one without recordings
+            (``dataset.yaml``), which lists the conditions.
+        spec: noise, beats, frames, markers and model; None: as recorded or, without recordings, stated defaults.
+        rig: simulation of the rig, if it is neither a wing nor a vehicle; its recordings must exist.
+        workers: number of processes that simulate, as in :func:`calibrate`.
+        on_progress: called with the completed fraction, in [0, 1], and what is simulated.
+
+    Raises:
+        ValueError: the spec does not fit the dataset, or a planned recording cannot be simulated.
+    """
+    planned = load_planned(Path(dataset)) if isinstance(dataset, str | Path) else dataset
+    with _evaluator(workers) as evaluator:
+        own = _series_of(planned, rig)
+        if own is not None:
+            return plan_rig(own[1], own[0], spec or PlanSpec(), evaluator, on_progress)
+        return plan_dataset(wing_or_vehicle(planned), spec or PlanSpec(), evaluator, on_progress)
 
 
 @contextmanager

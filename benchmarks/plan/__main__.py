@@ -11,7 +11,9 @@ import argparse
 import json
 import time
 from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
 from contextlib import closing
+from multiprocessing import get_context
 from typing import Any
 
 import numpy as np
@@ -35,8 +37,7 @@ def main() -> None:
     parser.add_argument("--campaigns", type=int, default=100, help="simulated campaigns of each design")
     parser.add_argument("--draws", type=int, default=60, help="drawn effects, and drawn pairs of effects")
     options = parser.parse_args()
-    with closing(make_evaluator("in_process")) as evaluator:
-        found = measured(options.campaigns, options.draws, evaluator)
+    found = measured(options.campaigns, options.draws)
     if not options.json:
         for name, value in found.items():
             print(f"{name:40} {value}")
@@ -44,14 +45,16 @@ def main() -> None:
     print(json.dumps(found))
 
 
-def measured(campaigns: int, draws: int, evaluator: Evaluator) -> dict[str, Any]:
-    """Return all results, as plain data."""
-    plans = {name: _seconds_of_plan(name, evaluator) for name in ("robird", "delfly")}
-    compared = vehicles(campaigns, evaluator, show) + wings(campaigns, evaluator, show)
-    drawn = cases(draws, evaluator, on_case=lambda k: show(f"draw {k}"))
-    second = cases(
-        max(draws // 3, 1), evaluator, 12, resonance=True, on_case=lambda k: show(f"second effect, draw {k}")
-    )
+def measured(campaigns: int, draws: int) -> dict[str, Any]:
+    """Return all results, as plain data; two processes simulate."""
+    with ProcessPoolExecutor(2, get_context("spawn")) as pool:
+        of_wings = pool.submit(_wings, campaigns)
+        of_effects = pool.submit(_cases, draws)
+        of_vehicles = pool.submit(_vehicles, campaigns)
+        of_plans = pool.submit(_plans)
+        compared = of_vehicles.result() + of_wings.result()
+        drawn, second = of_effects.result()
+        plans = of_plans.result()
     return {
         **_ratios("standard_error_ratio", compared),
         **{
@@ -72,6 +75,30 @@ def measured(campaigns: int, draws: int, evaluator: Evaluator) -> dict[str, Any]
         "commit": commit(),
         "cpu": cpu(),
     }
+
+
+def _wings(campaigns: int) -> list[Compared]:
+    with closing(make_evaluator("in_process")) as evaluator:
+        return wings(campaigns, evaluator, show)
+
+
+def _vehicles(campaigns: int) -> list[Compared]:
+    with closing(make_evaluator("in_process")) as evaluator:
+        return vehicles(campaigns, evaluator, show)
+
+
+def _cases(draws: int) -> tuple[list[Case], list[Case]]:
+    """Return draws without and, a third as many, with a second effect that neither hypothesis contains."""
+    with closing(make_evaluator("in_process")) as evaluator:
+        drawn = cases(draws, evaluator, on_case=lambda k: show(f"draw {k}"))
+        few = max(draws // 3, 1)
+        return drawn, cases(few, evaluator, 12, resonance=True, on_case=lambda k: show(f"second effect, draw {k}"))
+
+
+def _plans() -> dict[str, float]:
+    """Return the processor seconds of plans of the examples, with all effects."""
+    with closing(make_evaluator("in_process")) as evaluator:
+        return {name: _seconds_of_plan(name, evaluator) for name in ("robird", "delfly")}
 
 
 _WHATS = ("detected", "distinguished")

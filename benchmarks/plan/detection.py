@@ -153,11 +153,12 @@ class _Test:
             inner = np.flatnonzero(one.valid.all(axis=1))
             part = replace(one, times=one.times[inner], values=one.values[inner])
             psi = 2 * np.pi * part.condition.flap_frequency * part.times
-            project = np.linalg.pinv(fourier_basis(psi, HARMONICS))
+            project = np.asarray(np.linalg.pinv(fourier_basis(psi, HARMONICS)), float)
             mean = project @ part.values
             projections.append(project)
             kept.append(part)
-            whitening.append(np.linalg.inv(np.linalg.cholesky(_covariance(noise, mean, project, part))))
+            factor = np.linalg.cholesky(_covariance(noise, mean, project, part))
+            whitening.append(np.asarray(np.linalg.solve(factor, np.eye(len(factor))), float))
         return cls(vehicle, tuple(kept), truth, whitening, projections)
 
     def cost(self, effects: tuple[str, ...]) -> float:

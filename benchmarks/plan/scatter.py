@@ -82,14 +82,11 @@ def wings(count: int, evaluator: Evaluator, on_campaign: OnCampaign) -> list[Com
     truth = campaign.true_genome(exact, 5)
     for design, chosen in WING_DESIGNS.items():
         conditions = [campaign.SMALL[k][0] for k in chosen]
-        known = _Known(exact, truth.values)
+        known = _Known(exact, np.array(truth.values))
 
         def simulate(seed: int, conditions=conditions, known=known):  # type: ignore[no-untyped-def]
             rng = np.random.default_rng([seed, 73])
-            return tuple(
-                campaign.record(known, truth, one, campaign.Tracking(), rng)  # type: ignore[arg-type]
-                for one in conditions
-            )
+            return tuple(campaign.record(known, truth, one, campaign.Tracking(), rng) for one in conditions)
 
         found += _compared("wing", design, wing, simulate, truth.as_dict(), count, evaluator)
         on_campaign(design)
@@ -142,7 +139,7 @@ def _compared(
                 frames=frames,
                 add=0,
                 markers=40 if wing else None,
-                **(own if wing else {}),  # type: ignore[arg-type]
+                **(own if wing else {}),
             ),
             evaluator,
         ),

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from wingfit.planning.spec import PlanSpec
 
 NONE = "none"
-MODEL = ("division", "bounds_factor", "accuracy_mm", "preset", "without", "axes", "low_pass_hz", "peel_width_beats")
 
 
 def plan(
@@ -43,6 +42,9 @@ def plan(
     correlation: Annotated[float | None, typer.Option(help="Of the noise of successive frames, 0 to 0.99.")] = None,
     scatter_percent: Annotated[
         float | None, typer.Option(help="Vehicles: standard deviation of the force from beat to beat.")
+    ] = None,
+    zero_mn: Annotated[
+        float | None, typer.Option(help="Vehicles: standard deviation of the zero of a recording, by drift.")
     ] = None,
     beats: Annotated[int | None, typer.Option(help="Beats of each recording; of a rig of your own: repeats.")] = None,
     frames: Annotated[int | None, typer.Option(help="Frames or samples per beat.")] = None,
@@ -77,7 +79,7 @@ def plan(
     model |= {"genes": listed, "recordings": recordings}
     given: dict[str, Any] = {
         "noise_mm": noise_mm, "noise_mn": noise_mn, "correlation": correlation, "scatter_percent": scatter_percent,
-        "beats": beats, "frames": frames, "markers": markers, "add": add, "power": power,
+        "zero_mn": zero_mn,         "beats": beats, "frames": frames, "markers": markers, "add": add, "power": power,
         "target_percent": target_percent, "genome": o.read_genome(genome or []) or None,
     }  # fmt: skip
     if effects is not None:

@@ -9,11 +9,11 @@ import wingfit
 # Every public name stands on one page, in the order in which one needs them.
 PAGES: dict[str, tuple[str, str, tuple[str, ...]]] = {
     "diagnosing": (
-        "Calibrate and diagnose",
-        "Both run in the calling process, without a server.",
+        "Calibrate, diagnose, plan",
+        "They run in the calling process, without a server.",
         (
             "calibrate", "CalibrationSpec", "Result", "RecordingResult", "GeneResult", "ForceResult", "SeriesResult",
-            "diagnose", "DiagnosisSpec", "Finding", "finding_json", "html",
+            "diagnose", "DiagnosisSpec", "Finding", "finding_json", "html", "plan", "PlanSpec", "Plan",
         ),
     ),
     "datasets": (
