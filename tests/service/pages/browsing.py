@@ -107,3 +107,15 @@ def opened(browser: Browser, api: Api, **options: Any) -> Seen:
     """Return a watched page of the server behind ``api``, in a context with ``options``."""
     context = browser.new_context(**({"viewport": {"width": 1280, "height": 900}} | options))
     return Seen.watched(context.new_page(), str(api.client.base_url).rstrip("/"))
+
+
+def check_curves(seen: Seen, curves: list[dict[str, Any]]) -> None:
+    """The chart shows the curve that is chosen, first that with the largest misfit."""
+    seen.wait(DRAWN.format("curve-plot", 2))
+    options = seen.page.locator("#curve option").all_inner_texts()
+    assert options == [f"{c['channel']} in {c['recording']}{' (held out)' * c['held_out']}" for c in curves]
+    for k in (0, len(curves) - 1):
+        seen.page.select_option("#curve", str(k))
+        for trace, name in enumerate(("recorded", "nominal", "best")):
+            assert seen.data("curve-plot", trace, "y") == pytest.approx(curves[k][name])
+    assert "worst first" in seen.page.inner_text("#curves-note")

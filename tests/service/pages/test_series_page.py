@@ -8,6 +8,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from importlib.metadata import EntryPoint
+from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +18,7 @@ import pytest
 import wingfit
 from tests.records.series_samples import arm_dataset
 from tests.service.conftest import Api
-from tests.service.pages.browsing import DRAWN, Seen
+from tests.service.pages.browsing import DRAWN, Seen, check_curves
 from tests.service.pages.browsing import opened as watched
 from tests.service.rigs import decay_rig
 from tests.service.rigs.test_drive import DECLARED, client_of, driver, service, upload
@@ -224,37 +225,19 @@ def test_an_installed_rig_is_calibrated_and_diagnosed(seen: Seen, api: Api, deca
     assert "leak" in str(seen.page.evaluate(REPORT))
 
 
-def check_curves(seen: Seen, curves: list[dict[str, Any]]) -> None:
-    """The chart shows the curve that is chosen, first that with the largest misfit."""
-    seen.wait(DRAWN.format("curve-plot", 2))
-    options = seen.page.locator("#curve option").all_inner_texts()
-    assert options == [f"{c['channel']} in {c['recording']}{' (held out)' * c['held_out']}" for c in curves]
-    for k in (0, len(curves) - 1):
-        seen.page.select_option("#curve", str(k))
-        for trace, name in enumerate(("recorded", "nominal", "best")):
-            assert seen.data("curve-plot", trace, "y") == pytest.approx(curves[k][name])
-    assert "worst first" in seen.page.inner_text("#curves-note")
-
-
 def test_lines_end_where_samples_are_missing(seen: Seen, run: str) -> None:
-    """A straight line over a gap would look like a recorded and simulated motion."""
-
     def without_a_block(route: Route) -> None:
         result = route.fetch().json()
-        for curve in result["curves"]:
-            for name in ("time_s", "recorded", "nominal", "best"):
-                curve[name] = curve[name][:10] + curve[name][20:]
+        for curve, name in product(result["curves"], ("time_s", "recorded", "nominal", "best")):
+            curve[name] = curve[name][:10] + curve[name][20:]
         route.fulfill(json=result)
 
     seen.page.route("**/result", without_a_block)
     seen.open(run)
     seen.wait(DRAWN.format("curve-plot", 3))
-    for trace in range(4):
-        values = seen.data("curve-plot", trace, "y")
-        assert [k for k, value in enumerate(values) if value is None] == [10]
-    residual = np.subtract(seen.data("curve-plot", 0, "y")[:10], seen.data("curve-plot", 2, "y")[:10])
-    assert seen.data("curve-plot", 3, "y")[:10] == pytest.approx(residual), "of the best genome alone"
-    assert "as stated" in seen.page.inner_text("#series-misfit-note")
+    recorded, _, best, residual = (seen.data("curve-plot", trace, "y") for trace in range(4))
+    assert [values.index(None) for values in (recorded, best, residual)] == [10] * 3
+    assert residual[:10] == pytest.approx(np.subtract(recorded[:10], best[:10])), "of the best genome alone"
 
 
 def test_a_driven_run_is_followed_to_its_end(seen: Seen, api: Api, decay: str) -> None:
