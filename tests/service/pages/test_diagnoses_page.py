@@ -89,6 +89,9 @@ def test_a_dataset_is_diagnosed_and_the_finding_shown(seen: Seen, server: Server
     seen.page.emulate_media(media="print")
     assert [seen.page.is_visible(part) for part in (".top", "#finding-print", "#report >> h1")] == [False, False, True]
     seen.page.emulate_media(media="screen")
+    links = seen.page.locator("#finding-model a").evaluate_all("(all) => all.map((one) => one.getAttribute('href'))")
+    formats = ("python", "tables", "fmu", "json")
+    assert links == [f"v1/diagnoses/{diagnosis['id']}/model?format={one}" for one in formats]
     with seen.page.expect_popup() as opened:
         seen.page.click("#report-link")
     report = opened.value
