@@ -184,7 +184,7 @@ class Client(DiagnosisCalls, DriveCalls, FilmCalls, ImportCalls, KeyCalls, ListC
         """Write the calibrated model of a run or diagnosis to the file or into the folder ``path``; return the file.
 
         ``format``: "python": a file or package that needs no wingfit; "tables": CSV and JSON over the fitted range;
-        "mujoco": a wing as MuJoCo XML; "fmu": FMI 3.0; "json": all values. ``hypothesis``: effects joined by "+", or
+        "fmu": FMI 3.0; "json": all values. ``hypothesis``: effects joined by "+", or
         "nominal", the model to take of a diagnosis that names none for certain.
         """
         kind = "diagnoses" if job_id.startswith("dx_") else "runs"

@@ -12,7 +12,7 @@ from wingfit.client.force_answers import ForceResult
 from wingfit.client.series_answers import SeriesResult
 
 Format = Literal["json", "csv", "netcdf"]
-ModelFormat = Literal["python", "tables", "mujoco", "fmu", "json"]
+ModelFormat = Literal["python", "tables", "fmu", "json"]
 
 
 class Export(TypedDict):

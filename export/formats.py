@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import io
+import keyword
 import re
+import sys
 import zipfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -21,6 +23,7 @@ from wingfit.export.tables import tables
 from wingfit.records import Wing
 
 ZIP = "application/zip"
+REQUIRED = ("llvmlite", "numba", "numpy")  # names that an exported package must not have
 FMU = "wingfit.export.fmu"
 # Of all files in an archive, so that equal models give equal bytes.
 EARLIEST = (1980, 1, 1, 0, 0, 0)
@@ -49,7 +52,10 @@ def exported(model: CalibratedModel, format_name: str) -> ExportedFile:
 def stem(model: CalibratedModel) -> str:
     """Return the name of the model for files and Python packages: lower case letters, digits and underscores."""
     plain = re.sub(r"[^a-z0-9]+", "_", model.rig.name.lower()).strip("_") or "model"
-    return plain if plain[0].isalpha() else f"model_{plain}"
+    if not plain[0].isalpha():
+        return f"model_{plain}"
+    taken = keyword.iskeyword(plain) or plain in sys.stdlib_module_names or plain in REQUIRED
+    return f"{plain}_model" if taken else plain
 
 
 def archive(files: Mapping[str, str | bytes]) -> bytes:

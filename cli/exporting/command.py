@@ -19,9 +19,7 @@ def export(
     job_id: Annotated[
         str, typer.Argument(metavar="RUN_OR_DIAGNOSIS", help="Id of a run or diagnosis that has succeeded.")
     ],
-    format_name: Annotated[
-        str, typer.Option("--format", help="python, tables, mujoco (wings), fmu or json.")
-    ] = "python",
+    format_name: Annotated[str, typer.Option("--format", help="python, tables, fmu or json.")] = "python",
     output: Annotated[
         Path, typer.Option("--output", "-o", help="File, or folder in which the file gets the name of the rig.")
     ] = Path(),
@@ -35,8 +33,9 @@ def export(
 ) -> None:
     """Take a calibrated model away, as a file that needs no wingfit.
 
-    It has the parameters with their covariance, the fitted range of conditions, and where it comes from. Example:
-    wingfit export RUN_ID --format python --output model.py
+    It has the parameters with their covariance, the fitted range of conditions, and where it comes from.
+
+    Example: wingfit export run_669b16f6b6139e76 --output model.py
     """
     if format_name not in FORMATS:
         raise typer.BadParameter(f"{format_name}: must be one of {', '.join(FORMATS)}", param_hint="--format")

@@ -105,7 +105,13 @@ def title(model: CalibratedModel) -> str:
         f"Fitted range: {ranges}.",
         *(f"Remark: {remark}" for remark in model.remarks),
     ]
-    return "\n".join(line.replace("\\", "/").replace('"""', "'''") for line in lines)
+    return "\n".join(_harmless(line) for line in lines)
+
+
+def _harmless(line: str) -> str:
+    """Return ``line``, which may hold names given by anybody, so that it neither ends nor breaks a text literal."""
+    printable = "".join(one if one.isprintable() else " " for one in line)
+    return printable.replace("\\", "/").replace('"', "'")
 
 
 def _replaced(instants: int, folders: Iterable[str]) -> dict[str, str]:

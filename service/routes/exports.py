@@ -32,8 +32,8 @@ FormatQuery = Annotated[Format, Query(description="json: all of it; csv: a table
 ModelFormatQuery = Annotated[
     ModelFormat,
     Query(
-        description="python: a file or package without wingfit; tables: CSV and JSON over the fitted range; mujoco: "
-        "a wing as MuJoCo XML; fmu: FMI 3.0; json: all values in SI units"
+        description="python: a file or package without wingfit; tables: CSV and JSON over the fitted range; "
+        "fmu: FMI 3.0; json: all values in SI units"
     ),
 ]
 Hypothesis = Annotated[
@@ -138,7 +138,7 @@ def export_diagnosis(
 def _model_described() -> dict[str, Any]:
     saved = {"Content-Disposition": {"description": "name to save it under", "schema": {"type": "string"}}}
     binary = {"schema": {"type": "string", "format": "binary"}}
-    types = ("text/x-python", "application/zip", "application/json", "application/xml", "application/octet-stream")
+    types = ("text/x-python", "application/zip", "application/json", "application/octet-stream")
     return {"description": "the model as a file", "headers": saved, "content": dict.fromkeys(types, binary)}
 
 

@@ -9,6 +9,7 @@ import pytest
 
 from wingfit.export.calibrated_model import CalibratedModel
 from wingfit.export.model_file import model_from_json, model_json
+from wingfit.sim.vehicle.blade_element_wing import BladeElementWing
 from wingfit.sim.virtual_rigs.balance import blank_recording
 
 
@@ -36,7 +37,9 @@ def test_a_global_model_follows_the_condition(vehicle: CalibratedModel) -> None:
     one, other = (replace(vehicle.middle(), flap_frequency=f) for f in (12.0, 13.0))
     change = lift.at(other) - lift.at(one)
     assert change == pytest.approx(lift.per_hz, rel=1e-9)
-    forces = [vehicle.simulation().beat([vehicle.genome(c)], blank_recording(c))[0] for c in (one, other)]  # type: ignore[union-attr]
+    own = vehicle.simulation()
+    assert isinstance(own, BladeElementWing)
+    forces = [own.beat([vehicle.genome(c)], blank_recording(c))[0] for c in (one, other)]
     assert np.abs(forces[0] - forces[1]).max() > 1e-3
 
 

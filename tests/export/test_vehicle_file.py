@@ -16,7 +16,7 @@ import pytest
 from benchmarks.export.agreement import vehicle_error
 from benchmarks.export.isolated import FILE_NEEDS, site_of
 from wingfit.export.calibrated_model import CalibratedModel
-from wingfit.export.formats import FormatError, exported
+from wingfit.export.formats import FormatError, exported, stem
 from wingfit.export.predict import predictor
 from wingfit.export.python.vehicle_file import vehicle_file
 from wingfit.export.runtime.conditions import OutsideRangeError, condition_of
@@ -148,3 +148,21 @@ def test_a_format_that_does_not_exist_is_refused(vehicle: CalibratedModel) -> No
 def test_a_model_without_covariance_has_no_intervals(vehicle: CalibratedModel) -> None:
     found = predictor(replace(vehicle, covariance=None)).forces()
     assert set(found.means()) == {"mean_force_x_n", "mean_force_z_n"}
+
+
+def test_names_given_by_anybody_stay_text(vehicle: CalibratedModel) -> None:
+    evil = 'x"""\\\nraise SystemExit(3)\x00\ud800 {package} \'\'\' """'
+    source = replace(vehicle.provenance, name=evil, dataset=evil)
+    text = vehicle_file(replace(vehicle, provenance=source, remarks=(evil,)))
+    space: dict[str, Any] = {"__name__": "exported"}
+    exec(compile(text.encode(), "evil.py", "exec"), space)  # noqa: S102  (made above)
+    assert space["CALIBRATED"].provenance.name == evil.replace("{package}", space["_Modules"].package)
+
+
+@pytest.mark.parametrize(
+    ("name", "file"),
+    [("DelFly II!", "delfly_ii"), ("4 wings", "model_4_wings"), ("class", "class_model"), ("JSON", "json_model"),
+     ("numpy", "numpy_model"), ("../../etc", "etc"), ("\u7fbd", "model")],
+)  # fmt: skip
+def test_the_file_has_a_name_that_can_be_imported(vehicle: CalibratedModel, name: str, file: str) -> None:
+    assert stem(replace(vehicle, rig=replace(vehicle.vehicle, name=name))) == file

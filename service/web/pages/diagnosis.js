@@ -98,12 +98,12 @@ function update() {
 function offerModel(path) {
   const open = ["ambiguous", "unnamed"].includes(diagnosis.verdict);
   const title = open ? "The nominal model without effects; wingfit export --hypothesis chooses another" : "The model with the effects that the verdict names";
-  for (const format of ["python", "tables", "json"]) {
+  for (const format of ["python", "tables", "fmu", "json"]) {
     const link = $(`finding-model-${format}`);
     link.title = title;
     link.href = `${path}/model?format=${format}${open ? "&hypothesis=nominal" : ""}`;
   }
-  $("finding-model-tables").hidden = diagnosis.kind === "series";
+  for (const format of ["tables", "fmu"]) $(`finding-model-${format}`).hidden = diagnosis.kind === "series";
 }
 
 async function fetchReport() {

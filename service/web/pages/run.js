@@ -190,8 +190,8 @@ function drawHead() {
   $("run-exports").hidden = run.generations === 0;
   for (const format of ["csv", "netcdf", "json"]) $(`export-${format}`).href = `v1/runs/${part(run.id)}/export?format=${format}`;
   $("run-model").hidden = run.state !== "SUCCEEDED";
-  $("model-tables").hidden = run.kind === "series";
-  for (const format of ["python", "tables", "json"]) $(`model-${format}`).href = `v1/runs/${part(run.id)}/model?format=${format}`;
+  for (const format of ["tables", "fmu"]) $(`model-${format}`).hidden = run.kind === "series";
+  for (const format of ["python", "tables", "fmu", "json"]) $(`model-${format}`).href = `v1/runs/${part(run.id)}/model?format=${format}`;
   for (const button of $("actions").querySelectorAll("[data-action]")) {
     button.hidden = !ALLOWED[button.dataset.action].includes(run.state);
     button.disabled = Boolean(run.pending_action);

@@ -84,6 +84,7 @@ def test_a_model_is_refused_with_a_reason(real: Api, run: Json) -> None:
     for query, where in (("format=xlsx", "query.format"), ("hypothesis=nominal", "query.hypothesis")):
         refused = real.client.get(f"{path}?{query}")
         assert (refused.status_code, refused.json()["errors"][0]["where"]) == (422, where)
+    assert real.client.get(path, headers={"Sec-Fetch-Site": "cross-site"}).status_code == 403
     assert real.client.get(f"/v1/runs/{run['id']}x/model").status_code == 404
     assert real.client.get("/v1/diagnoses/dx_0/model").status_code == 404
 
