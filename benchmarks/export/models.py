@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, replace
+from dataclasses import replace
 
 import wingfit
 from benchmarks.common.files import EXAMPLES
@@ -48,9 +48,4 @@ def calibrated_wing(dataset: Dataset, spec: CalibrationSpec) -> CalibratedModel:
         raise TypeError("a wing has a result on tracks")
     stored = views.result(found)
     genome = base_genome(wing_model(dataset, spec), {one.name: one.best for one in found.genes}).as_dict()
-    return of_tracks(spec, dataset, genome, {**stored, "covariance": covariance_json(found)}, SOURCE)
-
-
-def covariance_json(found: Result) -> object:
-    """Return the covariance of ``found`` as a run stores it."""
-    return None if found.covariance is None else asdict(found.covariance)
+    return of_tracks(spec, dataset, genome, stored, SOURCE)

@@ -11,7 +11,8 @@ import pytest
 from tests.diagnosis.evidence.test_position_errors import HAND, SPEC, described
 from wingfit.diagnosis.evidence.fit import PRIOR_SD, Fit
 from wingfit.diagnosis.evidence.frame_error import changes_by_frame
-from wingfit.diagnosis.evidence.intervals import freedom, covariance
+from wingfit.diagnosis.evidence.intervals import covariance
+from wingfit.diagnosis.evidence.intervals import freedom as degrees_of_freedom
 from wingfit.diagnosis.evidence.position_errors import _own, _rigid, changes_by_errors
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.rigs import subject_of
@@ -76,5 +77,5 @@ def test_recordings_that_disagree_on_a_gene_widen_its_interval(data: WhitenedDat
     fit = fitted(left, slopes)
     total = covariance(data, fit)
     assert total[0, 0] == pytest.approx(alike + by_recording, rel=1e-2)
-    freedom = freedom(data, fit, np.diag(total))
+    freedom = degrees_of_freedom(data, fit, np.diag(total))
     assert freedom == pytest.approx([2 * ((alike + by_recording) / by_recording) ** 2], rel=0.03), "Satterthwaite"

@@ -74,6 +74,9 @@ def test_a_dataset_is_diagnosed_and_the_finding_shown(seen: Seen, server: Server
     assert "hatch" in shown.locator(".legend .faint").first.evaluate(colour)
     levels = shown.locator("h1, h2, h3").evaluate_all("(all) => all.map((one) => one.ariaLevel - one.tagName[1])")
     assert set(levels) == {2}, "headings continue those of the page"
+    links = seen.page.locator("#finding-model a").evaluate_all("(all) => all.map((one) => one.getAttribute('href'))")
+    formats = ("python", "tables", "fmu", "json")
+    assert links == [f"v1/diagnoses/{diagnosis['id']}/model?format={one}" for one in formats]
     with seen.page.expect_popup() as opened:
         seen.page.click("#report-link")
     report = opened.value
