@@ -35,19 +35,20 @@ def controlled(path: str, lift: float, seconds: float, gust: float) -> list[tupl
     fmu.setFloat64([reference["flap_frequency"]], [frequency])
     fmu.enterInitializationMode()
     fmu.exitInitializationMode()
-    beats, time, dt, total, count, before = [], 0.0, 1.0 / (high * STEPS), 0.0, 0, 0.0
+    beats, time, dt, mean, before = [], 0.0, 1.0 / (high * STEPS), 0.0, 0.0
     for step in range(int(seconds / dt)):
         if step == int(GUST_AT * seconds / dt):
             fmu.setFloat64([reference["airspeed"]], [gust])
         fmu.doStep(time, dt)
         time = (step + 1) * dt
         now, phase = fmu.getFloat64([reference["lift"], reference["beat_phase"]])
-        if phase < before:  # a beat has ended
-            beats.append((time, frequency, total / count))
-            frequency = min(max(frequency + GAIN * (lift - total / count), low), high)
+        if phase < before:  # a beat has ended within the step
+            mean += now * (1.0 - before)
+            beats.append((time, frequency, mean))
+            frequency = min(max(frequency + GAIN * (lift - mean), low), high)
             fmu.setFloat64([reference["flap_frequency"]], [frequency])
-            total, count = 0.0, 0
-        total, count, before = total + now, count + 1, phase
+            mean, before = 0.0, 0.0
+        mean, before = mean + now * (phase - before), phase
     fmu.terminate()
     fmu.freeInstance()
     shutil.rmtree(folder)
