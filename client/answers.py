@@ -11,6 +11,7 @@ from typing import Annotated, Any, Generic, Literal, NotRequired, TypeVar
 from annotated_types import Len
 from typing_extensions import TypedDict
 
+from wingfit.client.estimates.answers import Correlations, GeneCovariance
 from wingfit.client.importing.questions import ImportQuestion
 from wingfit.client.load_answers import Outputs
 
@@ -307,13 +308,6 @@ class GeneInfo(TypedDict):
     standard_error: NotRequired[float | None]
 
 
-class Correlations(TypedDict):
-    """Correlation coefficients [F][F] of the estimates of ``genes``; null for genes whose error is not known."""
-
-    genes: list[str]
-    values: list[list[float | None]]
-
-
 class GenomeInfo(TypedDict):
     """All genes with their values in the best genome so far; ``final`` is true once the run has succeeded."""
 
@@ -334,13 +328,6 @@ class RecordingResult(TypedDict):
     samples: int
     before_mm: float | None
     after_mm: float | None
-
-
-class GeneCovariance(TypedDict):
-    """Covariance [F][F] of the estimates of the genes called ``names``; an entry has the product of both units."""
-
-    names: list[str]
-    matrix: list[list[float]]
 
 
 class Result(TypedDict):

@@ -31,6 +31,7 @@ from wingfit.client.importing.calls import ImportCalls
 from wingfit.client.key_client import KeyCalls
 from wingfit.client.lists.calls import ListCalls
 from wingfit.client.load_answers import Loads
+from wingfit.client.planning.calls import PlanCalls
 from wingfit.client.recorded.calls import RecordedCalls
 from wingfit.client.series_answers import SeriesResult
 from wingfit.client.transport import (
@@ -49,7 +50,9 @@ __all__ = ["DEFAULT_URL", "Client", "ServerAwayError", "WingfitError"]
 OnRun = Callable[[a.Run], None]
 
 
-class Client(DiagnosisCalls, DriveCalls, FilmCalls, ImportCalls, KeyCalls, ListCalls, RecordedCalls):
+class Client(
+    DiagnosisCalls, DriveCalls, FilmCalls, ImportCalls, KeyCalls, ListCalls, PlanCalls, RecordedCalls
+):  # fmt: skip
     """Sends requests to one server and returns the answers; a context manager, at whose end the connections close."""
 
     def health(self) -> a.Health:

@@ -6,7 +6,8 @@ from typing import Literal, NotRequired
 
 from typing_extensions import TypedDict
 
-from wingfit.client.answers import Correlations, GeneCovariance, GeneInfo
+from wingfit.client.answers import GeneInfo
+from wingfit.client.estimates.answers import Correlations, GeneCovariance
 
 
 class ChannelResult(TypedDict):

@@ -19,7 +19,7 @@ from scipy.stats import chi2, ncx2, norm
 
 from wingfit.records.array_types import Array, Float, Index, Int
 
-UNKNOWN = 1e6  # standard deviation of an offset of which nothing is known beforehand, relative to the noise
+UNKNOWN = 1e6  # standard deviation of an offset without a prior, relative to the noise
 ROUNDS = 20  # of exchanges; each improves the score
 LEAST_GAIN = 1e-9  # of the score: exchanges that gain less are not made
 RIDGE = 1e-9  # of the largest curvature: changes that others explain exactly

@@ -37,6 +37,7 @@ from wingfit.service.http.openapi_additions import extend_openapi
 from wingfit.service.http.request_limits import RequestLimits
 from wingfit.service.operations.metrics_and_log import METRICS, Metrics, MetricsAndLog
 from wingfit.service.operations.shutdown import StopLimits
+from wingfit.service.planning import routes as plans
 from wingfit.service.routes import (
     backup,
     datasets,
@@ -64,6 +65,7 @@ WEB = Path(__file__).parent / "web"
 ROUTERS = (
     runs.router,
     outcomes.router,
+    plans.router,
     system.router,
     datasets.router,
     recorded.router,

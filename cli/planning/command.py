@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -12,17 +13,22 @@ from wingfit.cli.base import options as o
 from wingfit.cli.base.output import emit, late_progress
 from wingfit.cli.driving import rig_here
 from wingfit.cli.planning.text import print_plan
-from wingfit.client.client import WingfitError
+from wingfit.client.client import DEFAULT_URL, Client, WingfitError
 
 if TYPE_CHECKING:
     from wingfit.planning.spec import PlanSpec
 
 NONE = "none"
+DATASET = "ds_"  # ids of datasets begin with it
 
 
 def plan(
     dataset: Annotated[
-        str, typer.Argument(help="A dataset, or its description without recordings: folder, .zip, .nc or .yaml file.")
+        str,
+        typer.Argument(
+            help="A dataset, or its description without recordings: folder, .zip, .nc or .yaml file; or the id of a "
+            "dataset on a server, which then makes the plan."
+        ),
     ],
     genes: Annotated[
         list[str] | None, typer.Option(help="Estimate only these genes, e.g. E_f,E_r; default: those of a calibration.")
@@ -65,9 +71,10 @@ def plan(
     axes: o.Axes = None,
     included: o.With = None,
     rig: o.Rig = None,
+    url: o.Url = DEFAULT_URL,
     as_json: Annotated[bool, typer.Option("--json", help="Print the plan as JSON.")] = False,
 ) -> None:
-    """Plan an experiment: which genes and effects its recordings will identify, and which to add. Needs no server.
+    """Plan an experiment: which genes and effects its recordings will identify, and which to add.
 
     Noise, beats, frames and markers are those of the recordings or, before the first recording, stated defaults. The
     description of an experiment is a dataset.yaml that lists the conditions; the files of recordings may be missing.
@@ -84,9 +91,22 @@ def plan(
     }  # fmt: skip
     if effects is not None:
         given["effects"] = None if effects == [NONE] else tuple(effects)
-    made = _made(Path(dataset), given, model, rig)
+    if dataset.startswith(DATASET) and not Path(dataset).exists():
+        o.refuse({"--rig": rig}, "the server plans for wings and vehicles")
+        made = _remote(url, dataset, given, model)
+    else:
+        made = _made(Path(dataset), given, model, rig)
     then = "record, then: wingfit diagnose FOLDER --local" if not as_json else ""
     emit(made, print_plan, as_json=as_json, then=then)
+
+
+def _remote(url: str, dataset: str, given: dict[str, Any], model: dict[str, Any]) -> Mapping[str, Any]:
+    """Return the plan that the server at ``url`` makes for the ``dataset`` with this id."""
+    suspects = given.pop("effects", ())
+    settings = {name: one for name, one in {**given, **model}.items() if one}
+    with Client(url) as client, late_progress("planning") as show:
+        show(None)
+        return client.plan(dataset, suspects=suspects, **settings)
 
 
 def _made(path: Path, given: dict[str, Any], model: dict[str, Any], rig: str | None) -> dict[str, Any]:

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
-import threading
-from collections.abc import Callable
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Request
@@ -18,6 +15,7 @@ from wingfit.service.container import DOWNLOAD_SLOT, HeldSlots, Service, Service
 from wingfit.service.diagnoses import exports as diagnosis_exports
 from wingfit.service.http import csv_text
 from wingfit.service.http import responses as http
+from wingfit.service.http.awaited import while_awaited
 from wingfit.service.outcomes import calibrated_models
 from wingfit.service.routes.diagnoses import finding_of
 from wingfit.service.runs import best_genome, run_netcdf
@@ -26,7 +24,6 @@ from wingfit.service.runs import netcdf_variables as nc
 from wingfit.service.storage.tables import DiagnosisRow, RunRow
 
 router = APIRouter(prefix="/v1", tags=["exports"])
-LOOK_SECONDS = 1.0
 FormatQuery = Annotated[Format, Query(description="json: all of it; csv: a table; netcdf: series and maps")]
 
 ModelFormatQuery = Annotated[
@@ -85,20 +82,9 @@ async def export_run(
     exported = await run_in_threadpool(run_exports.of, service, RunRow, run_id)
     genome = await run_in_threadpool(best_genome.standing, service, exported.row)
     async with service.exports.slot():
-        body = await _while_awaited(request, lambda gone: run_netcdf.file(service, exported, genome, gone))
+        body = await while_awaited(request, lambda gone: run_netcdf.file(service, exported, genome, gone))
         await held.enter_async_context(service.answers.slot())
     return Response(body, media_type=nc.MEDIA_TYPE, headers=http.attachment(f"{run_id}.nc"))
-
-
-async def _while_awaited(request: Request, make: Callable[[Callable[[], bool]], bytes]) -> bytes:
-    """Run ``make(gone)`` in a thread and return its result; ``gone()`` says whether the client has hung up."""
-    gone = threading.Event()
-    making = asyncio.ensure_future(run_in_threadpool(make, gone.is_set))
-    while not making.done():
-        await asyncio.wait([making], timeout=LOOK_SECONDS)
-        if not making.done() and await request.is_disconnected():
-            gone.set()
-    return making.result()
 
 
 def _run(service: Service, run_id: str, format: Format) -> Response:  # noqa: A002

@@ -14,6 +14,7 @@ from wingfit.calibration.estimates.uncertainty import Correlations
 from wingfit.checks import Mistake
 from wingfit.client import answers as a
 from wingfit.client.answers import Comparison, Numerics
+from wingfit.client.estimates.answers import Correlations as CorrelationsOut
 from wingfit.client.recorded.answers import SeriesValues
 from wingfit.records import AnyDataset, Channel, Recording, Series, SeriesDataset
 from wingfit.records.array_types import Array, Mask
@@ -156,7 +157,7 @@ def gene(estimated: tracks_result.GeneResult) -> a.GeneInfo:
     return answer(a.GeneInfo, estimated, standard_error=None if error is None else finite(error))
 
 
-def correlations(found: Sequence[Correlations]) -> list[a.Correlations]:
+def correlations(found: Sequence[Correlations]) -> list[CorrelationsOut]:
     """Return the JSON answers about the ``found`` correlations of genes; numbers that are not finite become null."""
     return [
         {"genes": list(one.genes), "values": [[finite(value) for value in row] for row in one.values]} for one in found

@@ -22,6 +22,7 @@ from wingfit.service.diagnoses.requests import DiagnosisIn
 from wingfit.service.examples import EXAMPLES
 from wingfit.service.films.requests import FilmIn, TrackingIn
 from wingfit.service.outcomes.requests import LoadsIn, PredictionIn, SimulationIn
+from wingfit.service.planning.requests import PlanIn
 from wingfit.service.runs.requests import Method, Mode, RunIn
 from wingfit.sim.virtual_rigs.balance import delfly
 from wingfit.sim.virtual_rigs.campaign import robird_wing
@@ -160,6 +161,7 @@ def test_every_call_is_in_the_documentation_and_every_documented_one_exists(spec
         SimulationIn,
         LoadsIn,
         PredictionIn,
+        PlanIn,
         DiagnosisIn,
         FilmIn,
         TrackingIn,

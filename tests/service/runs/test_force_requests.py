@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from pydantic import TypeAdapter
 
 from tests.service import toy
 from tests.service.conftest import Api, serving
@@ -17,6 +18,7 @@ from tests.service.runs.force_data import TRUTH, finished, served, upload
 from tests.service.shapes import valid
 from wingfit.calibration.search import CalibrationSpec, resolved
 from wingfit.client.force_answers import ForceSimulation, Models
+from wingfit.client.planning.answers import Plan
 from wingfit.records import LowPass, Recording
 from wingfit.service.app import create_app
 from wingfit.service.runs.requests import Preset
@@ -191,3 +193,39 @@ def test_settings_of_a_vehicle_are_refused_for_a_wing(tmp_path: Path) -> None:
 def test_a_run_without_a_name_is_named_after_what_tells_it_from_others(spec: Json, name: str) -> None:
     given = force_data.dataset()
     assert run_name(given, resolved(CalibrationSpec(**spec), given)) == name
+
+
+def test_an_experiment_is_planned(api: Api, dataset: Json) -> None:
+    body: Json = {"suspects": ["stroke_bias", "mass_offset"], "genome": {"C_l": 1.2}, "add": 0, "beats": 20}
+    answer = api.client.post(f"/v1/datasets/{dataset['id']}/plan", json=body)
+    assert answer.status_code == 200, answer.text
+    found = TypeAdapter(Plan).validate_python(answer.json(), strict=True)
+    assert [gene["name"] for gene in found["genes"]] == ["C_l", "C_r", "C_F"]
+    assert found["genes"][0]["value"] == 1.2
+    assert {one["name"] for one in found["effects"]} == {"stroke_bias", "mass_offset"}
+    assert found["beats"] == 20
+    assert found["for_genes"] == []
+
+
+@pytest.mark.parametrize(
+    ("body", "where", "words"),
+    [
+        ({"noise_mm": 0.3}, "body", "noise_mm is a setting of marker tracks"),
+        ({"suspects": ["backlash"]}, "body", "unknown suspect 'backlash'"),
+        ({"division": "4"}, "body.division", "means nothing for a vehicle"),
+        ({"beats": 0}, "body.beats", "greater than or equal to 1"),
+        ({"add": 21}, "body.add", "less than or equal to 20"),
+        ({"effects": ["nothing"]}, "body.effects.0", "nothing"),
+        ({"genome": {"E_f": 1.0}}, "body", "which the model does not have"),
+    ],
+)
+def test_plans_that_cannot_be_made_are_refused(api: Api, dataset: Json, body: Json, where: str, words: str) -> None:
+    answer = api.client.post(f"/v1/datasets/{dataset['id']}/plan", json={"suspects": None, "add": 0} | body)
+    assert answer.status_code == 422, answer.text
+    (error,) = answer.json()["errors"]
+    assert error["where"] == where
+    assert words in f"{error['message']} {error['value']}"
+
+
+def test_a_plan_of_an_unknown_dataset_is_refused(api: Api) -> None:
+    assert api.client.post("/v1/datasets/ds_0/plan", json={}).status_code == 404
