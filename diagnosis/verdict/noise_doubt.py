@@ -11,6 +11,8 @@ from wingfit.diagnosis.evidence.fit import Fit
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.inference.noise.series import EXCEEDS, MEASURED_ERROR
 from wingfit.inference.noise.steadiness import steady_probability
+from wingfit.records import Series
+from wingfit.records.array_types import Array, Float
 
 UNEVEN = 3.0  # times the noise of quieter recordings
 QUIET = 0.25  # quantile of the recordings' noise that counts as quiet
@@ -49,14 +51,26 @@ def quiet_noise(data: WhitenedData) -> float:
 
 
 def loud(data: WhitenedData) -> bool:
-    """Return whether the noise, from repeats, periods or as stated, is several times what the highest frequencies show.
+    """Return whether the noise of a channel, from repeats, periods or as stated, is several times what is known of it.
 
-    It may be slow noise, or what differs between repeats, such as their start, or a motion that is not periodic.
+    That is what its highest frequencies show, and what the dataset states. The rest may be slow noise, or what differs
+    between repeats, such as their start, or a motion that is not periodic: one that sags from period to period.
     """
     noises = data.series.noises if data.series else {}
-    ratios = [noises[one.name].standard_deviation / noises[one.name].visible for one in data.recordings]
-    known = [one[np.isfinite(one)] for one in ratios]
-    return bool(len(np.concatenate(known)) and np.median(np.concatenate(known)) > LOUD)
+    recorded = [one for one in data.recordings if isinstance(one, Series)]
+    levels = np.array([noises[one.name].standard_deviation for one in recorded])
+    visible = np.array([noises[one.name].visible for one in recorded])
+    stated = np.array([[channel.standard_deviation or np.nan for channel in one.quantities] for one in recorded])
+    return _exceeds(levels / visible, LOUD) or _exceeds(levels / stated, EXCEEDS)
+
+
+def _exceeds(ratios: Float[Array, "R C"], limit: float) -> bool:
+    """Return whether the median over R recordings of a channel's ratio is above ``limit``, for any of C channels.
+
+    NaN is a ratio that is not known.
+    """
+    every = [own[np.isfinite(own)] for own in ratios.T]
+    return any(len(own) > 0 and bool(np.median(own) > limit) for own in every)
 
 
 def residual_to_noise(data: WhitenedData, fit: Fit) -> float:
