@@ -35,7 +35,10 @@ from wingfit.sim.wing import division
 
 ROOT = Path(__file__).parents[3]
 PAGE = (ROOT / "docs" / "security.md").read_text(encoding="utf-8")
-CODE = ("records", "tracking", "sim", "calibration", "diagnosis", "report", "workers", "service", "client", "cli")
+CODE = (
+    "records", "importers", "tracking", "cameras", "sim", "checks", "rigs", "inference", "calibration", "diagnosis",
+    "planning", "report", "plot", "export", "workers", "service", "client", "cli",
+)  # fmt: skip
 Schema = dict[str, Any]
 
 
@@ -125,7 +128,12 @@ def test_nothing_that_was_sent_or_stored_is_unpickled_or_executed() -> None:
         ("workers/ray_cluster.py", "pickle.loads"),  # from the process that owns the worker
         ("workers/processes.py", "pickle.loads"),  # what it wrote itself
         ("sim/kernels/lanes/vector.py", "exec"),  # a text of its own, when it is imported
-        ("tracking/marker_noise.py", "np.load"),  # arrays alone: with allow_pickle=False; on the command line
+        ("export/fmu/wing.py", "exec"),  # a text of its own: names of arrays and numbers of the layout of memory
+        ("export/fmu/vehicle.py", "exec"),  # the same
+        # arrays alone, without pickles
+        ("tracking/marker_noise.py", "np.load"),
+        ("importers/readers/sleap.py", "np.load"),
+        ("cameras/markers/stored.py", "np.load"),
     }
 
 
