@@ -82,7 +82,7 @@ def test_no_body_reaches_data_of_another_owner(as_: As, calls: list[Call]) -> No
             assert answer.status_code == 422, (path, name, answer.text)
             assert "there is no" in answer.json()["detail"], (path, name)
             tried += 1
-    assert tried == 6
+    assert tried == 7
     assert all(bob.get(f"/v1/{kind}")["items"] == [] for kind in KINDS)
 
 
