@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import pytest
 
-from benchmarks.export.models import SOURCE, calibrated_vehicle
 from tests.export.samples import wing_model
+from tests.oracles.exports import SOURCE, calibrated_vehicle
 from wingfit.export.calibrated_model import CalibratedModel
 from wingfit.sim.virtual_rigs.balance import TRIALS, Balance, campaign
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from benchmarks.export.models import SOURCE
+from tests.oracles.exports import SOURCE
 from wingfit.calibration.problem import base_genome
 from wingfit.calibration.spec import CalibrationSpec
 from wingfit.calibration.spec import wing_model as model_of

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks.common.files import EXAMPLES
-from benchmarks.export.models import SOURCE
+from tests.oracles.exports import EXAMPLES, SOURCE
 from wingfit.calibration.preparation import prepare_rig
 from wingfit.calibration.spec import CalibrationSpec
 from wingfit.export.calibrated_model import AnyRig, CalibratedModel

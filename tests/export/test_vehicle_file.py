@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks.export.agreement import vehicle_error
-from benchmarks.export.isolated import FILE_NEEDS, site_of
+from tests.oracles.exports import FILE_NEEDS, site_of, vehicle_error
 from wingfit.export.calibrated_model import CalibratedModel
 from wingfit.export.formats import FormatError, exported, stem
 from wingfit.export.predict import predictor

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.export.isolated import PACKAGE_NEEDS, run, site_of
+from tests.oracles.exports import PACKAGE_NEEDS, run, site_of
 from wingfit.export.calibrated_model import CalibratedModel
 from wingfit.export.formats import exported
 from wingfit.export.predict import predictor

@@ -7,8 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.export.fmu.importer import Fmu
-from benchmarks.export.fmu.models import true_vehicle
+from tests.oracles.exports.fmus import Fmu, true_vehicle
 from wingfit.export.calibrated_model import CalibratedModel
 from wingfit.export.fmu import NotExportedError, write_fmu
 from wingfit.export.fmu.package import c_compiler

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from benchmarks.export.fmu.importer import Fmu
+from tests.oracles.exports.fmus import Fmu
 
 
 def test_the_controller_holds_the_lift_through_a_change_of_airspeed(vehicle_fmu: Fmu) -> None:

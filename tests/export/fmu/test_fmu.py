@@ -12,9 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks.export.fmu import problems
-from benchmarks.export.fmu.importer import Fmu, Running
-from benchmarks.export.fmu.steady import conditions_within, inputs_at, percent, vehicle_errors
+from tests.oracles.exports.fmus import Fmu, Running, conditions_within, inputs_at, percent, problems, vehicle_errors
 from wingfit.export.calibrated_model import CalibratedModel
 from wingfit.export.fmu import NotExportedError
 from wingfit.export.fmu.conditions import reference_condition

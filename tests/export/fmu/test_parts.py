@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.export.fmu.models import true_vehicle, true_wing
+from tests.oracles.exports.fmus import true_vehicle, true_wing
 from wingfit.export.fmu.build import product_of
 from wingfit.export.fmu.conditions import reference_condition
 from wingfit.export.fmu.description import header, model_description
