@@ -24,7 +24,7 @@ test: $(INSTALLED)  ## every check and every test, four at a time: programs, ser
 	@$(MAKE) --no-print-directory -k -j4 test-service test-rest test-programs test-pages check
 
 # Taken out of two of the four parts, so that all take about as long.
-BESIDE := tests/service/jobs tests/service/pages tests/contract
+BESIDE := tests/service/jobs tests/service/pages tests/contract tests/export tests/planning
 test-service:
 	$(BIN)/python -m pytest tests/service $(BESIDE:%=--ignore %)
 
@@ -37,7 +37,7 @@ test-programs:
 	$(BIN)/python -m pytest $(PROGRAMS)
 
 test-rest:
-	$(BIN)/python -m pytest --ignore tests/service --ignore tests/contract $(PROGRAMS:%=--ignore %)
+	$(BIN)/python -m pytest --ignore tests/service $(BESIDE:%=--ignore %) $(PROGRAMS:%=--ignore %)
 
 check: $(INSTALLED) check-image  ## every check, no test
 	$(BIN)/ruff check .
