@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from decimal import Decimal
 from pathlib import Path
 
@@ -38,21 +39,18 @@ def dataset_of_films(
     cameras = _same_cameras(body, films)
     every = list[AlignedTracks]()
     for number, (one, film) in enumerate(zip(body.recordings, films, strict=True)):
-        try:
+        with _placed_in(number):
             every.append(_aligned(wing, body, one, film.tracks))
-        except DatasetError as error:
-            raise _placed(error, f"body.recordings.{number}") from None
-    try:
-        every = list(in_common_frame(every))
-    except DatasetError as error:
-        number = next(k for k, one in enumerate(body.recordings) if one.name == error.where)
-        raise _placed(error, f"body.recordings.{number}") from None
-    recordings = tuple(_recording(*each) for each in zip(body.recordings, every, films, strict=True))
+    every = _in_common_frame(body, every)
+    recordings = list[Recording]()
+    for number, (one, found, film) in enumerate(zip(body.recordings, every, films, strict=True)):
+        with _placed_in(number):
+            recordings.append(_recording(one, found, film))
     first = every[0]
     dataset = Dataset(
         body.name,
         wing,
-        recordings,
+        tuple(recordings),
         tuple(one.name for one in body.recordings if one.held_out),
         frame_error=FrameError(_triple(first.rotation_error), _triple(first.origin_error)),
         cameras=tuple(pose.seen_from(first.rotation, first.origin) for pose in cameras),
@@ -62,7 +60,10 @@ def dataset_of_films(
 
 def _same_cameras(body: FilmedDatasetIn, films: Sequence[TrackingFiles]) -> tuple[CameraPose, ...]:
     """Return the cameras of all ``films``; DatasetError if they are not those of the first film."""
-    every = [tuple(camera.pose for camera in read_cameras(film.cameras).cameras) for film in films]
+    every = list[tuple[CameraPose, ...]]()
+    for number, film in enumerate(films):
+        with _placed_in(number):
+            every.append(tuple(camera.pose for camera in read_cameras(film.cameras).cameras))
     for number, poses in enumerate(every):
         if poses != every[0]:
             message = (
@@ -71,6 +72,15 @@ def _same_cameras(body: FilmedDatasetIn, films: Sequence[TrackingFiles]) -> tupl
             )
             raise fail(f"body.recordings.{number}.tracking_id", body.recordings[number].tracking_id, message)
     return every[0]
+
+
+def _in_common_frame(body: FilmedDatasetIn, every: Sequence[AlignedTracks]) -> list[AlignedTracks]:
+    try:
+        return list(in_common_frame(every))
+    except DatasetError as error:
+        number = next(k for k, one in enumerate(body.recordings) if one.name == error.where)
+        with _placed_in(number):
+            raise
 
 
 def _aligned(wing: Wing, body: FilmedDatasetIn, one: FilmedRecordingIn, path: Path) -> AlignedTracks:
@@ -127,6 +137,15 @@ def _answer(one: FilmedRecordingIn, found: AlignedTracks) -> a.FilmAlignment:
         "dropped": [{"track": lost.track, "reason": lost.reason} for lost in found.dropped],
         "remarks": [*found.remarks],
     }
+
+
+@contextmanager
+def _placed_in(number: int) -> Iterator[None]:
+    """Give the faults of recording ``number`` their places in the request, where the paths of files mean nothing."""
+    try:
+        yield
+    except DatasetError as error:
+        raise _placed(error, f"body.recordings.{number}") from None
 
 
 def _placed(error: DatasetError, recording: str) -> DatasetError:

@@ -122,6 +122,20 @@ def test_a_flap_frequency_that_is_not_that_of_the_film_is_named(served: Api, tra
     assert "Hz" in found["message"]
 
 
+def test_a_file_that_is_damaged_is_named_by_its_recording(
+    served: Api, film: str, data: Path, trackings: list[str]
+) -> None:
+    path = data / "films" / film / "tracked" / trackings[0] / "covariance.npz"
+    whole = path.read_bytes()
+    path.write_bytes(whole[:100])
+    try:
+        found = _refused(served, _body(trackings, recordings=_body(trackings)["recordings"][:1]))
+    finally:
+        path.write_bytes(whole)
+    assert found["where"] == "body.recordings.0"
+    assert str(data) not in str(found)
+
+
 def test_recordings_of_other_cameras_have_no_common_frame(
     served: Api, folder: Path, data: Path, trackings: list[str]
 ) -> None:
