@@ -108,9 +108,9 @@ def test_pages_opened_as_files_are_accessible_and_load_nothing_from_elsewhere(
         page.goto((built / name).as_uri())
         assert not wrong, f"{name}: {wrong}"
         assert page.evaluate("document.documentElement.scrollWidth <= window.innerWidth"), f"{name} is too wide"
-        found = axe.Axe().run(page).response["violations"]
+        # Without "preload", for which axe reads the style sheets, what a page opened as a file may not.
+        found = axe.Axe().run(page, options={"preload": False}).response["violations"]
         assert not [(one["id"], one["nodes"][0]["html"]) for one in found], name
-        wrong.clear()  # axe tries to read the style sheets, which a page opened as a file may not
     context.close()
 
 
