@@ -12,6 +12,7 @@ from typing import Any, Literal
 import numpy as np
 
 from wingfit.records.array_types import Array
+from wingfit.report.gaps import starts_after_gaps
 
 AXES = "xyz"
 MOST_MARKERS = 4  # drawn unless markers are named: more rows cannot be read
@@ -84,7 +85,7 @@ def curves_of(source: object, recording: str | None = None, channels: Sequence[s
     known = dict.fromkeys(name for name, _, _ in found)
     if recording is not None and recording not in known:
         raise ValueError(f"there are no curves of the recording {recording!r}; there are those of {_listed(known)}")
-    here = [(name, curves) for where, name, curves in found if recording in (None, where)]
+    here = [(name, _with_gaps(curves)) for where, name, curves in found if recording in (None, where)]
     missing = [one for one in channels or () if one not in {name for name, _ in here}]
     if missing or not here:
         there = _listed(dict.fromkeys(name for name, _ in here))
@@ -116,6 +117,24 @@ def model_names(finding: Mapping[str, Any]) -> dict[str, str]:
 def misfit_unit(finding: Mapping[str, Any]) -> tuple[float, str]:
     """Return the factor from the unit of a finding to that of its figures, and the latter: mm, mN or × noise."""
     return {"m": (1e3, "mm"), "N": (1e3, "mN")}.get(finding["unit"], (1.0, "× noise"))
+
+
+def _with_gaps(curves: Curves) -> Curves:
+    """Return ``curves`` over time with an instant without values in each gap, over which no line is drawn."""
+    starts = starts_after_gaps(curves.x) if curves.x_label == TIME else []
+    if not starts:
+        return curves
+    between = (curves.x[starts] + curves.x[np.array(starts) - 1]) / 2
+
+    def parted(values: Array) -> Array:
+        return np.insert(values, starts, np.nan)
+
+    return dataclasses.replace(
+        curves,
+        x=np.insert(curves.x, starts, between),
+        recorded=parted(curves.recorded),
+        models={name: parted(values) for name, values in curves.models.items()},
+    )
 
 
 Found = Iterator[tuple[str, str, Curves]]  # recording, channel, curves

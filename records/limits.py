@@ -18,6 +18,7 @@ MAX_RODS = 50
 MAX_HARMONICS = 50
 MAX_ESTIMATES = 1000
 MAX_QUANTITIES = 1000  # channels of a series, at most; as many inputs, and settings
+MAX_COLUMNS = 3 * MAX_MARKERS + 1  # of a table: the times, and the coordinates of each marker
 
 # Largest magnitude of a recorded number of a series, in any unit, and smallest of a standard deviation, period or
 # difference of times: their squares and products are still finite.

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from statistics import median
 
 from wingfit.diagnosis.finding import Finding, Interval, Overlay, Proof, RecordingMisfit
+from wingfit.report.gaps import pieces
 from wingfit.report.layout import figure, panels
 from wingfit.report.markup import Markup, tag
 from wingfit.report.number_format import (
@@ -161,10 +162,10 @@ def _overlay(finding: Finding, overlay: Overlay, scale: Scale) -> Markup:
     residuals = {n: [r - v for r, v in zip(recorded, values, strict=True)] for n, values in simulated.items()}
     if overlay.times:
         over, label, at, ticks = "time", "time, s", overlay.times, None
-        across = Axis(at[0], at[-1], left, right)
+        across, parts = Axis(at[0], at[-1], left, right), pieces(at)
     else:
         over, label, at, ticks = "one beat", "phase of the beat", overlay.phase, BEATS
-        across = Axis(0, 1, left, right)
+        across, parts = Axis(0, 1, left, right), [slice(None)]
     up = axis([*recorded, *(v for values in simulated.values() for v in values)], 142, 42)
     rest = axis([v for values in residuals.values() for v in values], 226, 160, zero=True)
     title = shortened(overlay.channel, 28)
@@ -181,9 +182,10 @@ def _overlay(finding: Finding, overlay: Overlay, scale: Scale) -> Markup:
         line(left, rest.at(0), right, rest.at(0), "axis"),
         dots(places(across, at, up, recorded), "samples"),
         *(
-            curve(places(across, at, on, values[stage]), f"curve {stage}")
+            curve(places(across, at[piece], on, values[stage][piece]), f"curve {stage}")
             for on, values in ((up, simulated), (rest, residuals))
             for stage in simulated
+            for piece in parts
         ),
     )
 

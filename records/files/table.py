@@ -19,8 +19,8 @@ import numpy as np
 from wingfit.records.array_types import Array, Float, Index, Int
 from wingfit.records.dataset import ForceAxis
 from wingfit.records.description.yaml_text import NUMBER
-from wingfit.records.errors import DatasetError, Faults, decode, fail, shown
-from wingfit.records.limits import MAX_ROWS, MAX_VALUES, MIN_FRAMES
+from wingfit.records.errors import DatasetError, Faults, check_most, decode, fail, shown
+from wingfit.records.limits import MAX_COLUMNS, MAX_ROWS, MAX_VALUES, MIN_FRAMES
 
 _WRITTEN = 1000  # rows that are converted at once
 _SUSPICIOUS = re.compile(r"[^0-9eE+\-., \r\n]")
@@ -77,6 +77,7 @@ def read_table(raw: bytes, file: str, read_layout: Callable[[list[str], str], La
     reader = csv.reader(io.TextIOWrapper(io.BytesIO(raw), "utf-8-sig", newline=""), strict=True)
     try:
         header = [name.strip() for name in next(reader)]
+        check_most(f"{file}, line 1", "has", len(header), MAX_COLUMNS, "columns", "remove those that are not needed")
         if not header:
             raise fail(f"{file}, line 1", None, "the line is empty; it must name the columns, 'time_s' first")
         layout = read_layout(header, f"{file}, line 1")
@@ -106,6 +107,8 @@ def read_columns(
         wrong = _column_problem(name, columns, known) or (problem(name) if name != "time_s" else None)
         if wrong:
             faults.add(f"{where}, column {index + 1}", name, wrong)
+        if faults.full:
+            break
         columns.setdefault(name, index)
     faults.raise_any()
     if "time_s" not in columns:

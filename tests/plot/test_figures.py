@@ -126,6 +126,15 @@ def test_series_are_compared_over_time() -> None:
     assert figure.layout.xaxis2.title.text == "time, s"
 
 
+def test_no_line_crosses_a_gap_in_a_series() -> None:
+    source = series()
+    times = [0.0, 0.1, 0.2, 5.0, 5.1, 5.2]
+    source["curves"][0] |= {"time_s": times, "recorded": [1.0] * 6, "best": [2.0] * 6}
+    best = trace(plot.comparison(source), "best genome", 0)
+    assert list(best.x) == pytest.approx([0.0, 0.1, 0.2, 2.6, 5.0, 5.1, 5.2])
+    assert [k for k, value in enumerate(best.y) if np.isnan(value)] == [3]
+
+
 def test_the_residual_of_a_wing_is_a_map_before_and_after_on_one_scale() -> None:
     finding = wing_finding()
     figure = plot.residual(finding)

@@ -238,6 +238,18 @@ def test_the_drawing_of_the_wing_keeps_its_proportions() -> None:
     assert max(scales) == pytest.approx(min(scales), rel=2e-3)
 
 
+def test_no_curve_of_a_series_crosses_a_gap() -> None:
+    finding = wing_finding()
+    (one, *_) = finding.overlays
+    times = tuple(0.1 * k + (3.0 if k >= 10 else 0.0) for k in range(len(one.phase)))
+    steady = replace(one, times=tuple(0.1 * k for k in range(len(one.phase))))
+    curves = {
+        name: sum(tag == "path" and a.get("class") == "curve after" for tag, a in page(replace(finding, overlays=(given,))).tags)
+        for name, given in (("steady", steady), ("gap", replace(steady, times=times)))
+    }
+    assert curves["gap"] == curves["steady"] + 2, "the simulation and the residual are in two parts each"
+
+
 def test_what_is_left_out_of_the_page_is_counted() -> None:
     finding = wing_finding()
     shown = page(replace(finding, overlays=finding.overlays * 3, missing=finding.missing * 4)).text

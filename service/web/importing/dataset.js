@@ -10,7 +10,7 @@ import { zip } from "./zip.js";
 
 const NEEDED = ["name", "rig", "flap_frequency_hz", "phase_lag_deg", "pressure_mbar", "temperature_c"];
 const NUMBERS = ["flap_frequency_hz", "phase_lag_deg", "pressure_mbar", "temperature_c", "airspeed_m_s", "angle_of_attack_deg", "gravity_m_s2",
-  "window_from", "window_to", "standard_deviation_m"];
+  "window_from", "window_to", "standard_deviation_mm"];
 const NUMBER = /^[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?$/; // as dataset.yaml has them
 
 let recordings = [];

@@ -3,7 +3,8 @@
 import { ApiError } from "../base/api.js";
 
 const OURS = ["format_version", "name", "recordings", "held_out"];
-const OPTIONAL = ["airspeed_m_s", "angle_of_attack_deg", "gravity_m_s2", "standard_deviation_m"];
+const OPTIONAL = ["airspeed_m_s", "angle_of_attack_deg", "gravity_m_s2"];
+const MM = 1000; // in a metre
 
 // ``text`` may be a whole dataset.yaml: its own name and recordings are replaced. Its lines keep their numbers, so that
 // the errors of the server name those of the user.
@@ -30,5 +31,6 @@ function withoutKeys(lines, keys) {
 function entry(one) {
   const fields = ["rig", "flap_frequency_hz", "phase_lag_deg", "pressure_mbar", "temperature_c", ...OPTIONAL].filter((name) => one[name]);
   const window = one.window_from ? [`window_s: [${one.window_from}, ${one.window_to}]`] : [];
-  return `  - {${[`name: ${JSON.stringify(one.name)}`, ...fields.map((name) => `${name}: ${one[name]}`), ...window].join(", ")}}`;
+  const noise = one.standard_deviation_mm ? [`standard_deviation_m: ${Number(one.standard_deviation_mm) / MM}`] : [];
+  return `  - {${[`name: ${JSON.stringify(one.name)}`, ...fields.map((name) => `${name}: ${one[name]}`), ...window, ...noise].join(", ")}}`;
 }

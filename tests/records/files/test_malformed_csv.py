@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from tests.records.malformed import TRACKS, cells, edited, error_of, good_files, with_csv, with_yaml
+from wingfit.records.errors import DatasetError
 from wingfit.records.files.tracks import read_tracks
 from wingfit.records.limits import MAX_ERRORS, MAX_ROWS
 
@@ -136,6 +138,25 @@ def test_too_many_numbers() -> None:
     text = b"time_s,m1_x_m,m1_y_m,m1_z_m\n" + b"".join(b"%d,0,0,0\n" % k for k in range(20))
     with pytest.raises(ValueError, match="split it or thin it out"):
         read_tracks(text, "f.csv", ["m1"], room=40)
+
+
+def test_a_header_of_100_000_columns_is_refused_before_its_names_are_compared() -> None:
+    header = ",".join(["time_s", *(f"n{k}_x_m" for k in range(100_000))])
+    began = time.process_time()
+    with pytest.raises(DatasetError) as told:
+        read_tracks(f"{header}\n".encode(), "f.csv", [f"m{k}" for k in range(50)])
+    assert time.process_time() - began < 1.0, "comparing each name with those of the markers takes seconds"
+    assert told.value.count == 1
+    assert "f.csv, line 1: has 100001 columns; at most 3001 columns are read: remove" in str(told.value)
+
+
+def test_many_wrong_names_of_columns_are_compared_until_the_report_is_full(monkeypatch: pytest.MonkeyPatch) -> None:
+    compared: list[str] = []
+    monkeypatch.setattr("wingfit.records.files.tracks.nearest", lambda name, _: compared.append(name) or "known: m1")
+    header = ",".join(["time_s", *(f"n{k}_x_m" for k in range(2000))])
+    with pytest.raises(DatasetError):
+        read_tracks(f"{header}\n".encode(), "f.csv", ["m1"])
+    assert len(compared) == MAX_ERRORS
 
 
 @pytest.mark.parametrize("change", [("\n", "\r\n"), (",", " , "), ("time_s", "\ufefftime_s")])

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import io
 import json
+import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -144,7 +146,7 @@ def test_from_a_file_to_a_dataset(seen: Seen, api: Api, tmp_path: Path) -> None:
     add(seen)
     seen.wait(f"{TEXT.format('import-recordings')}.includes('vacuum-3hz')")
     seen.page.check("#import-recording [name=held_out]")
-    add(seen, name="again", window_from="0", window_to="0.12", airspeed_m_s="5", standard_deviation_m="5e-4")
+    add(seen, name="again", window_from="0", window_to="0.12", airspeed_m_s="5", standard_deviation_mm="0.5")
     seen.wait("document.querySelectorAll('#import-recordings tbody tr').length === 2")
     seen.page.fill("#import-dataset [name=name]", 'dives: "first" #1')
     seen.page.click("#import-dataset [type=submit]")
@@ -159,6 +161,10 @@ def test_from_a_file_to_a_dataset(seen: Seen, api: Api, tmp_path: Path) -> None:
     assert (first["name"], first["held_out"], first["frames"], first["airspeed_m_s"]) == ("vacuum-3hz", False, 8, 0)
     assert (second["name"], second["held_out"], second["airspeed_m_s"]) == ("again", True, 5)
     assert first["missing_percent"] == 12.5
+    archive = api.client.get(f"/v1/datasets/{stored['id']}/archive").content
+    with zipfile.ZipFile(io.BytesIO(archive)) as packed:
+        entries = packed.read("dataset.yaml").decode().splitlines()
+    assert [line.rpartition(", ")[2] for line in entries if "- {name" in line][1] == "standard_deviation_m: 0.0005}"
     seen.wait(f"{TEXT.format('recordings')}.includes('vacuum-3hz')")
 
 

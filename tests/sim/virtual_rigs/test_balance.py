@@ -10,6 +10,7 @@ import pytest
 from wingfit.records import load_dataset, wing_or_vehicle
 from wingfit.records.dataset import STANDARD_GRAVITY
 from wingfit.sim.vehicle.lift_drag import lift_drag
+from wingfit.sim.virtual_rigs import save_with_truth
 from wingfit.sim.virtual_rigs.balance import (
     EXAMPLE,
     HELD_OUT,
@@ -116,6 +117,15 @@ def test_same_seed_same_noise() -> None:
     one, other = campaign(3, EXAMPLE, TRIALS[:1]), campaign(4, EXAMPLE, TRIALS[:1])
     np.testing.assert_array_equal(one.recordings[0].values, campaign(3, EXAMPLE, TRIALS[:1]).recordings[0].values)
     assert np.abs(one.recordings[0].values - other.recordings[0].values).max() > 1e-3
+
+
+@pytest.mark.parametrize(
+    ("written", "name"), [("my-balance", "my-balance"), ("tests.2.zip", "tests.2"), ("v1.5", "v1.5")]
+)
+def test_a_written_dataset_has_the_name_of_its_folder_or_file(tmp_path: Path, written: str, name: str) -> None:
+    dataset = campaign(1, QUIET, TRIALS[:2])
+    save_with_truth(dataset, {}, tmp_path / written)
+    assert load_dataset(tmp_path / written).name == name
 
 
 def test_campaign_is_written_with_its_truth(tmp_path: Path) -> None:
