@@ -2,8 +2,8 @@
 
 Data of the Robird example (a wing with a displaced axis and a wrong linkage) are simulated, uploaded, calibrated twice
 and diagnosed, and the page is opened in Chromium. Takes a few minutes. With ``--every FOLDER``, the forces of the
-DelFly and the series of the pendulum are calibrated and diagnosed too, and every page is saved to the folder, in light
-and dark colours, as on a desktop and on a phone. Takes another few minutes.
+DelFly and the series of the pendulum are calibrated and diagnosed too, markers are tracked in a small film, and every
+page is saved to the folder, in light and dark colours, as on a desktop and on a phone. Takes another few minutes.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from benchmarks.cameras.small_film import places, write_small_film
 from benchmarks.common import machine
 from benchmarks.common.files import EXAMPLES, REPOSITORY
 from benchmarks.common.server_process import Server
@@ -124,7 +125,7 @@ def others(url: str) -> dict[str, tuple[str, str]]:
         drive(client, driven, rig)
         client.wait(run)
         client.wait_for_diagnosis(diagnosis)
-        film = client.create_film("wing from two sides", ["left", "right"])["id"]
+        film, tracking = tracked(client)
     return {
         "page-forces-dataset": (f"dataset={forces}", "data-motion"),
         "page-forces-run": (f"run={run}", "beat-0"),
@@ -133,7 +134,20 @@ def others(url: str) -> dict[str, tuple[str, str]]:
         "page-series-run": (f"run={driven_run}", "curve-plot"),
         "page-series-diagnosis": (f"diagnosis={driven}", "report"),
         "page-film": (f"film={film}", "film-files"),
+        "page-tracking": (f"tracking={tracking}", "found-plot"),
     }
+
+
+def tracked(client: Client) -> tuple[str, str]:
+    """Upload a small film, track its markers, and return the ids of the film and of the tracking."""
+    with tempfile.TemporaryDirectory(prefix="wf-") as scratch:
+        files = write_small_film(Path(scratch))
+        film = client.create_film("plate from two sides", [name for name in files if name != "cameras"])["id"]
+        for name, path in files.items():
+            client.upload_film_file(film, name, path)
+    tracking = client.submit_tracking(film, kind="dot", light="continuous", places=places())["id"]
+    client.wait_for_tracking(tracking)
+    return film, tracking
 
 
 def photographed_everywhere(url: str, pages: dict[str, tuple[str, str]], out: Path) -> list[str]:

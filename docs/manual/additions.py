@@ -1,4 +1,4 @@
-"""What the manual adds to Sphinx: pages below other pages, and links to files that are no pages."""
+"""What the manual adds to Sphinx: pages below other pages, titles as texts of links, links to files that are no pages."""
 
 from __future__ import annotations
 
@@ -38,6 +38,23 @@ class LinkedFiles(SphinxTransform):
                 node.replace_self(link)
             else:  # a folder: there is nothing to open
                 node.replace_self(node.children)
+
+
+class TitledLinks(SphinxTransform):
+    """Gives links to pages whose text is the name of their file (docs/x.md) the title of the page or section."""
+
+    default_priority = 100
+
+    def apply(self, **_: Any) -> None:
+        """Mark such links as without a text of their own: MyST then takes the title."""
+        for node in self.document.findall(addnodes.pending_xref):
+            if node.get("refdomain") == "doc" and _is_file_name(node.astext(), node["reftarget"]):
+                node["refexplicit"] = False
+
+
+def _is_file_name(text: str, docname: str) -> bool:
+    """Return whether ``text`` is the name of the file of the page ``docname``, with or without its folders."""
+    return text.endswith(".md") and f"/{docname}.md".endswith(f"/{text.lstrip('./')}")
 
 
 def _is_link(node: nodes.Node) -> bool:
@@ -84,6 +101,7 @@ def with_levels(_app: Sphinx, _page: str, _template: str, context: dict[str, Any
 def setup(app: Sphinx) -> dict[str, bool]:
     """Add all this to the application of Sphinx, as it requires of an extension."""
     app.add_transform(LinkedFiles)
+    app.add_transform(TitledLinks)
     app.connect("build-finished", copy_linked)
     app.connect("source-read", with_pages_below)
     app.connect("html-page-context", with_levels, priority=900)  # after the theme

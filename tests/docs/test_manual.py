@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -57,6 +58,15 @@ def test_links_to_files_open_them_and_anchors_are_those_of_code_hosts(built: Pat
         encoding="utf-8"
     )
     assert 'href="../deploy/slurm/wingfit.sbatch"' in (built / "docs" / "deployment.html").read_text(encoding="utf-8")
+
+
+def test_links_read_as_titles_where_their_text_is_the_name_of_a_file(built: Path) -> None:
+    page = (built / "README.html").read_text(encoding="utf-8")
+    assert re.search(r'href="docs/diagnosis\.html"><span class="std std-doc">Diagnosis', page)
+    assert re.search(r'href="docs/importing\.html#a-whole-dataset"><span class="std std-ref">A whole dataset<', page)
+    for path in built.rglob("*.html"):
+        bare = re.findall(r"<a [^>]*>(?:<[^>]*>)*([\w./-]+\.md)<", path.read_text(encoding="utf-8"))
+        assert not bare, (path.relative_to(built), bare)
 
 
 def test_the_references_name_commands_calls_and_python(built: Path) -> None:

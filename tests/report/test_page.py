@@ -244,7 +244,10 @@ def test_no_curve_of_a_series_crosses_a_gap() -> None:
     times = tuple(0.1 * k + (3.0 if k >= 10 else 0.0) for k in range(len(one.phase)))
     steady = replace(one, times=tuple(0.1 * k for k in range(len(one.phase))))
     curves = {
-        name: sum(tag == "path" and a.get("class") == "curve after" for tag, a in page(replace(finding, overlays=(given,))).tags)
+        name: sum(
+            tag == "path" and a.get("class") == "curve after"
+            for tag, a in page(replace(finding, overlays=(given,))).tags
+        )
         for name, given in (("steady", steady), ("gap", replace(steady, times=times)))
     }
     assert curves["gap"] == curves["steady"] + 2, "the simulation and the residual are in two parts each"

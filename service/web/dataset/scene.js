@@ -7,6 +7,7 @@ import { placed, projected } from "./labels.js";
 const AXES = ["x aft", "y outboard", "z up"];
 const ARROW = 0.3; // of the span
 const MARGIN = 0.04; // of the span, around everything
+const LABELLED = 0.7; // of the upper edge of the stroke plane, from the hinge: at its end there is no room above it
 export const FAR = 0.15; // of the span: distances beyond which axes, names or unit are wrong (docs/checks.md)
 
 const CAMERAS = {
@@ -103,8 +104,8 @@ function scene(look, node, { wing, tracks, parts, frame, turned, names, view }) 
       textposition: wing.markers.map((_, m) => written.get(m)?.side ?? "top center"),
       textfont: { size: 10, color: wing.markers.map((_, m) => (written.has(m) ? described : "rgba(0,0,0,0)")) } },
     line("axes", parts.arrows, look.accent, 6),
-    { type: "scatter3d", mode: "text", name: "labels", ...coordinates([...tips, parts.hinge[0], fan.at(-1)]), text: [...AXES, "hinge axis", "stroke plane"], hoverinfo: "skip",
-      showlegend: false, textfont: { size: 12, color: [look.accent, look.accent, look.accent, look.ink, look.series[2]] }, textposition: "top center" },
+    { type: "scatter3d", mode: "text", name: "labels", ...coordinates([...tips, parts.hinge[0], fan[0].map((from, k) => from + LABELLED * (fan.at(-1)[k] - from))]), text: [...AXES, "hinge axis", "stroke plane"], hoverinfo: "skip",
+      showlegend: false, textfont: { size: 12, color: [look.accent, look.accent, look.accent, look.ink, look.series[2]] }, textposition: [...tips.map(() => "top center"), "top center", "top left"] },
   ];
   const box = (k) => ({
     title: { text: `${"xyz"[k]}, mm`, font: { size: 11 } }, range: parts.ranges[k], gridcolor: look.line, zeroline: false, showbackground: false,

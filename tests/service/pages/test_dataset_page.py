@@ -159,6 +159,9 @@ def test_markers_are_drawn_where_they_were_recorded(browser: Browser, api: Api, 
     assert sorted(lengths(points(seen, "distance")) + lengths(points(seen, "far"))) == pytest.approx(sorted(expected))
     scene = seen.page.evaluate("document.getElementById('picture').layout.scene")
     sizes = {k: scene[f"{k}axis"]["range"][1] - scene[f"{k}axis"]["range"][0] for k in "xyz"}
+    label, top = points(seen, "labels")[-1], scene["zaxis"]["range"][1]
+    assert label[2] is not None
+    assert label[2] < top - 0.15 * sizes["z"], "there is room above the label of the stroke plane"
     scale = [sizes[k] / scene["aspectratio"][k] for k in "xyz"]
     assert scale == pytest.approx([scale[0]] * 3), "one scale on all axes"
     assert seen.rows("distances")[0][0] == tracks["markers"][int(np.argmax(tracks["distance_mm"]))]

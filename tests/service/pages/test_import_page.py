@@ -164,7 +164,8 @@ def test_from_a_file_to_a_dataset(seen: Seen, api: Api, tmp_path: Path) -> None:
     archive = api.client.get(f"/v1/datasets/{stored['id']}/archive").content
     with zipfile.ZipFile(io.BytesIO(archive)) as packed:
         entries = packed.read("dataset.yaml").decode().splitlines()
-    assert [line.rpartition(", ")[2] for line in entries if "- {name" in line][1] == "standard_deviation_m: 0.0005}"
+    (entry,) = (line for line in entries if '- {name: "again"' in line)
+    assert entry.endswith(", standard_deviation_m: 0.0005}")
     seen.wait(f"{TEXT.format('recordings')}.includes('vacuum-3hz')")
 
 
