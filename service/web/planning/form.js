@@ -111,14 +111,14 @@ export async function values() {
 }
 
 // Show what is wrong at the fields that it names, and the rest in the box below; null: nothing is wrong.
-export function showFaults(error) {
+export function showFaults(error, focus = true) {
   for (const node of form().querySelectorAll(".fault")) node.remove();
   for (const control of form().querySelectorAll("[aria-describedby]")) control.removeAttribute("aria-describedby");
   const placed = [];
   const rest = (error?.errors ?? []).filter((item) => !place(item, placed));
   showErrors(form(), $("plan-errors"), error && { message: error.message, errors: rest });
   for (const control of placed) control.setAttribute("aria-invalid", "true");
-  placed[0]?.focus();
+  if (focus) placed[0]?.focus();
 }
 
 // Write ``item`` at its field, which is unfolded; false if it names none that is shown.

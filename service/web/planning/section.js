@@ -16,7 +16,7 @@ const SLOWEST = 20; // times the usual time, which is that of an idle machine
 
 let ready = null;
 let dataset = null;
-const plans = new Map(); // by id of the dataset: {stop, began, expected, first, plan}; stop is null once it has ended
+const plans = new Map(); // by id of the dataset: {stop, began, expected, first, failure, plan}; stop is null once it has ended
 const pace = { tracks: 1, forces: 1 }; // how much longer than usual a plan took on this server
 let ticking = null;
 
@@ -52,6 +52,8 @@ export async function showPlan(next) {
   $("plan-about").textContent = `What recordings like these will show: how well each gene will be known, which effects will be told apart, what to record next. The ${plural(counted, "recording")} to fit ${counted === 1 ? "is" : "are"} counted, with the noise seen in ${counted === 1 ? "it" : "them"}: after more data, plan again. Nothing is stored.`;
   show();
   await showForm(next);
+  const { stop = null, failure = null } = plans.get(next.id) ?? {};
+  if (dataset === next && failure && !stop) showFaults(failure, false);
 }
 
 // The server has no simulation of a rig of the user's own.
@@ -89,7 +91,7 @@ async function start() {
   if (plans.get(of.id)?.stop) return;
   const stop = new AbortController();
   const work = effort();
-  const one = { stop, began: Date.now(), expected: usual(of.kind, work) * pace[of.kind], first: false, plan: plans.get(of.id)?.plan ?? null };
+  const one = { stop, began: Date.now(), expected: usual(of.kind, work) * pace[of.kind], first: false, failure: null, plan: plans.get(of.id)?.plan ?? null };
   plans.set(of.id, one);
   showFaults(null);
   show();
@@ -101,19 +103,23 @@ async function start() {
     if (body.suspects !== null && one.expected > LONG_SECONDS) {
       one.plan = await ask({ ...body, suspects: null });
       one.first = true;
-      if (dataset === of) show();
+      const taken = (Date.now() - one.began) / 1e3;
+      one.expected = taken + (usual(of.kind, work) * taken) / usual(of.kind, { ...work, effects: 0 }); // the effects take as much longer
+      if (dataset?.id === of.id) show(); // it may have been fetched anew meanwhile
     }
     one.plan = await ask(body);
-    pace[of.kind] = Math.min(SLOWEST, Math.max(1 / SLOWEST, (pace[of.kind] * (Date.now() - one.began)) / 1e3 / one.expected));
+    pace[of.kind] = Math.min(SLOWEST, Math.max(1 / SLOWEST, (Date.now() - one.began) / 1e3 / usual(of.kind, work)));
   } catch (error) {
     failure = error;
   }
   const cancelled = stop.signal.aborted;
   one.stop = null;
-  if (dataset === of) {
-    show(true);
-    if (cancelled) say(one.first ? "The plan was cancelled; what is shown has no effects." : "The plan was cancelled.");
+  one.failure = cancelled ? null : failure;
+  if (dataset?.id === of.id) {
+    show();
+    if (cancelled) toast(one.first ? "The plan was cancelled; what is shown has no effects" : "The plan was cancelled");
     else if (failure) showFaults(failure);
+    else say(words(one.plan));
   } else if (!cancelled && plans.has(of.id)) {
     toast(failure ? `The plan of ${of.name} failed: ${failure.message}` : `The plan of ${of.name} is ready`);
   }
@@ -122,12 +128,12 @@ async function start() {
 const say = (text) => { $("plan-said").textContent = text; };
 
 // Show the plan of this dataset as it stands.
-function show(ended = false) {
+function show() {
   const one = plans.get(dataset.id) ?? null;
   const running = Boolean(one?.stop);
   clearInterval(ticking);
   $("plan-start").disabled = running;
-  $("plan-start").textContent = one?.plan ? "Plan again" : "Plan";
+  $("plan-start").textContent = running ? "Planning…" : one?.plan ? "Plan again" : "Plan";
   $("plan-cancel").hidden = !running;
   $("plan-progress").hidden = !running;
   if (running) {
@@ -138,7 +144,6 @@ function show(ended = false) {
   $("plan-answer").hidden = !one?.plan;
   $("plan-answer").classList.toggle("old", running && !one.first);
   if (!one?.plan) return;
-  if (ended) say(words(one.plan));
   drawHead(one.plan);
   drawGenes(one.plan);
   drawAdditions(one.plan, dataset);

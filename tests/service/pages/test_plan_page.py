@@ -70,16 +70,14 @@ def answered(route: Route, status: int, body: dict[str, Any]) -> None:
 
 @pytest.fixture(scope="module")
 def plan(api: Api, dataset: dict[str, Any]) -> dict[str, Any]:
-    """The plan with few effects."""
-    body = {"suspects": FEW, "add": 1, "beats": BEATS}
+    """A plan of the genes alone, which takes a moment."""
+    body: dict[str, Any] = {"suspects": None, "add": 0}
     answer = api.client.post(f"/v1/datasets/{dataset['id']}/plan", json=body)
     assert answer.status_code == 200, answer.text
     return dict(answer.json())
 
 
-def test_a_plan_is_asked_for_and_drawn(
-    browser: Browser, api: Api, dataset: dict[str, Any], plan: dict[str, Any]
-) -> None:
+def test_a_plan_is_asked_for_and_drawn(browser: Browser, api: Api, dataset: dict[str, Any]) -> None:
     axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="pip install -e '.[dev]'").Axe()
     seen = ready(browser, api, dataset, color_scheme="light")
     assert "The 2 recordings to fit are counted" in seen.page.inner_text("#plan-about")
@@ -88,14 +86,14 @@ def test_a_plan_is_asked_for_and_drawn(
     seen.page.fill("#plan-form input[name=add]", "1")
     seen.page.click("#plan-summary")
     seen.page.fill("#plan-form input[name=beats]", str(BEATS))
-    sent: list[dict[str, Any]] = []
-    seen.page.on("request", lambda one: sent.append(one.post_data_json) if one.url.endswith("/plan") else None)
-    seen.page.click("#plan-start")
+    with seen.page.expect_response("**/plan") as found_out:
+        seen.page.click("#plan-start")
     seen.wait(DONE)
+    plan, sent = found_out.value.json(), found_out.value.request.post_data_json
     defaults = {"target_percent": 7.5, "power": 0.9, "axes": ["x"], "preset": "proposed"}
-    assert [one | {"suspects": sorted(one["suspects"])} for one in sent] == [
-        {"suspects": sorted(FEW), "add": 1, "beats": BEATS} | defaults
-    ]
+    assert (
+        sent | {"suspects": sorted(sent["suspects"])} == {"suspects": sorted(FEW), "add": 1, "beats": BEATS} | defaults
+    )
     _check_genes(seen, plan)
     _check_effects(seen, plan)
     _check_additions(seen, plan)
@@ -198,7 +196,7 @@ def test_refusals_are_shown_and_a_plan_can_be_cancelled(
     assert not seen.page.is_visible("#plan-errors"), "those of before are gone"
     seen.page.click("#plan-cancel")
     seen.wait("document.getElementById('plan-progress').hidden")
-    assert seen.page.text_content("#plan-said") == "The plan was cancelled."
+    assert seen.page.inner_text("#toast") == "The plan was cancelled"
     assert seen.page.is_enabled("#plan-start")
     assert not seen.page.is_visible("#plan-cancel")
 
@@ -206,6 +204,15 @@ def test_refusals_are_shown_and_a_plan_can_be_cancelled(
     seen.wait("!document.getElementById('plan-progress').hidden")
     seen.page.evaluate("location.hash = 'datasets'")
     seen.wait("document.getElementById('dataset').hidden && !document.getElementById('listing').hidden")
+    seen.page.evaluate(f"location.hash = 'dataset={dataset['id']}'")
+    seen.wait(f"{READY} && !document.getElementById('dataset').hidden")
+    assert seen.page.is_visible("#plan-progress"), "it goes on"
+    answered(waiting[-1], 200, plan)
+    seen.wait(DONE)
+    seen.page.click("#plan-start")
+    seen.wait("!document.getElementById('plan-progress').hidden")
+    seen.page.evaluate("location.hash = 'datasets'")
+    seen.wait("document.getElementById('dataset').hidden")
     answered(waiting[-1], 200, plan)
     seen.wait("document.getElementById('toast').textContent.endsWith('is ready')")
     seen.page.evaluate(f"location.hash = 'dataset={dataset['id']}'")
@@ -276,17 +283,17 @@ def test_a_wing_is_planned_and_series_are_where_their_rig_is(browser: Browser, a
     seen.page.fill("#plan-form input[name=markers]", "9")
     for box in seen.page.locator("#plan-recordings input").all()[1:]:
         box.uncheck()
-    sent: list[dict[str, Any]] = []
-    seen.page.on("request", lambda one: sent.append(one.post_data_json) if one.url.endswith("/plan") else None)
-    seen.page.click("#plan-start")
+    with seen.page.expect_response("**/plan") as found_out:
+        seen.page.click("#plan-start")
     seen.wait(DONE)
-    assert (sent[0]["suspects"], sent[0]["recordings"]) == (None, [wing["recordings"][0]["name"]])
+    sent = found_out.value.request.post_data_json
+    assert (sent["suspects"], sent["recordings"]) == (None, [wing["recordings"][0]["name"]])
     assert len(seen.rows("plan-genes")) == 18
     assert not seen.page.is_visible("#plan-effects-part")
     assert not seen.page.is_visible("#plan-additions")
     seen.wait(DRAWN.format("plan-markers", 0))
     assert seen.data("plan-markers", 0, "x")[-1] == 9
-    _check_long(seen)
+    _check_long(seen, found_out.value.json())
     series = upload(api)
     seen.page.evaluate(f"location.hash = 'dataset={series}'")
     seen.wait("document.querySelector('#plan-part .copyable') !== null")
@@ -298,21 +305,24 @@ def test_a_wing_is_planned_and_series_are_where_their_rig_is(browser: Browser, a
     closed(seen)
 
 
-def _check_long(seen: Seen) -> None:
+def _check_long(seen: Seen, of_genes: dict[str, Any]) -> None:
     """All effects take long on a wing: the genes are asked for first, and stay if the effects are cancelled."""
     waiting: list[Route] = []
     seen.page.route("**/plan", lambda route: waiting.append(route))
-    genes = seen.page.evaluate("document.querySelector('#plan-genes tbody').textContent")
     seen.page.select_option("#plan-form select[name=compare]", "all")
     seen.page.select_option("#plan-form select[name=division]", "24")
+    seen.page.fill("#plan-form input[name=add]", "3")
+    for box in seen.page.locator("#plan-recordings input").all():
+        box.check()
     seen.page.click("#plan-start")
     seen.wait("document.getElementById('plan-status').textContent.includes('Computing')")
     assert waiting[0].request.post_data_json["suspects"] is None
-    waiting[0].fallback()
+    genes = [gene | {"relative_percent": 33.0} for gene in of_genes["genes"]]
+    answered(waiting[0], 200, of_genes | {"genes": genes})
     seen.wait("document.getElementById('plan-status').textContent.includes('the effects follow')")
     assert waiting[1].request.post_data_json["suspects"] == []
     seen.page.click("#plan-cancel")
     seen.wait(DONE)
-    assert seen.page.text_content("#plan-said") == "The plan was cancelled; what is shown has no effects."
-    assert seen.page.evaluate("document.querySelector('#plan-genes tbody').textContent") != genes, "those of 24 bodies"
+    assert seen.page.inner_text("#toast") == "The plan was cancelled; what is shown has no effects"
+    assert {row[2] for row in seen.rows("plan-genes")} == {"± 33 %"}, "those that came first"
     seen.page.unroute("**/plan")
