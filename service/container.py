@@ -68,6 +68,7 @@ class Service:
         self.simulations = ConcurrencyLimit("simulations", concurrency_limit.SIMULATIONS)
         self.uploads = ConcurrencyLimit("uploads", concurrency_limit.UPLOADS)
         self.exports = ConcurrencyLimit("exports", concurrency_limit.EXPORTS)
+        self.plans = ConcurrencyLimit("plans", concurrency_limit.PLANS, concurrency_limit.MAX_WAITING_PLANS)
         self.downloads = ConcurrencyLimit("downloads", concurrency_limit.DOWNLOADS)
         self.answers = ConcurrencyLimit("answers", concurrency_limit.ANSWERS)
         self.film_uploads = ConcurrencyLimit("uploads of films", concurrency_limit.FILM_UPLOADS)

@@ -15,6 +15,8 @@ UPLOADS = 2
 FILM_UPLOADS, FRAMES = 8, 4
 # An export simulates every recording, which may take an hour, and is made in memory.
 EXPORTS = 1
+# A plan of a wing with all effects takes minutes, which as many more users would wait.
+PLANS, MAX_WAITING_PLANS = 1, 8
 # Large answers, held until the client has taken them: stored ones, and simulated ones of some tens of megabytes.
 DOWNLOADS = ANSWERS = 8
 # A copy of the whole database, which is on the disk until the client has taken it.

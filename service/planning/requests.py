@@ -7,7 +7,7 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field
 
 from wingfit.planning.spec import REAL, WHOLE
-from wingfit.service.runs.requests import Accuracy, Division, Effects, Name, Number, VehicleModel, Whole
+from wingfit.service.runs.requests import Accuracy, Axes, Division, Effects, Name, Number, VehicleModel, Whole
 
 _EXAMPLE: dict[str, Any] = {"noise_mm": 0.4, "beats": 10, "suspects": ["added_mass", "hinge_offset"], "add": 2}
 
@@ -30,7 +30,7 @@ class PlanIn(VehicleModel, BaseModel):
     division: Division = "11"
     accuracy_mm: Accuracy = 0.1
     effects: Effects = []
-    axes: Annotated[list[Name], Field(max_length=2, description="vehicles only: force axes that are fitted")] = ["x"]
+    axes: Axes = ["x"]
     genes: Annotated[list[Name], Field(max_length=1000, description="empty: those of a calibration")] = []
     recordings: Annotated[list[Name], Field(max_length=1000, description="empty: all that are not held out")] = []
     genome: Annotated[dict[str, Number], Field(max_length=1000, description="genes not named are nominal")] = {}

@@ -30,10 +30,10 @@ export async function fill(node, file) {
 
 export const isFinal = (job) => FINAL.has(job.state);
 
-export async function call(method, path, { body, headers = {}, as = "json" } = {}) {
+export async function call(method, path, { body, headers = {}, as = "json", signal } = {}) {
   let response;
   try {
-    response = await fetch(`v1/${path}`, { method, body, headers });
+    response = await fetch(`v1/${path}`, { method, body, headers, signal });
   } catch {
     throw new ApiError("The server does not answer. Start it with 'wingfit serve'.");
   }
@@ -50,8 +50,9 @@ export const get = (path) => call("GET", path);
 
 export const getText = (path) => call("GET", path, { as: "text" });
 
-export const postJson = (path, value, headers = {}) =>
-  call("POST", path, { body: JSON.stringify(value), headers: { "Content-Type": "application/json", ...headers } });
+// ``signal`` ends a request that is no longer wanted.
+export const postJson = (path, value, headers = {}, signal = undefined) =>
+  call("POST", path, { body: JSON.stringify(value), headers: { "Content-Type": "application/json", ...headers }, signal });
 
 export const part = encodeURIComponent;
 

@@ -12,6 +12,7 @@ import { showDrawing } from "../parts/drawing.js";
 import { setUpSimulation, showSimulation } from "../parts/driving.js";
 import { hideSeries, redrawSeries, setUpSeries, showSeries } from "../parts/series.js";
 import { badge, runName } from "../parts/sidebar.js";
+import { forgetPlan, hidePlan, redrawPlan, revealPlan, showPlan } from "../planning/section.js";
 import { randomKey, remove } from "./submit.js";
 
 const LISTED = 10;
@@ -36,8 +37,12 @@ async function build() {
   });
   $("dataset-run").addEventListener("click", () => hooks.onRun(dataset));
   $("dataset-diagnose").addEventListener("click", () => hooks.onDiagnose(dataset));
+  $("dataset-plan").addEventListener("click", revealPlan);
   $("dataset-delete").addEventListener("click", async () => {
-    if (await remove("datasets", dataset.id, dataset.name)) hooks.onDeleted();
+    const { id, name } = dataset;
+    if (!await remove("datasets", id, name)) return;
+    forgetPlan(id);
+    hooks.onDeleted();
   });
 }
 
@@ -49,7 +54,7 @@ export async function selectDataset(id) {
   ready ??= build();
   try {
     await ready;
-    for (const hide of [hideSeries, hideForces, hideTracks]) hide();
+    for (const hide of [hideSeries, hideForces, hideTracks, hidePlan]) hide();
     if (!id || hooks.currentId() !== id) return;
     const found = await get(`datasets/${part(id)}`);
     if (hooks.currentId() !== id) return;
@@ -68,7 +73,7 @@ export async function selectDataset(id) {
   $("drawing-part").hidden = series;
   const shown = dataset;
   const charts = { tracks: () => [showTracks(shown), showDrawing(shown)], forces: () => [showForces(shown), showDrawing(shown)], series: () => [showRig()] }[dataset.kind]();
-  await Promise.all([...charts, showChecks(shown, () => dataset === shown), drawConditions(shown), listWork(id)]);
+  await Promise.all([...charts, showChecks(shown, () => dataset === shown), drawConditions(shown), showPlan(shown), listWork(id)]);
 }
 
 async function showRig() {
@@ -110,6 +115,7 @@ export function redrawDataset() {
   if (!dataset) return;
   ({ tracks: redrawTracks, forces: redrawForces, series: redrawSeries })[dataset.kind]();
   drawConditions(dataset);
+  redrawPlan();
 }
 
 async function listWork(id) {

@@ -210,13 +210,18 @@ def test_an_experiment_is_planned(api: Api, dataset: Json) -> None:
 @pytest.mark.parametrize(
     ("body", "where", "words"),
     [
-        ({"noise_mm": 0.3}, "body", "noise_mm is a setting of marker tracks"),
-        ({"suspects": ["backlash"]}, "body", "unknown suspect 'backlash'"),
+        ({"noise_mm": 0.3}, "body.noise_mm", "noise_mm is a setting of marker tracks"),
+        ({"suspects": ["backlash"]}, "body.suspects", "unknown suspect 'backlash'"),
         ({"division": "4"}, "body.division", "means nothing for a vehicle"),
         ({"beats": 0}, "body.beats", "greater than or equal to 1"),
         ({"add": 21}, "body.add", "less than or equal to 20"),
         ({"effects": ["nothing"]}, "body.effects.0", "nothing"),
-        ({"genome": {"E_f": 1.0}}, "body", "which the model does not have"),
+        ({"genome": {"E_f": 1.0}}, "body.genome", "which the model does not have"),
+        ({"genome": {"C_l": -1.0}}, "body.genome", "it must lie in"),
+        ({"genes": ["E_f"]}, "body.genes", "unknown gene 'E_f'"),
+        ({"recordings": ["none"]}, "body.recordings", "no recording 'none'"),
+        ({"axes": ["y"]}, "body.axes.0", "should be 'x' or 'z'"),
+        ({"without": ["translation", "clap_and_peel", "rotation"]}, "body", "nothing to calibrate"),
     ],
 )
 def test_plans_that_cannot_be_made_are_refused(api: Api, dataset: Json, body: Json, where: str, words: str) -> None:
