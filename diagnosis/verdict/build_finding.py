@@ -35,6 +35,7 @@ from wingfit.diagnosis.verdict.proof import (
 from wingfit.diagnosis.verdict.reservations import (
     accepted_error_sentence,
     accepted_sentence,
+    candidate_sentence,
     doubted_by_held_out,
     held_out_sentence,
     judged_by_accepted_error,
@@ -164,6 +165,7 @@ def _finding(
         summary=summary(decision, suspects, _summary_texts(data, nominal, best, located, proved))
         + ("" if data.kind == "series" else _drift_sentence(data, nominal, best))
         + remaining_sentence(data, decision, best, floor)
+        + candidate_sentence(data, decision, weights, suspects)
         + accepted_error_sentence(decide(weights), first)
         + accepted_sentence(data, decision, nominal, floor)
         + noise_sentence(data, decision, nominal)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -13,8 +14,10 @@ from wingfit.diagnosis.verdict.noise_doubt import noise_may_hide
 from wingfit.diagnosis.verdict.verdict import Decision
 from wingfit.diagnosis.verdict.weigh_hypotheses import HypothesisWeights, nominal_refuted, tolerated_excess
 from wingfit.records import Series
+from wingfit.rigs.suspect import Suspect
 
 CLAIMING: tuple[Verdict, ...] = (*NAMING, "ambiguous")
+WORTH_MENTIONING = 0.5  # of a misfit that an adequate model leaves: an effect that would remove more of it is mentioned
 NO_GAIN = 0.1  # of the held-out misfit: effects that remove less of it are not named
 NOT_PREDICTED = 2.0  # times the floor: the lower end of a held-out misfit from which a model does not predict
 
@@ -33,12 +36,14 @@ def partly(decision: Decision, data: WhitenedData, nominal: Refit, floor: float)
 
 
 def remaining_sentence(data: WhitenedData, decision: Decision, best: Refit, floor: float) -> str:
-    """Return a sentence on the misfit that the named effects leave; empty if it is negligible, or nothing is named.
+    """Return a sentence on the misfit that the named effects, or an adequate model, leave; empty if it is negligible.
 
-    ``floor`` (m or N): discretisation error.
+    An unnamed verdict speaks of nothing else. ``floor`` (m or N): discretisation error.
     """
     size = float(np.sqrt(max(best.excess, 0.0)))
-    if decision.verdict in ("adequate", "unnamed") or size <= data.policy.negligible * data.noise:
+    if decision.verdict == "unnamed" or size <= data.policy.negligible * data.noise:
+        return ""
+    if decision.verdict == "adequate" and data.accepted:  # what accepted_sentence says
         return ""
     share = "" if data.unit == "noise" else f", {size / data.noise:.2g} times the noise"
     if nominal_refuted(data, best.excess, floor):
@@ -49,6 +54,26 @@ def remaining_sentence(data: WhitenedData, decision: Decision, best: Refit, floo
     return (
         f" A misfit of {amount(size, data.unit)} beyond the noise remains{share}, no more than errors of the noise "
         "and of the discretisation explain."
+    )
+
+
+def candidate_sentence(
+    data: WhitenedData, decision: Decision, weights: HypothesisWeights, suspects: Mapping[str, Suspect]
+) -> str:
+    """Return a sentence on the effects that would remove most of what an adequate model leaves; else empty.
+
+    ``suspects``: by name.
+    """
+    nominal, *others = weights.refits
+    if decision.verdict != "adequate" or not others or nominal.excess <= (data.policy.negligible * data.noise) ** 2:
+        return ""
+    best = others[int(np.argmax(weights.evidence[1:]))]
+    removed = 1.0 - max(best.excess, 0.0) / nominal.excess
+    if removed < WORTH_MENTIONING:
+        return ""
+    titles = " with ".join(suspects[name].title.lower() for name in best.names)
+    return (
+        f" Most of it, {100.0 * removed:.0f} %, would go with {titles}: too little evidence to add to the model."
     )
 
 

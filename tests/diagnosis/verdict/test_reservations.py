@@ -14,6 +14,7 @@ from wingfit.diagnosis.policy import POLICY
 from wingfit.diagnosis.verdict.reservations import (
     accepted_error_sentence,
     accepted_sentence,
+    candidate_sentence,
     doubted_by_held_out,
     held_out_sentence,
     judged_by_accepted_error,
@@ -107,11 +108,33 @@ def test_a_misfit_that_remains_is_stated() -> None:
     assert "A misfit of 5 times the noise beyond the noise remains" in remaining_sentence(
         data(), found, found.best, 0.0
     )
-    assert remaining_sentence(data(), decision("adequate"), found.best, 0.0) == ""
+    assert "A misfit of 0.447 times the noise" in remaining_sentence(
+        data(), decision("adequate"), replace_excess(found, 0.2).best, 1.0
+    )
+    assert remaining_sentence(data(accepted=1.0), decision("adequate"), found.best, 0.0) == ""
     exact = replace_excess(found, 0.01)
     assert remaining_sentence(data(), exact, exact.best, 0.0) == ""
     small = replace_excess(found, 0.2)
     assert "remains, no more than errors of the noise and of the" in remaining_sentence(data(), small, small.best, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("left", "verdict", "said"),
+    [
+        (0.1, "adequate", " Most of it, 67 %, would go with play: too little evidence to add to the model."),
+        (0.2, "adequate", ""),
+        (0.1, "unnamed", ""),
+    ],
+)
+def test_what_would_remove_most_of_what_an_adequate_model_leaves_is_stated(
+    left: float, verdict: Verdict, said: str
+) -> None:
+    refits = [SimpleNamespace(names=names, excess=excess) for names, excess in (((), 0.3), (("play",), left))]
+    weights: Any = SimpleNamespace(refits=refits, evidence=np.array([0.0, -1.0]))
+    suspects: Any = {"play": SimpleNamespace(title="Play")}
+    assert candidate_sentence(data("tracks"), decision(verdict), weights, suspects) == said
+    refits[0].excess = 0.01
+    assert candidate_sentence(data("tracks"), decision(verdict), weights, suspects) == ""
 
 
 def replace_excess(found: Decision, excess: float) -> Decision:
