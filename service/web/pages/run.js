@@ -2,7 +2,7 @@
 
 import { call, follow, get, history, isFinal, part } from "../base/api.js";
 import { copy, curl, python } from "../base/copying.js";
-import { $, plural, toast, when } from "../base/format.js";
+import { $, isolated, plural, toast, when } from "../base/format.js";
 import { hideForces, redrawForces, setUpForces, showForces } from "./forces.js";
 import { showGeneCorrelations } from "../base/correlations.js";
 import { redrawCurves, setUpCurves, showCurves } from "../parts/curves.js";
@@ -75,6 +75,13 @@ export async function selectRun(id) {
   showSections();
   update();
   if (!isFinal(run)) listen();
+}
+
+// Take over name and notes of ``now``, the run as it is on the server.
+export function renameRun(now) {
+  if (run?.id !== now.id || (run.name === now.name && run.notes === now.notes)) return;
+  run = { ...run, name: now.name, notes: now.notes };
+  drawHead();
 }
 
 export function redraw() {
@@ -173,7 +180,7 @@ function drawHead() {
   $("run-fit").hidden = run.state !== "SUCCEEDED";
   $("run-fit").textContent = run.state === "SUCCEEDED" ? fitSentence(run) : "";
   placeHistory();
-  $("run-about").textContent = [dataset.name, ...setup(run), when(run.created_at)].join(" · ");
+  $("run-about").textContent = [isolated(dataset.name), ...setup(run), when(run.created_at)].join(" · ");
   showNotes($("run-name"), "runs", run, ({ name, notes }) => {
     run = { ...run, name, notes };
     drawHead();
