@@ -160,10 +160,12 @@ def test_charts_of_a_page_that_was_left_at_once_fit_when_it_is_opened_again(brow
     with seen.page.expect_request("**/plotly.min.js"):
         seen.show(f"dataset={dataset}")
     seen.show("effects")
-    seen.wait(f"{DRAWN.format('picture', 8)}")
+    seen.wait(DRAWN.format("conditions", 0))
     seen.show(f"dataset={dataset}")
-    seen.wait("document.getElementById('picture').clientWidth > 0")
-    seen.wait("document.getElementById('picture')._fullLayout.width === document.getElementById('picture').clientWidth")
+    seen.wait("document.getElementById('conditions').clientWidth > 0")
+    seen.wait(
+        "document.getElementById('conditions')._fullLayout.width === document.getElementById('conditions').clientWidth"
+    )
     seen.wait("document.documentElement.scrollWidth <= 390")
     seen.page.context.close()
 
