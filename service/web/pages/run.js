@@ -8,7 +8,7 @@ import { showGeneCorrelations } from "../base/correlations.js";
 import { redrawCurves, setUpCurves, showCurves } from "../parts/curves.js";
 import { showWaiting } from "../parts/driving.js";
 import { aboutHistory, drawHistory } from "../parts/history.js";
-import { badge, runName, setBar, timeLeft } from "../parts/sidebar.js";
+import { badge, runName, setBar, stateWord, timeLeft } from "../parts/sidebar.js";
 import { showNotes } from "../lists/edit.js";
 import { redrawLoads } from "../parts/loads.js";
 import { cancel, remove } from "./submit.js";
@@ -238,6 +238,18 @@ async function act(action) {
     // The new state arrives as an event; this answer may be older than the last event.
     await call("POST", `runs/${part(run.id)}/${action}`);
   } catch (error) {
-    toast(error.message);
+    if (error.status === 409) await takeOver(action);
+    else toast(error.message);
   }
+}
+
+// The state of the run had changed before the action, and the page did not know it.
+async function takeOver(action) {
+  const { id } = run;
+  const now = await get(`runs/${part(id)}`).catch((error) => toast(error.message));
+  if (!now || run?.id !== id) return;
+  run = now;
+  hooks.onChange(run);
+  update();
+  toast(`Could not ${action}: meanwhile the run is ${stateWord(run.state)}`);
 }

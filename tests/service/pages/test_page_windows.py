@@ -147,9 +147,13 @@ def test_a_window_behind_others_leaves_its_connection_to_them(seen: Seen, api: A
     seen.wait("!document.getElementById('history').hidden")
     with seen.page.expect_event("requestfailed", lambda request: "/events" in request.url):
         seen.page.evaluate(f"window.shown = false; {POLL}")
-    api.control(run, "cancel")
-    api.finish(run)
+    api.control(run, "pause")
+    api.until(run, lambda now: now["state"] == "PAUSED")
+    seen.page.click("[data-action=pause]")
+    seen.wait(f"{TEXT.format('toast')} === 'Could not pause: meanwhile the run is paused'")
     seen.page.evaluate(f"window.shown = true; {POLL}")
+    seen.page.click("[data-action=cancel]")
+    seen.page.click("#confirm-yes")
     seen.wait("document.querySelector('#run-name .badge').textContent === 'cancelled'")
     assert len(followed) == 2
 
