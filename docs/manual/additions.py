@@ -1,4 +1,4 @@
-"""What the manual adds to Sphinx: pages below other pages, titles as texts of links, links to files that are no pages."""
+"""What the manual adds to Sphinx: pages below other pages, titles as texts of links, and links to other files."""
 
 from __future__ import annotations
 

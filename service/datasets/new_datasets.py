@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import PurePath
 from typing import Any
 
 from sqlalchemy.orm import Session
@@ -49,7 +50,7 @@ def stored(
         again: identifies a repeated request, which stores nothing.
         found: the dataset.
         archive: name and bytes of the file from which it was opened.
-        name: instead of the dataset's own.
+        name: instead of the dataset's own, which gets a number if its owner has a dataset of that name.
         body: makes the body of the answer from the description of the dataset.
 
     """
@@ -59,6 +60,7 @@ def stored(
     def create(session: Session) -> store.Answer:
         row = _row(found.dataset, found.mistakes, name, filename, data)
         store.make_room(session, row.owner, len(data) + len(found.parsed or b""), service.settings.max_stored_mb)
+        row.name = name or store.free_dataset_name(session, row.owner, row.name)
         session.add(row)
         session.flush()
         session.add(ArchiveRow(dataset_id=row.id, body=data))
@@ -77,7 +79,7 @@ def _row(loaded: AnyDataset, mistakes: Sequence[Mistake], name: str | None, file
     return DatasetRow(
         id=store.new_id("ds"),
         owner=owner_of_new(),
-        name=name or loaded.name,
+        name=name or loaded.name.strip() or PurePath(filename).stem,
         kind=loaded.kind,
         description=loaded.description,
         filename=filename,

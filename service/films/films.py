@@ -16,7 +16,7 @@ from wingfit.cameras.files.camera_set import CameraSet
 from wingfit.cameras.files.project import read_project
 from wingfit.cameras.files.read import recognise
 from wingfit.client.films import answers as a
-from wingfit.records.errors import DatasetError, fail
+from wingfit.records.errors import DatasetError, counted, fail
 from wingfit.records.limits import MAX_DESCRIPTION_BYTES
 from wingfit.service.films import views
 from wingfit.service.films.containers import is_video
@@ -191,7 +191,7 @@ class Films:
                 row = store.one(session, FilmRow, film_id)
                 count = session.scalar(select(func.count()).where(TrackingRow.film_id == film_id)) or 0
                 if count:
-                    raise conflict(f"{count} tracking(s) refer to film {film_id}; delete them first")
+                    raise store.in_use("film", film_id, counted(count, "tracking"), count)
                 session.delete(row)
                 session.flush()
                 self.files.set_aside(film_id)

@@ -23,6 +23,7 @@ from wingfit.service.http.list_routes import add_edit_route
 from wingfit.service.http.problems import ProblemError, conflict, error_item, invalid
 from wingfit.service.http.request_limits import UPLOAD_LIMIT
 from wingfit.service.runs import views
+from wingfit.service.runs.requests import Title
 from wingfit.service.storage import listing, store
 from wingfit.service.storage.database import Database
 from wingfit.service.storage.listing import Wanted
@@ -54,7 +55,7 @@ def upload(
     request: Request,
     service: ServiceDep,
     file: UploadFile,
-    name: Annotated[str | None, Form(min_length=1, max_length=200, description="instead of the dataset's own")] = None,
+    name: Annotated[Title | None, Form(description="instead of the dataset's own, which is numbered if in use")] = None,
     idempotency_key: http.RepeatKey = None,
 ) -> Response:
     """Upload a zip of a dataset folder, or a NetCDF file; stored byte for byte if it reads without error.

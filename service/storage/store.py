@@ -138,13 +138,19 @@ def make_room(session: Session, owner: str | None, size: int, most_mb: int) -> N
         )
 
 
+def in_use(what: str, row_id: str, by: str, count: int) -> ProblemError:
+    """Return the 409 for the deletion of ``what``, called ``row_id``, to which ``count`` jobs, ``by``, refer."""
+    verb, them = ("refers", "it") if count == 1 else ("refer", "them")
+    return conflict(f"{by} {verb} to {what} {row_id}; delete {them} first")
+
+
 def delete_dataset(session: Session, dataset_id: str) -> None:
     """Delete a dataset; raise a 409 while a run or diagnosis refers to it, a 404 if there is no such dataset."""
     row = one(session, DatasetRow, dataset_id)
-    for table, what in ((RunRow, "run(s)"), (DiagnosisRow, "diagnosis(es)")):
+    for table, one_job, several in ((RunRow, "run", "runs"), (DiagnosisRow, "diagnosis", "diagnoses")):
         count = session.scalar(select(func.count()).where(table.dataset_id == dataset_id)) or 0
         if count:
-            raise conflict(f"{count} {what} refer to dataset {dataset_id}; delete them first")
+            raise in_use("dataset", dataset_id, f"{count} {one_job if count == 1 else several}", count)
     session.delete(row)
 
 
@@ -218,9 +224,17 @@ def free_name(session: Session, row: JobRow, name: str) -> str:
     Compared are the jobs of its kind on the same dataset or film. The name is cut to the length that names may have.
     """
     table, (subject, subject_id) = type(row), row.subject
-    of_subject = getattr(table, f"{subject.__tablename__}_id") == subject_id
+    return _free(session, table, getattr(table, f"{subject.__tablename__}_id") == subject_id, name)
+
+
+def free_dataset_name(session: Session, owner: str | None, name: str) -> str:
+    """Return ``name``, or with the first number that makes it the only one among the datasets of ``owner``."""
+    return _free(session, DatasetRow, of_owner(DatasetRow, owner), name)
+
+
+def _free(session: Session, table: type[JobRow] | type[DatasetRow], among: ColumnElement[bool], name: str) -> str:
     stem = name[:LONGEST_STEM]
-    taken = set(session.scalars(select(table.name).where(of_subject, table.name.startswith(stem, autoescape=True))))
+    taken = set(session.scalars(select(table.name).where(among, table.name.startswith(stem, autoescape=True))))
     candidates = chain([name[:LONGEST_NAME]], (f"{stem}, {count}" for count in range(2, len(taken) + 3)))
     return next(one for one in candidates if one not in taken)
 

@@ -1,11 +1,11 @@
 // Entry point: side column, state of the server, and the page that the address after # names.
 
 import { askForKey, isRefused, setUpAccess } from "./parts/access.js";
-import { get, isFinal, postJson } from "./base/api.js";
+import { get, isFinal, poll as ask, postJson, setUpRefused, takeMissed } from "./base/api.js";
 import { redrawComparison, setUpCompare, showComparison } from "./pages/compare.js";
-import { redrawDataset, selectDataset, setUpDataset, simulate } from "./pages/dataset.js";
+import { redrawDataset, refreshDataset, selectDataset, setUpDataset, simulate } from "./pages/dataset.js";
 import { openDiagnoseForm, setUpDiagnoseForm } from "./diagnosing/form.js";
-import { redrawDiagnosis, selectDiagnosis, setUpDiagnosis } from "./pages/diagnosis.js";
+import { redrawDiagnosis, renameDiagnosis, selectDiagnosis, setUpDiagnosis } from "./pages/diagnosis.js";
 import { showEffects } from "./pages/effects.js";
 import { FILM_PAGES, redrawFilms, setUpFilms, showFilms } from "./films/page.js";
 import { $, plural, toast } from "./base/format.js";
@@ -17,7 +17,7 @@ import { refreshListing, setUpListing, showListing } from "./lists/table.js";
 import { setUpUpload } from "./lists/upload.js";
 import { drawActive } from "./parts/sidebar.js";
 import { stored } from "./parts/warnings.js";
-import { redraw, selectRun, setUpRun } from "./pages/run.js";
+import { redraw, renameRun, selectRun, setUpRun } from "./pages/run.js";
 import { openSubmit, randomKey, remove, setUpSubmit } from "./pages/submit.js";
 
 const POLL_MS = 2500;
@@ -28,6 +28,7 @@ const LISTINGS = ["runs", "diagnoses", "datasets"];
 const LISTS = ["effects", "import", "films", ...LISTINGS]; // pages that need no id
 const PAGES = ["run", "diagnosis", "dataset", "compare", "film", "tracking", ...LISTS];
 const SECTIONS = { run: "runs", compare: "runs", diagnosis: "diagnoses", dataset: "datasets", import: "datasets", film: "films", tracking: "films" }; // menu entry of each page
+const KINDS = { run: "runs", diagnosis: "diagnoses", dataset: "datasets", film: "films", tracking: "trackings" }; // pages of one thing
 const BROAD = ["compare", "import", ...FILM_PAGES, ...LISTINGS]; // without the lists of the sidebar
 
 let active = { runs: [], diagnoses: [], trackings: [] };
@@ -59,7 +60,9 @@ function drawLists() {
   if (atHome) drawHome(atHome, { ...starting, onDelete: async (dataset) => (await remove("datasets", dataset.id, dataset.name)) && poll() });
 }
 
+// What could not be fetched meanwhile is fetched when the server is back.
 function setAway(away) {
+  if (!away && takeMissed()) route();
   $("away").hidden = !away;
   $("away").textContent = away ? "The server does not answer. The page may be out of date; it continues when the server is back." : "";
 }
@@ -75,15 +78,15 @@ function showHealth(health) {
 async function poll() {
   clearTimeout(polling);
   try {
-    const [health, fresh] = await Promise.all([get("health"), isHome() ? newest() : atHome]);
+    const [health, fresh] = await Promise.all([ask("health"), isHome() ? newest() : atHome]);
     atHome = fresh;
-    active = Object.fromEntries(await Promise.all(Object.keys(active).map(async (kind) => [kind, health[`${kind}_active`] === 0 ? [] : (await get(`${kind}?active=true&limit=${MOST_ACTIVE}`)).items])));
+    active = Object.fromEntries(await Promise.all(Object.keys(active).map(async (kind) => [kind, health[`${kind}_active`] === 0 ? [] : (await ask(`${kind}?active=true&limit=${MOST_ACTIVE}`)).items])));
     setAway(false);
     showHealth(health);
     drawLists();
     await Promise.all([refreshListing(active), missed()]);
   } catch (error) {
-    if (isRefused(error)) askForKey();
+    if (isRefused(error)) setAway(false);
     else if (error.away) setAway(true);
     else toast(error.message);
   }
@@ -117,11 +120,18 @@ function nothing(why) {
   $("empty-title").textContent = why;
 }
 
-// The job or dataset shown may have been deleted by another user.
+// The job, dataset or film shown may have been renamed or deleted in another window, or by another user.
 async function missed() {
-  const page = Object.keys(SECTIONS).find((name) => LISTINGS.includes(SECTIONS[name]) && !["compare", "import"].includes(name) && current(name));
-  if (!page || active[SECTIONS[page]]?.some((one) => one.id === current(page))) return;
-  await get(`${SECTIONS[page]}/${encodeURIComponent(current(page))}`).catch((error) => error.status === 404 && $("empty").hidden && route());
+  const page = pageOf(parameters());
+  if (!KINDS[page]) return;
+  const id = current(page);
+  const known = active[KINDS[page]]?.find((one) => one.id === id);
+  try {
+    const now = known ?? await ask(`${KINDS[page]}/${encodeURIComponent(id)}`);
+    if (current(page) === id) ({ run: renameRun, diagnosis: renameDiagnosis, dataset: (one) => refreshDataset(one, active) })[page]?.(now);
+  } catch (error) {
+    if (error.status === 404 && $("empty").hidden && current(page) === id) route();
+  }
 }
 
 // Try again while the server does not answer; an unknown id is final.
@@ -214,18 +224,36 @@ function onUploaded(dataset, alone) {
   poll();
 }
 
-const built = buildLists().then(() => {
+async function build() {
+  try {
+    await buildLists();
+  } catch (error) {
+    toast(error.message);
+    await new Promise((resolve) => { setTimeout(resolve, AGAIN_MS); });
+    return build();
+  }
   setUpListing({ onRun: () => newRun() });
   setUpUpload({ onUploaded });
   $("home-run").addEventListener("click", () => newRun());
-}, (error) => toast(error.message));
-if (await setUpAccess()) {
+}
+
+setUpRefused(askForKey);
+const built = build();
+function onSignedIn() {
+  route();
+  poll();
+}
+
+if (await setUpAccess({ onSignedIn })) {
   await built;
   window.addEventListener("hashchange", () => {
+    // A question about one page is not to be answered on another.
+    for (const dialog of document.querySelectorAll("dialog[open]:not(#key-dialog)")) dialog.close();
     route();
     if (isHome()) poll();
   });
   document.addEventListener("visibilitychange", () => document.hidden || poll());
+  window.addEventListener("online", poll);
   route();
   poll();
 }

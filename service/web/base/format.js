@@ -66,6 +66,9 @@ export const size = (bytes) => (bytes >= 1e6 ? `${(bytes / 1e6).toFixed(1)} MB` 
 // Escaped text for charts: Plotly interprets markup.
 export const plain = (text) => String(text).replaceAll("&", "&amp;").replaceAll("<", "&lt;").replaceAll(">", "&gt;");
 
+// ``text`` that, if written from right to left, leaves what stands beside it in place.
+export const isolated = (text) => (/[\u0590-\u08ff\ufb1d-\ufefc]/.test(text) ? `\u2068${text}\u2069` : text);
+
 export const plural = (n, word) => `${n} ${word}${n === 1 ? "" : "s"}`;
 
 // A new element with properties and children; text children are text, never markup.
@@ -85,11 +88,14 @@ export const keyNumber = (label, value, unit = "", main = false) =>
 
 export const $ = (id) => document.getElementById(id);
 
+const TOAST_MS = 4000;
+const LETTER_MS = 60; // that reading takes
+
 let toastTimer = null;
 export function toast(text) {
   const node = $("toast");
   node.textContent = text;
   node.hidden = false;
   clearTimeout(toastTimer);
-  toastTimer = setTimeout(() => { node.hidden = true; }, 4000);
+  toastTimer = setTimeout(() => { node.hidden = true; }, Math.max(TOAST_MS, LETTER_MS * text.length));
 }

@@ -45,12 +45,14 @@ export async function draw(node, build) {
   const Plotly = await plotly();
   const look = theme();
   const { traces, ...own } = build(look);
-  return Plotly.react(node, traces, {
+  await Plotly.react(node, traces, {
     paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", font: look.font, margin: { l: 10, r: 8, t: 30, b: 10 },
     showlegend: false, legend: { orientation: "h", traceorder: "normal", x: 0, y: 1.02, yanchor: "bottom", font: { color: look.ink, size: 12 } },
     hoverlabel: { bgcolor: look.surface, bordercolor: look.line, font: { color: look.ink, size: 12 } },
     ...own,
   }, CONFIG);
+  // A chart that was drawn while its page was left has a width of its own.
+  if (node.clientWidth && Math.abs(node._fullLayout.width - node.clientWidth) > 1) await Plotly.Plots.resize(node);
 }
 
 // Draw curves [name, y] over the phase of the beat, or over something else with ``dots``.

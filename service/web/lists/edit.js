@@ -1,8 +1,10 @@
 // The name and the notes of a dataset, run or diagnosis: shown on its page, changed in a dialog.
 
-import { call, part } from "../base/api.js";
+import { ApiError, call, get, part } from "../base/api.js";
 import { showErrors } from "../base/form_errors.js";
 import { el } from "../base/format.js";
+
+const differ = (one, other) => one.name !== other.name || one.notes !== other.notes;
 
 // Let the user change ``item`` of ``kind`` ("runs", "diagnoses", "datasets"); a promise of the changed item, or of null.
 export function edit(kind, item) {
@@ -19,11 +21,17 @@ export function edit(kind, item) {
   document.body.append(dialog);
   dialog.showModal();
   let changed = null;
+  let before = item;
   form.addEventListener("submit", async (event) => {
     event.preventDefault();
     const field = (name) => form.elements.namedItem(name).value;
     const body = { name: field("name").trim(), notes: field("notes").trim() };
     try {
+      const now = await get(`${kind}/${part(item.id)}`);
+      if (differ(now, before) && differ(now, body)) {
+        before = now;
+        throw new ApiError(`Changed meanwhile, in another window or by another user: the name is “${now.name}”${now.notes ? `, the notes are “${now.notes}”` : ", without notes"}. Save again to replace this.`);
+      }
       changed = await call("PATCH", `${kind}/${part(item.id)}`, { body: JSON.stringify(body), headers: { "Content-Type": "application/json" } });
       dialog.close();
     } catch (error) {

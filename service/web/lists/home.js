@@ -1,6 +1,6 @@
 // The start page (#): three steps as long as there is no dataset; then the newest findings, runs and datasets.
 
-import { get, part } from "../base/api.js";
+import { part, poll } from "../base/api.js";
 import { $, DASH, el, plural, size, when } from "../base/format.js";
 import { contents, fitBadge, misfit } from "../base/labels.js";
 import { badge, keyed, replaced, runName } from "../parts/sidebar.js";
@@ -14,10 +14,10 @@ let names = new Map();
 // The newest items of all kinds.
 export async function newest() {
   const [diagnoses, runs, datasets] = await Promise.all(
-    [`diagnoses?state=SUCCEEDED&limit=${SHOWN}`, `runs?limit=${SHOWN}`, `datasets?limit=${SHOWN}`].map((path) => get(path).then((page) => page.items)));
+    [`diagnoses?state=SUCCEEDED&limit=${SHOWN}`, `runs?limit=${SHOWN}`, `datasets?limit=${SHOWN}`].map((path) => poll(path).then((page) => page.items)));
   for (const dataset of datasets) names.set(dataset.id, dataset.name);
   const unknown = [...new Set([...diagnoses, ...runs].map((job) => job.dataset_id))].filter((id) => !names.has(id));
-  await Promise.all(unknown.map((id) => get(`datasets/${part(id)}`).then((dataset) => names.set(id, dataset.name), () => names.set(id, id))));
+  await Promise.all(unknown.map((id) => poll(`datasets/${part(id)}`).then((dataset) => names.set(id, dataset.name), () => names.set(id, id))));
   return { diagnoses, runs, datasets };
 }
 

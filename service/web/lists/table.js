@@ -1,6 +1,6 @@
 // Tables of all runs, diagnoses and datasets (#runs, #diagnoses, #datasets): sorted, filtered and paged by the server.
 
-import { get, isFinal, part } from "../base/api.js";
+import { get, isFinal, part, poll } from "../base/api.js";
 import { $, el, plural, toast } from "../base/format.js";
 import { runName, stateWord } from "../parts/sidebar.js";
 import { COLUMNS } from "./columns.js";
@@ -191,7 +191,7 @@ export async function refreshListing(active) {
   const mine = kind;
   fixing = true;
   try {
-    for (const job of await Promise.all(gone.map((item) => get(`${mine}/${part(item.id)}`).catch(() => null)))) if (job) known.set(job.id, job);
+    for (const job of await Promise.all(gone.map((item) => poll(`${mine}/${part(item.id)}`).catch(() => null)))) if (job) known.set(job.id, job);
   } finally {
     fixing = false;
   }

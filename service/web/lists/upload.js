@@ -1,5 +1,6 @@
 // Datasets are uploaded: files that are dropped or chosen, and folders, which become zip archives here.
 
+import { get } from "../base/api.js";
 import { $, el, size, toast } from "../base/format.js";
 import { zip } from "../importing/zip.js";
 import { send } from "../pages/submit.js";
@@ -42,7 +43,14 @@ export function setUpUpload(given) {
     // The items are only there during the event.
     const dropped = [...event.dataTransfer.items].map((item) => ({ entry: item.webkitGetAsEntry?.(), file: item.getAsFile() }));
     add(await Promise.all(dropped.filter((one) => one.entry || one.file).map(async ({ entry, file }) => (entry?.isDirectory
-      ? { name: entry.name, files: await filesIn(entry) } : { name: file.name, file }))));
+      ? { name: entry.name, files: await filesIn(entry).catch(() => null) } : { name: file.name, file }))));
+  });
+  // A file dropped beside a box would be opened by the browser, in place of the page.
+  for (const name of ["dragover", "drop"]) window.addEventListener(name, (event) => {
+    if (event.defaultPrevented || !event.dataTransfer?.types.includes("Files")) return;
+    event.preventDefault();
+    event.dataTransfer.dropEffect = "none";
+    if (name === "drop") toast("Drop files into the box with the dashed line");
   });
   window.addEventListener("beforeunload", (event) => { if (sending) event.preventDefault(); });
 }
@@ -100,7 +108,8 @@ async function next() {
     if (one.file && OF_TRACKS.test(one.name)) throw new TracksError();
     const file = one.file ?? await archive(one);
     const dataset = await send(file, (fraction) => show(one, fraction < 1 ? `Uploading ${one.name}, ${size(file.size)}, ${Math.round(100 * fraction)} %` : `Checking ${one.name}`, fraction));
-    toast(stored("Uploaded", dataset));
+    const twin = await same(dataset);
+    toast(`${stored("Uploaded", dataset)}${twin ? `. The same file is stored already, as ${twin.name}` : ""}`);
     if (one.alone) one.item.remove();
     else one.item.replaceChildren(el("span", {}, `${one.name}: `, el("a", { href: `#dataset=${encodeURIComponent(dataset.id)}` }, stored("stored as", dataset))));
     hooks.onUploaded(dataset, one.alone);
@@ -110,8 +119,16 @@ async function next() {
   next();
 }
 
+// An earlier dataset of the same bytes, if it has kept its name.
+async function same({ id, name, sha256 }) {
+  const text = name.replace(/, \d+$/, "");
+  const found = await get(`datasets?limit=100&q=${encodeURIComponent(text)}`).catch(() => ({ items: [] }));
+  return found.items.find((one) => one.sha256 === sha256 && one.id !== id);
+}
+
 // A zip archive of a folder that has dataset.yaml, perhaps in a folder of its own.
 async function archive({ name, files }) {
+  if (!files) throw new Error("the folder cannot be read; check its permissions, or choose it again");
   const parts = ({ path }) => path.split("/").filter(Boolean);
   const [root] = files.filter((one) => parts(one).at(-1) === DESCRIPTION).map((one) => parts(one).slice(0, -1)).sort((a, b) => a.length - b.length);
   if (!root) throw new Error(`the folder has no ${DESCRIPTION}; choose the folder in which it lies, or import the files of a tracking system`);

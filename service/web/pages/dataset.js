@@ -1,6 +1,6 @@
 // The selected dataset: what was recorded, what the checks say, conditions, and its runs and diagnoses.
 
-import { fill, get, part, postJson } from "../base/api.js";
+import { fill, get, isFinal, part, postJson } from "../base/api.js";
 import { $, el, plural, size, toast, when } from "../base/format.js";
 import { isSeries, misfit } from "../base/labels.js";
 import { showChecks, showMarkerNoise } from "../dataset/checks.js";
@@ -11,7 +11,7 @@ import { showNotes } from "../lists/edit.js";
 import { showDrawing } from "../parts/drawing.js";
 import { setUpSimulation, showSimulation } from "../parts/driving.js";
 import { hideSeries, redrawSeries, setUpSeries, showSeries } from "../parts/series.js";
-import { badge, runName } from "../parts/sidebar.js";
+import { badge, replaced, runName } from "../parts/sidebar.js";
 import { forgetPlan, hidePlan, redrawPlan, revealPlan, showPlan } from "../planning/section.js";
 import { randomKey, remove } from "./submit.js";
 
@@ -20,6 +20,7 @@ const LISTED = 10;
 let ready = null;
 let dataset = null;
 let hooks = {};
+let worked = null; // ids and states of the unfinished jobs that are listed
 let simulating = null; // id of the dataset whose ways to simulate are to be shown
 
 export function setUpDataset(given) {
@@ -118,18 +119,30 @@ export function redrawDataset() {
   redrawPlan();
 }
 
+// Take over name and notes of ``now``, the dataset as it is on the server, and the jobs that began or ended.
+export async function refreshDataset(now, active) {
+  if (dataset?.id !== now.id) return;
+  if (dataset.name !== now.name || dataset.notes !== now.notes) {
+    dataset = { ...dataset, name: now.name, notes: now.notes };
+    drawHead();
+  }
+  const working = [...active.runs, ...active.diagnoses].filter((job) => job.dataset_id === now.id).map((job) => `${job.id} ${job.state}`).sort().join();
+  if (working !== worked) await listWork(now.id);
+}
+
 async function listWork(id) {
+  const unfinished = [];
   const show = async (kind, page, text) => {
     const list = $(`dataset-${kind}`);
-    list.replaceChildren();
     const found = await get(`${kind}?dataset_id=${part(id)}&limit=${LISTED}`);
     if (hooks.currentId() !== id) return;
+    unfinished.push(...found.items.filter((job) => !isFinal(job)).map((job) => `${job.id} ${job.state}`));
     const items = found.items.map((job) => el("li", {}, el("a", { href: `#${page}=${part(job.id)}` }, ...text(job))));
     if (found.next_cursor) items.push(el("li", {}, el("a", { href: `#${kind}&dataset_id=${part(id)}` }, "Show all")));
-    list.replaceChildren(...(items.length ? items : [el("li", { className: "quiet" }, "None yet.")]));
+    replaced(list, items.length ? items : [el("li", { className: "quiet" }, "None yet.")]);
   };
   await Promise.all([
     show("runs", "run", (run) => [runName(run), " ", badge(run), ` ${misfit(run).value} ${misfit(run).unit}`]),
     show("diagnoses", "diagnosis", (one) => [one.name, " ", badge(one), ` ${one.verdict ?? ""}`]),
-  ]).catch((error) => toast(error.message));
+  ]).then(() => { worked = unfinished.sort().join(); }, (error) => toast(error.message));
 }

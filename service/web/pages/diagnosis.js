@@ -27,6 +27,13 @@ export function setUpDiagnosis(given) {
   $("finding-link").addEventListener("click", () => copy(location.href));
 }
 
+// Take over name and notes of ``now``, the diagnosis as it is on the server.
+export function renameDiagnosis(now) {
+  if (diagnosis?.id !== now.id || (diagnosis.name === now.name && diagnosis.notes === now.notes)) return;
+  diagnosis = { ...diagnosis, name: now.name, notes: now.notes };
+  update();
+}
+
 export const redrawDiagnosis = () => redrawPartial();
 
 export async function selectDiagnosis(id) {

@@ -2,13 +2,13 @@
 
 import { call, follow, get, history, isFinal, part } from "../base/api.js";
 import { copy, curl, python } from "../base/copying.js";
-import { $, plural, toast, when } from "../base/format.js";
+import { $, isolated, plural, toast, when } from "../base/format.js";
 import { hideForces, redrawForces, setUpForces, showForces } from "./forces.js";
 import { showGeneCorrelations } from "../base/correlations.js";
 import { redrawCurves, setUpCurves, showCurves } from "../parts/curves.js";
 import { showWaiting } from "../parts/driving.js";
 import { aboutHistory, drawHistory } from "../parts/history.js";
-import { badge, runName, setBar, timeLeft } from "../parts/sidebar.js";
+import { badge, runName, setBar, stateWord, timeLeft } from "../parts/sidebar.js";
 import { showNotes } from "../lists/edit.js";
 import { redrawLoads } from "../parts/loads.js";
 import { cancel, remove } from "./submit.js";
@@ -75,6 +75,13 @@ export async function selectRun(id) {
   showSections();
   update();
   if (!isFinal(run)) listen();
+}
+
+// Take over name and notes of ``now``, the run as it is on the server.
+export function renameRun(now) {
+  if (run?.id !== now.id || (run.name === now.name && run.notes === now.notes)) return;
+  run = { ...run, name: now.name, notes: now.notes };
+  drawHead();
 }
 
 export function redraw() {
@@ -173,7 +180,7 @@ function drawHead() {
   $("run-fit").hidden = run.state !== "SUCCEEDED";
   $("run-fit").textContent = run.state === "SUCCEEDED" ? fitSentence(run) : "";
   placeHistory();
-  $("run-about").textContent = [dataset.name, ...setup(run), when(run.created_at)].join(" · ");
+  $("run-about").textContent = [isolated(dataset.name), ...setup(run), when(run.created_at)].join(" · ");
   showNotes($("run-name"), "runs", run, ({ name, notes }) => {
     run = { ...run, name, notes };
     drawHead();
@@ -231,6 +238,18 @@ async function act(action) {
     // The new state arrives as an event; this answer may be older than the last event.
     await call("POST", `runs/${part(run.id)}/${action}`);
   } catch (error) {
-    toast(error.message);
+    if (error.status === 409) await takeOver(action);
+    else toast(error.message);
   }
+}
+
+// The state of the run had changed before the action, and the page did not know it.
+async function takeOver(action) {
+  const { id } = run;
+  const now = await get(`runs/${part(id)}`).catch((error) => toast(error.message));
+  if (!now || run?.id !== id) return;
+  run = now;
+  hooks.onChange(run);
+  update();
+  toast(`Could not ${action}: meanwhile the run is ${stateWord(run.state)}`);
 }

@@ -1,6 +1,6 @@
 // The form that starts a run, and questions before a job is cancelled or something deleted; the server checks them, and its errors are shown at the fields.
 
-import { ApiError, call, get, part, postJson } from "../base/api.js";
+import { ApiError, call, get, part, postJson, refused } from "../base/api.js";
 import { confirmed } from "../base/confirm.js";
 import { effectFamilies, tick } from "../base/choices.js";
 import { copy, curl, python } from "../base/copying.js";
@@ -196,6 +196,7 @@ export function send(file, onFraction) {
     request.upload.onprogress = (event) => event.lengthComputable && onFraction(event.loaded / event.total);
     request.onload = () => {
       const answer = request.response ?? {};
+      refused(request.status);
       if (request.status < 300) resolve(answer);
       else reject(new ApiError(answer.detail || `${request.status} ${request.statusText}`, { status: request.status, errors: answer.errors ?? [] }));
     };
@@ -218,7 +219,7 @@ export async function remove(kind, id, name) {
     await call("DELETE", `${kind}/${part(id)}`);
     return true;
   } catch (error) {
-    toast(error.message);
-    return false;
+    toast(error.status === 404 ? `${name} was deleted already` : error.message);
+    return error.status === 404;
   }
 }

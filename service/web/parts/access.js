@@ -2,7 +2,7 @@
 
 import { call, get, postJson } from "../base/api.js";
 import { useKeyInCurl } from "../base/copying.js";
-import { $ } from "../base/format.js";
+import { $, toast } from "../base/format.js";
 import { showErrors } from "../base/form_errors.js";
 
 export const isRefused = (error) => error.status === 401;
@@ -12,19 +12,20 @@ export function askForKey() {
 }
 
 // Return whether the server accepts requests; if it requires a key, show the sign-in form, which reloads the page.
-export async function setUpAccess() {
+// ``onSignedIn``: the user of the page has entered a key again, after the first one expired or was revoked.
+export async function setUpAccess({ onSignedIn }) {
   const form = $("key-form");
   $("key-dialog").addEventListener("cancel", (event) => event.preventDefault()); // the page shows nothing without a key
-  $("sign-out").addEventListener("click", async () => {
-    await call("DELETE", "session");
-    location.reload();
-  });
+  $("sign-out").addEventListener("click", () => call("DELETE", "session").then(() => location.reload(), (error) => toast(error.message)));
   form.addEventListener("submit", async (event) => {
     event.preventDefault();
     showErrors(form, $("key-errors"), null);
     try {
-      await postJson("session", { key: form.key.value.trim() });
-      location.reload();
+      const { owner } = await postJson("session", { key: form.key.value.trim() });
+      if (!owner || owner !== $("owner").textContent) return location.reload();
+      form.key.value = "";
+      $("key-dialog").close(); // the same user goes on, with what is on the page
+      onSignedIn();
     } catch (error) {
       showErrors(form, $("key-errors"), error);
     }
@@ -38,7 +39,6 @@ export async function setUpAccess() {
     askForKey();
     return false;
   } catch (error) {
-    if (!error.away) throw error;
-    return true; // polling reports that the server does not answer
+    return true; // polling reports what is wrong
   }
 }

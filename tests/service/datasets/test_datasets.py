@@ -37,6 +37,17 @@ def test_an_archive_comes_back_byte_for_byte(api: Api) -> None:
     assert api.get(f"/v1/datasets/{dataset['id']}") == dataset
 
 
+def test_a_name_in_use_is_numbered_and_one_that_is_stated_stays(api: Api) -> None:
+    assert [api.upload(name="delfly")["name"] for _ in range(3)] == ["delfly", "delfly, 2", "delfly, 3"]
+    stated = [
+        api.client.post("/v1/datasets", files={"file": ("a.zip", toy.archive(name="delfly"))}, data={"name": name})
+        for name in ("delfly", "   ", "a\u0000b", "\u202eevil")
+    ]
+    assert [answer.status_code for answer in stated] == [201, 422, 422, 422]
+    assert stated[0].json()["name"] == "delfly"
+    assert api.upload(name="   ")["name"] == "toy", "a name that cannot be seen gives way to that of the file"
+
+
 def test_a_dataset_is_described_in_units_that_people_read(api: Api) -> None:
     dataset = api.upload()
     assert dataset["markers"] == 2

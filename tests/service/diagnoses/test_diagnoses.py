@@ -197,7 +197,7 @@ def test_cancel_and_delete(api: Api, gate: Gate) -> None:
         answer = api.client.get(f"{path}/{what}")
         assert (answer.status_code, answer.json()["state"]) == (409, "CANCELLED")
     assert api.client.post(f"{path}/cancel").status_code == 409
-    assert "1 diagnosis(es) refer" in api.client.delete(f"/v1/datasets/{dataset}").json()["detail"]
+    assert "1 diagnosis refers to dataset" in api.client.delete(f"/v1/datasets/{dataset}").json()["detail"]
     assert api.client.delete(path).status_code == 204
     assert api.client.get(path).status_code == 404
     assert api.client.delete(f"/v1/datasets/{dataset}").status_code == 204

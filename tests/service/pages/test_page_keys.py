@@ -6,12 +6,43 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tests.service.auth.test_keys import bearer
-from tests.service.conftest import made
+from tests.service.conftest import made, toy_service
 from tests.service.pages.browsing import Seen
 from tests.service.processes import ServerProcess
+from wingfit.service.auth import keys
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
+
+
+def test_a_key_that_is_revoked_is_asked_for_and_its_user_goes_on(browser: Browser, tmp_path: Path) -> None:
+    with toy_service(tmp_path / "data", require_keys=True) as (service, api):
+        with service.database.write() as session:
+            (first, secret), (_, second) = (keys.make(session, name, "ann", ("read", "write")) for name in ("a", "b"))
+            key_id = first.id
+        service.load_keys()
+        seen = Seen.watched(browser.new_context().new_page(), str(api.client.base_url).rstrip("/"))
+        page = seen.page
+        seen.open()
+        page.fill("#key-form [name=key]", secret)
+        page.keyboard.press("Enter")
+        seen.wait("document.getElementById('owner').textContent === 'ann'")
+        seen.show("import")
+        page.evaluate("document.body.dataset.same = 'yes'")
+        with service.database.write() as session:
+            keys.revoke(session, key_id)
+        service.load_keys()
+        assert seen.errors == []
+        seen.show("runs")
+        page.wait_for_selector("#key-dialog[open]")
+        assert page.is_hidden("#away"), "the server answers"
+        page.fill("#key-form [name=key]", second)
+        page.keyboard.press("Enter")
+        seen.wait("!document.getElementById('key-dialog').open")
+        seen.wait("document.getElementById('listing-note').textContent === 'No runs yet.'")
+        assert page.get_attribute("body", "data-same") == "yes", "what was on the page is still there"
+        assert all("401" in error for error in seen.errors)
+        page.context.close()
 
 
 def test_a_key_is_asked_for_once_kept_from_scripts_and_forgotten(browser: Browser, tmp_path: Path) -> None:
