@@ -20,10 +20,11 @@ from typing import IO, NamedTuple
 from starlette.concurrency import run_in_threadpool
 
 from wingfit.client import private_files
+from wingfit.service.films.child import VIDEOS
 from wingfit.service.http.problems import ProblemError
 from wingfit.service.storage.disk_space import FULL
 
-ROOT, VIDEOS = "films", "videos"
+ROOT = "films"
 PART, DELETED = ".part", "deleted-"
 PIECE = 2**20
 MIB = 2**20
@@ -34,11 +35,12 @@ SILENT_SECONDS = 60.0  # a client that sends nothing for so long is given up
 FILM, TRACKING = re.compile(r"fl_[0-9a-f]{16}"), re.compile(r"tk_[0-9a-f]{16}")
 UPLOADED = re.compile(r"[A-Za-z0-9_-]{1,40}\.[0-9a-f]{8}")
 
+CAMERAS = "cameras.yaml"
 TRACKS, COVARIANCE, REPORT, RESULT = "tracks.csv", "covariance.npz", "report.html", "result.json"
 
 
 class TrackingFiles(NamedTuple):
-    """Files of one tracking that has succeeded: tracks (CSV), covariances (NumPy), and the cameras of its film."""
+    """Files of one tracking that has succeeded: tracks (CSV), covariances (NumPy), and their cameras."""
 
     tracks: Path
     covariance: Path

@@ -15,6 +15,7 @@ from sqlalchemy.orm.attributes import flag_modified
 from wingfit.cameras.files.camera_set import CameraSet
 from wingfit.cameras.files.project import read_project
 from wingfit.cameras.files.read import recognise
+from wingfit.cameras.video.source import same_film
 from wingfit.client.films import answers as a
 from wingfit.records.errors import DatasetError, fail
 from wingfit.records.limits import MAX_DESCRIPTION_BYTES
@@ -119,11 +120,19 @@ class Films:
                 raise fail(
                     name, None, "is no video in a known container; upload AVI, MP4, MOV, MKV, WebM, MTS, WMV or MPEG"
                 )
+            self._check_own(row, name, path)
             return self.videos.facts(path, _camera_of(row, name)["stated_rate_hz"])
         except DatasetError as error:
             raise refused(f"the file {name} cannot be used", error, f"files.{name}") from None
         except VideoTimeoutError as error:
             raise invalid(str(error), [error_item(f"files.{name}", None, str(error))]) from None
+
+    def _check_own(self, row: FilmRow, name: str, path: Path) -> None:
+        """Raise DatasetError if the video ``path`` of camera ``name`` is that of another camera too."""
+        for other, file in views.uploaded(row).items():
+            video = self.files.video(row.id, file)
+            if other not in (name, CALIBRATION) and video.is_file() and same_film(video, path):
+                raise fail(name, None, f"is the video of camera {other!r} too; upload the one that this camera filmed")
 
     def _check_sizes(self, row: FilmRow, name: str, path: Path, facts: Mapping[str, Any]) -> None:
         """Raise a 422 if the images of a video have another size than its camera was calibrated with."""
