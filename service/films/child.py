@@ -46,7 +46,7 @@ def listed(error: DatasetError) -> list[list[str | None]]:
 
 def _place(where: str | None) -> str:
     path = Path(where or "")
-    return f"video of camera {path.stem}" if path.parent.name == VIDEOS else str(where)
+    return f"video of camera {path.name.split('.')[0]}" if path.parent.name == VIDEOS else str(where)
 
 
 def error_of(faults: Sequence[Sequence[object]]) -> DatasetError:

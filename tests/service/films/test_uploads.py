@@ -8,6 +8,7 @@ import shutil
 import socket
 import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,7 @@ import pytest
 
 from tests.cameras.films import SIZE, cameras
 from tests.service.conftest import Api, toy_service
-from tests.service.films.films import CAMERAS, FRAMES, RATE, new_film, put, write_video
+from tests.service.films.films import CAMERAS, FRAMES, RATE, new_film, put, uploaded, write_video
 from tests.service.shapes import valid
 from wingfit.cameras.files.camera_set import CameraSet
 from wingfit.cameras.files.project import write_cameras
@@ -211,6 +212,16 @@ def test_a_replaced_file_is_removed_with_what_was_detected(served: Api, data: Pa
     second = served.client.get(f"/v1/films/{film}/frames/left/3")
     assert first.headers["etag"] != second.headers["etag"]
     assert first.content != second.content
+
+
+def test_uploads_of_one_file_at_once_leave_one(served: Api, data: Path, folder: Path) -> None:
+    film, video = uploaded(served, folder)["id"], (folder / "left.avi").read_bytes()
+    with ThreadPoolExecutor(4) as pool:
+        answers = list(pool.map(lambda _: put(served.client, film, "left", video), range(6)))
+    assert {answer.status_code for answer in answers} == {200}, [answer.text for answer in answers]
+    assert served.get(f"/v1/films/{film}")["ready"]
+    assert sorted(path.name.split(".")[0] for path in stored(data, film)) == ["cameras", "left", "right"]
+    assert served.client.get(f"/v1/films/{film}/frames/left/3").status_code == 200
 
 
 @pytest.fixture
