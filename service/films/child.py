@@ -19,7 +19,15 @@ NICENESS = 5
 VIDEOS = "videos"  # name of the folder with the videos of a film
 LENGTHS = struct.Struct("!II")  # of the JSON and of the bytes of an answer about a video
 FAULTS = 3  # exit status: the input has faults, which standard output lists
-OF_LIBRARIES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_CACHE_DIR")
+OF_LIBRARIES = (
+    "OMP_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "NUMBA_CACHE_DIR",
+    # These decide how sums are rounded, and tracks are those of 'wingfit track' bit for bit.
+    "OPENBLAS_CORETYPE",
+    "OPENBLAS_L2_SIZE",
+)
 
 
 def command(module: str, *arguments: str) -> list[str]:
