@@ -15,7 +15,7 @@ from wingfit.cameras.track.film_detections import Light, MarkerKind
 from wingfit.cameras.track.labels import Label, read_labels
 from wingfit.cameras.track.procedure import Request
 from wingfit.cameras.track.reference import LEAST_MARKERS
-from wingfit.cameras.video.source import Film
+from wingfit.cameras.video.source import Film, same_film
 from wingfit.records.array_types import Array
 from wingfit.records.description.wing_description import read_wing
 from wingfit.records.description.yaml_text import Document, read_yaml
@@ -26,6 +26,7 @@ from wingfit.records.limits import MAX_DESCRIPTION_BYTES, MIB
 FORMAT, VERSION = "wingfit film", 1
 MOST_CAMERAS = 8
 MOST_WITHIN_MS = 1000.0
+LEAST_APART_M = 1e-5  # two markers
 _KEYS = ("format", "version", "cameras", "films", "markers", "light")
 _OPTIONAL = ("clocks_within_ms", "first_frame", "last_frame", "labels")
 
@@ -92,10 +93,13 @@ class _Reader:
             mapping_at(self.document, ("films", name), ("path",), ("rate_hz",))
             rate = self._number(("films", name, "rate_hz"), 1e-3, 1e6, 0.0)
             film = Film(self._file(("films", name, "path")), rate or None)
-            same = next((other for other, one in found.items() if one.path.resolve() == film.path.resolve()), None)
+            same = next((other for other, one in found.items() if same_film(one.path, film.path)), None)
             if same is not None:
                 where = self.document.where(("films", name, "path"))
-                raise fail(where, str(film.path), f"is the film of camera {same!r} too; each camera has its own film")
+                message = (
+                    f"camera {name!r} has the film of camera {same!r}, or a copy of it; each has a film of its own"
+                )
+                raise fail(where, name, message)
             found[name] = film
         return found
 
@@ -121,6 +125,11 @@ class _Reader:
         twice = [name for name in names if names.count(name) > 1 or not name]
         if twice:
             raise fail(where, twice[0], f"two markers have the name {twice[0]!r}; give each a name of its own")
+        apart = np.linalg.norm(places[:, None] - places[None], axis=2) + np.diag(np.full(len(places), np.inf))
+        if not apart.min() > LEAST_APART_M:
+            one, two = sorted(np.unravel_index(int(np.argmin(apart)), apart.shape))
+            message = f"the markers {names[one]!r} and {names[two]!r} have one place; give each its own, in metres"
+            raise fail(where, names[two], message)
         size = float(np.linalg.norm(np.ptp(places, axis=0)))
         if not 1e-3 < size < 20:
             raise fail(where, f"{size:g}", f"the markers extend over {size:g} m; give their places in metres")
@@ -137,7 +146,11 @@ class _Reader:
         if not isinstance(value, str) or not value:
             raise fail(self.document.where(path), value, f"{shown(value)} is no path; state that of a file or folder")
         found = self.folder / value
-        if not found.exists():
+        try:
+            there = found.exists()
+        except OSError as error:  # a name that is too long
+            raise fail(self.document.where(path), value, f"cannot be read: {error.strerror}; check the path") from None
+        if not there:
             raise fail(
                 self.document.where(path), value, f"there is no {found}; paths count from the folder of film.yaml"
             )

@@ -6,14 +6,14 @@ import tomllib
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from wingfit.cameras.camera import Camera
-from wingfit.cameras.files.camera_set import CameraSet, check_cameras
+from wingfit.cameras.files.camera_set import CameraSet, check_cameras, rotation_of
 from wingfit.cameras.files.opencv import checked_matrix, lens_of
 from wingfit.records.array_types import Array
 from wingfit.records.errors import decode, fail, shown
 
+MOST = 1e300  # of a number
 KEYS = ("name", "size", "matrix", "distortions", "rotation", "translation")
 
 
@@ -24,7 +24,7 @@ def read_anipose(raw: bytes, file: str, metres: float | None) -> CameraSet:
     """
     try:
         data = tomllib.loads(decode(raw, file))
-    except tomllib.TOMLDecodeError as error:
+    except (tomllib.TOMLDecodeError, RecursionError, ValueError) as error:
         raise fail(file, None, f"not valid TOML: {error}; write the file again") from None
     tables = {key: value for key, value in data.items() if key != "metadata"}
     if not tables:
@@ -54,12 +54,15 @@ def _camera(table: Any, where: str, metres: float) -> Camera:
         raise fail(f"{where}.size", size[0], "sizes are whole numbers of pixels: width, height")
     matrix = np.stack([_numbers(row, f"{where}.matrix", 3) for row in _list(table["matrix"], f"{where}.matrix", 3)])
     coefficients = _numbers(table["distortions"], f"{where}.distortions", None)
-    rotation = Rotation.from_rotvec(_numbers(table["rotation"], f"{where}.rotation", 3)).as_matrix()
+    rotation = rotation_of(_numbers(table["rotation"], f"{where}.rotation", 3), f"{where}.rotation")
+    fisheye = table.get("fisheye", False)
+    if not isinstance(fisheye, bool):
+        raise fail(f"{where}.fisheye", fisheye, f"{shown(fisheye)} is neither true nor false; state one of them")
     return Camera(
         table["name"],
         (int(size[0]), int(size[1])),
         checked_matrix(matrix, f"{where}.matrix"),
-        lens_of(coefficients, f"{where}.distortions", table.get("fisheye") is True),
+        lens_of(coefficients, f"{where}.distortions", fisheye),
         rotation,
         _numbers(table["translation"], f"{where}.translation", 3) * metres,
     )
@@ -74,7 +77,7 @@ def _list(data: Any, where: str, count: int | None) -> list[Any]:
 def _numbers(data: Any, where: str, count: int | None) -> Array:
     values = _list(data, where, count)
     if not all(
-        isinstance(value, int | float) and not isinstance(value, bool) and np.isfinite(value) for value in values
+        isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < MOST for value in values
     ):
         raise fail(where, data, "not all of these are finite numbers; write the file again")
     return np.array(values, dtype=float)

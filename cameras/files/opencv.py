@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from wingfit.cameras.camera import COEFFICIENTS, Camera, Lens, LensModel
-from wingfit.cameras.files.camera_set import ROUNDING, CameraSet, check_cameras
+from wingfit.cameras.files.camera_set import LARGEST_PX, ROUNDING, CameraSet, check_cameras
 from wingfit.cameras.opencv import opencv
 from wingfit.records.array_types import Array
 from wingfit.records.errors import check_most, fail
 from wingfit.records.limits import MIB
 
 MOST_BYTES = 16 * MIB
+MOST_NESTED = 32  # of the maps, lists and elements of a file
 MOST_SKEW = 1e-9  # of the focal length
+_NESTING = re.compile(rb"[\[{]|[\]}]|<[A-Za-z_][^>]*(?<!/)>|</")
 # Numbers of coefficients that OpenCV writes, and the model of this package that has the first of them.
 MODELS: dict[int, LensModel] = {0: "pinhole", 4: "brown", 5: "brown", 8: "rational", 12: "rational", 14: "rational"}
 
@@ -91,6 +95,9 @@ def checked_matrix(matrix: Array, where: str) -> Array:
 def _stored(raw: bytes, file: str) -> Any:
     cv2 = opencv()
     check_most(file, "is", len(raw) / MIB, MOST_BYTES / MIB, "MiB", "give the file of a calibration")
+    if _nested(raw) > MOST_NESTED:
+        message = f"nested deeper than {MOST_NESTED} levels; give the file of a calibration that OpenCV wrote"
+        raise fail(file, None, message)
     try:
         stored = cv2.FileStorage(raw.decode("utf-8"), cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY)
     except (cv2.error, UnicodeDecodeError, SystemError) as error:
@@ -101,12 +108,26 @@ def _stored(raw: bytes, file: str) -> Any:
     return stored
 
 
+def _nested(raw: bytes) -> int:
+    """Return how deep the contents of a file are nested: OpenCV reads them recursively, and ends the process."""
+    level = deepest = 0
+    for part in _NESTING.finditer(raw):
+        closes = part[0] in (b"]", b"}", b"</")
+        level = max(level - 1, 0) if closes else level + 1
+        deepest = max(deepest, level)
+    return max(deepest, *((len(line) - len(line.lstrip(b" "))) // 2 for line in raw.splitlines() or [b""]), 0)
+
+
 def _matrix(stored: Any, name: str) -> Array | None:
     node = stored.getNode(name)
     if node.empty() or not node.isMap():
         return None
-    found = node.mat()
-    return None if found is None else np.asarray(found, dtype=float)
+    try:
+        found = node.mat()
+    except opencv().error:
+        message = f"{name} is no matrix: its rows, cols, dt and data do not belong together; write the file again"
+        raise fail(name, None, message) from None
+    return None if found is None or np.ndim(found) != 2 else np.asarray(found, dtype=float)
 
 
 def _needed(stored: Any, name: str, file: str) -> Array:
@@ -131,9 +152,17 @@ def _stereo_pose(stored: Any, file: str) -> tuple[Array, Array]:
     return rotation, translation
 
 
+def _pixels(nodes: Sequence[Any], file: str) -> tuple[int, int]:
+    width, height = (node.real() if node.isReal() or node.isInt() else float("nan") for node in nodes)
+    if not (1 <= width <= LARGEST_PX and 1 <= height <= LARGEST_PX and width % 1 == height % 1 == 0):
+        message = f"image_width or image_height is no whole number from 1 to {LARGEST_PX}; write the file again"
+        raise fail(file, f"{width:g} x {height:g}", message)
+    return int(width), int(height)
+
+
 def _size(stored: Any, file: str, stated: tuple[int, int] | None) -> tuple[int, int]:
     nodes = [stored.getNode(name) for name in ("image_width", "image_height")]
-    read = None if any(node.empty() for node in nodes) else (int(nodes[0].real()), int(nodes[1].real()))
+    read = None if any(node.empty() for node in nodes) else _pixels(nodes, file)
     if read is None and stated is None:
         raise fail(file, None, "the size of the images is not in the file; state width and height (px)")
     if read is not None and stated is not None and read != stated:

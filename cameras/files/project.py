@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from wingfit.cameras.camera import COEFFICIENTS, Camera, Lens
-from wingfit.cameras.files.camera_set import CameraSet, check_cameras
+from wingfit.cameras.files.camera_set import CameraSet, check_cameras, rotation_of
 from wingfit.cameras.files.keys import mapping_at, value_at
 from wingfit.records.array_types import Array
 from wingfit.records.description.yaml_text import Document, read_yaml, write_yaml
@@ -95,7 +95,7 @@ def _camera(document: Document, path: tuple[str | int, ...]) -> Camera:
         raise fail(document.where((*path, "size_px")), size[0], "sizes are whole numbers of pixels: width, height")
     matrix = np.array([[focal[0], 0, centre[0]], [0, focal[1], centre[1]], [0, 0, 1.0]])
     lens = _lens(document, (*path, "lens"))
-    turned = Rotation.from_rotvec(rotation).as_matrix()
+    turned = rotation_of(rotation, document.where((*path, "rotation_rad")))
     row_us = _number(document, (*path, "row_us"))
     return Camera(name, (int(size[0]), int(size[1])), matrix, lens, turned, translation, row_us / 1e6)
 

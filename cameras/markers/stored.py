@@ -19,7 +19,7 @@ from wingfit.cameras.computed import Computed
 from wingfit.cameras.markers.detections import FIELDS, Detections, joined
 from wingfit.cameras.video.strobe import FlashMark
 from wingfit.records.array_types import Array
-from wingfit.records.errors import fail
+from wingfit.records.errors import DatasetError, fail
 
 BLOCK = 50  # instants
 _COMPLETE = "complete"
@@ -38,7 +38,10 @@ class DetectionStore:
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
-        folder.mkdir(parents=True, exist_ok=True)
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise self._unwritable(error) from error
         self._counts: list[int] = []  # instants of each block
         self._marks: list[Array] = []
         self._fresh: list[tuple[FlashMark, Detections]] = []
@@ -125,8 +128,11 @@ class DetectionStore:
                 write(to)
             part.replace(file)
         except OSError as error:
-            remedy = "free the disk, or choose another folder for what is detected (--store, TMPDIR)"
-            raise fail(str(self._folder), None, f"cannot be written ({error.strerror or error}): {remedy}") from error
+            raise self._unwritable(error) from error
+
+    def _unwritable(self, error: OSError) -> DatasetError:
+        remedy = "free the disk, or choose another folder for what is detected (--store, TMPDIR)"
+        return fail(str(self._folder), None, f"cannot be written ({error.strerror or error}): {remedy}")
 
     def _block(self, number: int) -> list[Detections]:
         """Return the detections of the instants of one block."""

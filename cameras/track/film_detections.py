@@ -23,7 +23,7 @@ from wingfit.records.errors import fail
 MarkerKind = Literal["chequer", "dot"]
 Light = Literal["strobe", "continuous"]
 Progress = Callable[[int, int], object]
-_VERSION = 4
+_VERSION = 5
 _COUNT_OFF = 3  # frames by which the count of a container may be wrong
 _LEAST_NOISE = 1.0  # grey levels: quantisation, and compression that removes noise
 

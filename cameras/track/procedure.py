@@ -43,7 +43,9 @@ TOLERANCE_PX = 0.3
 MOST_PLACES = 20_000_000  # instants times markers
 Names = tuple[str, ...]
 Places = Float[Array, "K 3"]
+_ROUNDED = 0.01  # of a frame, in the stated time of a row and the rate
 _JUMP = 0.05  # of the distance between neighbouring markers
+_LENGTH_OFF = 0.01  # of the longest film
 _SHOWN = 12  # instants of which the points are counted for a message
 _UNLIKELY = 15.1  # chi-square with one degree of freedom, 99.99 %
 
@@ -176,7 +178,9 @@ def _identified(
 
 
 def _check(request: Request, films: Sequence[Frames]) -> None:
-    """Raise DatasetError for labels that the films cannot have, and for a layout that takes labels but has none."""
+    """Raise DatasetError for films or labels that do not fit, and for a layout that takes labels but has none."""
+    for camera, film in zip(request.cameras, films, strict=True):
+        _check_film(camera, film, request.first)
     check_labels(request.labels, request.cameras, request.names)
     check_frames(request.labels, request.cameras, films, (request.first, request.last))
     alike = looks_alike(request.reference) if request.reference is not None and not request.labels else None
@@ -188,6 +192,28 @@ def _check(request: Request, films: Sequence[Frames]) -> None:
             f"the layout looks the same after a turn that takes {one!r} to the place of {two!r}: distances cannot tell "
             f"the markers apart. Label {LEAST_LABELLED} or more in one frame of each camera (labels: labels.csv)",
         )
+
+
+def _check_film(camera: Camera, film: Frames, first: int) -> None:
+    where = f"camera {camera.name}"
+    if film.size_px != camera.size_px:
+        filmed, stated = (" x ".join(map(str, size)) for size in (film.size_px, camera.size_px))
+        message = (
+            f"films {filmed} px and was calibrated at {stated} px: give the film in the size of the calibration, or "
+            "calibrate with images of this size"
+        )
+        raise fail(where, filmed, message)
+    readout = camera.row_s * film.size_px[1]
+    if readout * film.rate_hz > 1 + _ROUNDED:
+        message = (
+            f"row_us {camera.row_s * 1e6:g} in the file of cameras makes {readout * 1e3:.4g} ms for "
+            f"{film.size_px[1]} rows, more than a frame lasts: {1e3 / film.rate_hz:.4g} ms at {film.rate_hz:g} frames "
+            "per second; correct row_us (microseconds), or rate_hz"
+        )
+        raise fail(where, f"{camera.row_s * 1e6:g}", message)
+    if 0 < film.count <= first:
+        message = f"the film has {film.count} frames, counted from 0; begin before its end"
+        raise fail(f"first_frame, {where}", first, message)
 
 
 def _result(
@@ -271,8 +297,8 @@ def _label_remarks(
 
 
 def _remarks(request: Request, films: Sequence[Frames], found: Sequence[FilmDetections]) -> list[str]:
-    """Return remarks about frames that could not be decoded."""
-    remarks = []
+    """Return remarks about frames that could not be decoded, and about films that do not last equally long."""
+    remarks = _lengths(request, films)
     for camera, film, of in zip(request.cameras, films, found, strict=True):
         if of.bad_frames:
             listed = f"{', '.join(map(str, of.bad_frames[:5]))}{', ...' if len(of.bad_frames) > 5 else ''}"
@@ -284,3 +310,12 @@ def _remarks(request: Request, films: Sequence[Frames], found: Sequence[FilmDete
                 "file is damaged or cut off; copy it again"
             )
     return remarks
+
+
+def _lengths(request: Request, films: Sequence[Frames]) -> list[str]:
+    seconds = [film.count / film.rate_hz for film in films]
+    differ = max(seconds) - min(seconds) > max(_LENGTH_OFF * max(seconds), *(4 / film.rate_hz for film in films))
+    if request.light == "strobe" or request.last is not None or not min(seconds) or not differ:
+        return []
+    each = ", ".join(f"{camera.name} {last:.4g} s" for camera, last in zip(request.cameras, seconds, strict=True))
+    return [f"the films do not last equally long: {each}; what all cameras filmed is tracked. Check the frame rates"]

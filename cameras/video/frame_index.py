@@ -1,8 +1,8 @@
 """Where in a video a frame is: times of all frames, from the packets of the container, which are not decoded.
 
 What a container calls frame 5000 is a time, and often not the 5000th frame that is decoded: frames are dropped or
-doubled, and the rate may vary. Here frames are counted, and a place that was sought is known by its time. A packet that
-is damaged in the middle of a video is not noticed: frames behind it are then reached that counting would not reach.
+doubled, and the rate may vary. Here frames are counted, and a place that was sought is known by its time. So are the
+frames behind a damaged packet.
 """
 
 from __future__ import annotations

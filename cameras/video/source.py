@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import filecmp
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -22,6 +23,7 @@ MOST_PIXELS = 64_000_000
 NEAR = 100
 """Frames that are decoded and passed over, rather than sought."""
 _FASTEST_HZ = 1_000_000.0
+_GAP = 1.5  # frames between the times of two that were decoded one after the other: one between them is damaged
 
 
 @dataclass(frozen=True)
@@ -50,6 +52,24 @@ class Film:
                 str(self.path), None, "is no file or folder; state the path of a video, or of a folder of images"
             )
         return _VideoFrames(self.path, self.rate_hz)
+
+
+def same_film(one: Path, other: Path) -> bool:
+    """Return whether two videos or folders of images are one, or copies of one."""
+    pairs = [(one, other)]
+    if one.resolve() == other.resolve():
+        return True
+    if one.is_dir() and other.is_dir():
+        first, second = images_in(one), images_in(other)
+        if len(first) != len(second):
+            return False
+        pairs = list(zip(first, second, strict=True))
+    elif one.is_dir() or other.is_dir():
+        return False
+    try:
+        return bool(pairs) and all(filecmp.cmp(*pair, shallow=False) for pair in pairs)
+    except OSError:  # what reads the films says so
+        return False
 
 
 class Frames:
@@ -88,14 +108,12 @@ class Frames:
 class _ImageFrames(Frames):
     def __init__(self, folder: Path, rate_hz: float | None) -> None:
         self.path = folder
-        # Names that start with a dot are hidden files, which macOS writes beside images on other systems' disks.
-        images = (one for one in folder.iterdir() if one.suffix.lower() in IMAGES and not one.name.startswith("."))
-        self.files = sorted(images, key=_by_number)
+        self.files = images_in(folder)
         if not self.files:
             raise fail(str(folder), None, f"holds no images; a frame is a file ending in {', '.join(IMAGES)}")
         if rate_hz is None:
             raise fail(str(folder), None, "images have no frame rate; state rate_hz, in frames per second")
-        first = _grey(opencv().imread(str(self.files[0]), opencv().IMREAD_UNCHANGED))
+        first = _image(self.files[0])
         if first is None:
             raise fail(str(self.files[0]), None, "cannot be read as an image; save it as PNG")
         self.size_px = (first.shape[1], first.shape[0])
@@ -103,9 +121,8 @@ class _ImageFrames(Frames):
         self._check()
 
     def read(self, first: int = 0) -> Iterator[tuple[int, Array | None]]:
-        cv2 = opencv()
         for number, file in enumerate(self.files[first:], first):
-            image = _grey(cv2.imread(str(file), cv2.IMREAD_UNCHANGED))
+            image = _image(file)
             fits = image is not None and image.shape == self.size_px[::-1]
             yield number, image if fits else None
 
@@ -118,17 +135,24 @@ class _VideoFrames(Frames):
         self.size_px = (int(video.get(cv2.CAP_PROP_FRAME_WIDTH)), int(video.get(cv2.CAP_PROP_FRAME_HEIGHT)))
         stated = float(video.get(cv2.CAP_PROP_FPS))
         self.count = max(int(video.get(cv2.CAP_PROP_FRAME_COUNT)), 0)
+        self._check()
         readable, _ = video.read()
         video.release()
         if not readable:
             raise fail(str(file), None, "holds no frame that can be decoded; convert it, for example to MP4 with H.264")
+        self._stated_hz = stated
         self.rate_hz = rate_hz if rate_hz is not None else stated
         if not 0 < self.rate_hz < _FASTEST_HZ:
             raise fail(str(file), stated, "states no frame rate; state rate_hz, in frames per second")
-        self._check()
 
     def _open(self) -> Any:
-        video = opencv().VideoCapture(str(self.path))
+        try:
+            # OpenCV ends the process if it is given bytes that are no text.
+            named = str(self.path).encode().decode()
+        except UnicodeEncodeError:
+            message = "its name is not in UTF-8, which OpenCV does not open; rename the file"
+            raise fail(ascii(str(self.path)), None, message) from None
+        video = opencv().VideoCapture(named)
         if not video.isOpened():
             endings = ", ".join(VIDEOS)
             raise fail(
@@ -139,14 +163,32 @@ class _VideoFrames(Frames):
     def read(self, first: int = 0) -> Iterator[tuple[int, Array | None]]:
         video, number = self._at(first)
         try:
-            while video.grab():
-                if number >= first:
+            while (at := self._grabbed(video, number)) is not None:
+                yield from ((lost, None) for lost in range(max(number, first), at))
+                if at >= first:
                     readable, image = video.retrieve()
-                    yield number, _grey(image) if readable else None
-                number += 1
+                    yield at, _grey(image) if readable else None
+                number = at + 1
             self.ended = number
         finally:
             video.release()
+
+    def _grabbed(self, video: Any, number: int) -> int | None:
+        """Decode the next frame of ``video``, ``number`` if none is damaged; return its number, None at the end.
+
+        A damaged packet ends what OpenCV decodes, or is passed over; the index then tells which frame is next.
+        """
+        cv2 = opencv()
+        step = 1e3 / self._stated_hz if self._stated_hz > 0 else np.inf
+        before = video.get(cv2.CAP_PROP_POS_MSEC)
+        if video.grab():
+            if video.get(cv2.CAP_PROP_POS_MSEC) - before < _GAP * step or number == 0 or self._index is None:
+                return number
+        elif self._index is None or not any(video.grab() for _ in range(number + 1, len(self._index.times))):
+            return None
+        index = self._index
+        found = None if index is None else index.number(video.get(cv2.CAP_PROP_POS_MSEC))
+        return number if found is None else max(found, number)
 
     @cached_property
     def _index(self) -> FrameIndex | None:
@@ -162,6 +204,24 @@ class _VideoFrames(Frames):
             video.release()
         # Earlier frames are decoded and passed over.
         return self._open(), 0
+
+
+def images_in(folder: Path) -> list[Path]:
+    """Return the images in ``folder``, in the order of the numbers in their names."""
+    # Names that start with a dot are hidden files, which macOS writes beside images on other systems' disks.
+    images = (one for one in folder.iterdir() if one.suffix.lower() in IMAGES and not one.name.startswith("."))
+    return sorted(images, key=_by_number)
+
+
+def _image(file: Path) -> Array | None:
+    """Return the grey image in ``file``; None if it cannot be read."""
+    cv2 = opencv()
+    try:
+        # Not cv2.imread, which ends the process if the name is not in UTF-8.
+        data = np.frombuffer(file.read_bytes(), np.uint8)
+        return _grey(cv2.imdecode(data, cv2.IMREAD_UNCHANGED)) if len(data) else None
+    except (OSError, cv2.error):
+        return None
 
 
 def _grey(image: Array | None) -> Array | None:

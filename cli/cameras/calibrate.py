@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -157,6 +158,8 @@ def convert(
 
     Example: wingfit cameras convert calibration.toml --unit mm -o cameras.yaml
     """
+    import numpy as np
+
     from wingfit.cameras.files.project import write_cameras
     from wingfit.cameras.files.read import read_cameras
     from wingfit.records.errors import DatasetError
@@ -169,6 +172,8 @@ def convert(
         raise _refused(error) from error
     for camera in found.cameras:
         print(f"  camera {camera.name}: {camera.size_px[0]} x {camera.size_px[1]} px, lens {camera.lens.model}")
+    for one, other in combinations(found.cameras, 2):
+        print(f"  {one.name} and {other.name} are {np.linalg.norm(one.centre - other.centre):.3f} m apart")
     for remark in found.notes:
         note(f"remark: {remark}")
     note(f"cameras written to {output}")
@@ -176,6 +181,8 @@ def convert(
 
 
 def _show(found: Calibration) -> None:
+    from wingfit.records.errors import counted
+
     print(f"RMS distance {found.rms_px:.3f} px over {len(found.images)} views; world: {found.world}")
     for camera, errors, coverage in zip(found.cameras, found.errors, found.coverage, strict=True):
         print(f"  camera {camera.name}: {errors.rms_px:.3f} px, {100 * coverage.fraction:.0f} % of the image seen")
@@ -185,7 +192,8 @@ def _show(found: Calibration) -> None:
             f"{found.wand.held_out_rms_percent:.3f} % in frames that were not used"
         )
     for rejection in found.rejected:
-        note(f"rejected: {rejection}")
+        points = "all points" if rejection.points is None else counted(rejection.points, "point")
+        note(f"rejected: camera {rejection.camera}, image {rejection.image}, {points}: {rejection.reason}")
     for warning in found.warnings:
         note(f"warning: {warning}")
 
@@ -215,15 +223,22 @@ def _size(text: str) -> tuple[int, int]:
 
 def _images(stated: list[str]) -> dict[str, list[Path]]:
     """Return the image files of each camera, from NAME=FOLDER."""
-    from wingfit.cameras.video.source import IMAGES
+    from wingfit.cameras.video.source import IMAGES, images_in, same_film
 
-    found: dict[str, list[Path]] = {}
+    found, places = dict[str, list[Path]](), dict[str, Path]()
     for one in stated:
         name, separator, folder = one.partition("=")
         place = Path(folder)
         if not separator or not name or not place.is_dir():
             raise typer.BadParameter(f"{one!r}: give NAME=FOLDER, with a folder of images", param_hint="images")
-        found[name] = sorted(file for file in place.iterdir() if file.suffix.lower() in IMAGES)
+        if name in found:
+            raise typer.BadParameter(f"camera {name!r} is given twice; give each a name", param_hint="images")
+        found[name] = sorted(images_in(place))
         if not found[name]:
             raise typer.BadParameter(f"{place} holds no images ({', '.join(IMAGES)})", param_hint="images")
+        same = next((other for other in found if other != name and same_film(places[other], place)), None)
+        if same is not None:
+            message = f"{name!r} has the images of {same!r}, or copies of them; give the images of each camera"
+            raise typer.BadParameter(message, param_hint="images")
+        places[name] = place
     return found

@@ -57,7 +57,10 @@ def track(
     if output:
         write_text(output, found.csv(), f"tracks of {film}")
     if covariance:
-        found.write_covariance(covariance)
+        try:
+            found.write_covariance(covariance)
+        except OSError as error:
+            raise WingfitError(f"cannot write {covariance}", error.strerror or str(error)) from error
         note(f"wrote {covariance}")
     if report:
         write_text(report, film_report(found), f"pictures of {film}")

@@ -10,14 +10,24 @@ import os
 import struct
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 
 from wingfit.records.errors import DatasetError, Fault
 from wingfit.records.files.confined import ENVIRONMENT
 
 NICENESS = 5
+VIDEOS = "videos"  # name of the folder with the videos of a film
 LENGTHS = struct.Struct("!II")  # of the JSON and of the bytes of an answer about a video
 FAULTS = 3  # exit status: the input has faults, which standard output lists
-OF_LIBRARIES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_CACHE_DIR")
+OF_LIBRARIES = (
+    "OMP_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "NUMBA_CACHE_DIR",
+    # These decide how sums are rounded, and tracks are those of 'wingfit track' bit for bit.
+    "OPENBLAS_CORETYPE",
+    "OPENBLAS_L2_SIZE",
+)
 
 
 def command(module: str, *arguments: str) -> list[str]:
@@ -38,8 +48,13 @@ def environment() -> dict[str, str]:
 
 
 def listed(error: DatasetError) -> list[list[str | None]]:
-    """Return the faults of ``error`` as JSON."""
-    return [[fault.where, fault.value, fault.message] for fault in error.errors]
+    """Return the faults of ``error`` as JSON, without paths of the server, which mean nothing to its users."""
+    return [[_place(fault.where), fault.value, fault.message] for fault in error.errors]
+
+
+def _place(where: str | None) -> str:
+    path = Path(where or "")
+    return f"video of camera {path.name.split('.')[0]}" if path.parent.name == VIDEOS else str(where)
 
 
 def error_of(faults: Sequence[Sequence[object]]) -> DatasetError:

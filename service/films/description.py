@@ -11,7 +11,7 @@ from typing import Any
 
 from wingfit.client import private_files
 from wingfit.records.description.yaml_text import write_yaml
-from wingfit.service.films.files import FilmFiles
+from wingfit.service.films.files import CAMERAS, FilmFiles
 from wingfit.service.films.requests import CALIBRATION
 from wingfit.service.films.views import uploaded
 from wingfit.service.storage.tables import FilmRow
@@ -20,11 +20,13 @@ DESCRIPTION, PLACES, LABELS = "film.yaml", "markers.csv", "labels.csv"
 
 
 def write_description(folder: Path, row: FilmRow, spec: Mapping[str, Any], files: FilmFiles) -> Path:
-    """Write ``film.yaml`` into ``folder``, with the tables that it names beside it; return its path.
+    """Write ``film.yaml`` into ``folder``, with the cameras and tables that it names beside it; return its path.
 
     ``row``: the film, all of whose files are there; ``spec``: settings of a tracking.
     """
     named = {name: str(files.video(row.id, file).resolve()) for name, file in uploaded(row).items()}
+    # A copy, which tells later with which cameras the tracks were made.
+    _write(folder / CAMERAS, Path(named[CALIBRATION]).read_bytes().decode())
     markers: dict[str, Any] = {"kind": spec["kind"]}
     if spec["places"]:
         _write(folder / PLACES, _table(("marker", "x_m", "y_m", "z_m"), spec["places"]))
@@ -32,7 +34,7 @@ def write_description(folder: Path, row: FilmRow, spec: Mapping[str, Any], files
     data = {
         "format": "wingfit film",
         "version": 1,
-        "cameras": named[CALIBRATION],
+        "cameras": CAMERAS,
         "light": spec["light"],
         "films": {camera["name"]: _film(named[camera["name"]], camera["stated_rate_hz"]) for camera in row.cameras},
         "markers": markers,

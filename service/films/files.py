@@ -20,10 +20,11 @@ from typing import IO, NamedTuple
 from starlette.concurrency import run_in_threadpool
 
 from wingfit.client import private_files
+from wingfit.service.films.child import VIDEOS
 from wingfit.service.http.problems import ProblemError
 from wingfit.service.storage.disk_space import FULL
 
-ROOT, VIDEOS = "films", "videos"
+ROOT = "films"
 PART, DELETED = ".part", "deleted-"
 PIECE = 2**20
 MIB = 2**20
@@ -34,11 +35,12 @@ SILENT_SECONDS = 60.0  # a client that sends nothing for so long is given up
 FILM, TRACKING = re.compile(r"fl_[0-9a-f]{16}"), re.compile(r"tk_[0-9a-f]{16}")
 UPLOADED = re.compile(r"[A-Za-z0-9_-]{1,40}\.[0-9a-f]{8}")
 
+CAMERAS = "cameras.yaml"
 TRACKS, COVARIANCE, REPORT, RESULT = "tracks.csv", "covariance.npz", "report.html", "result.json"
 
 
 class TrackingFiles(NamedTuple):
-    """Files of one tracking that has succeeded: tracks (CSV), covariances (NumPy), and the cameras of its film."""
+    """Files of one tracking that has succeeded: tracks (CSV), covariances (NumPy), and their cameras."""
 
     tracks: Path
     covariance: Path
@@ -81,8 +83,9 @@ class FilmFiles:
     async def receive(self, film_id: str, name: str, body: AsyncIterator[bytes], size: int | None, most: int) -> Path:
         """Write an upload of ``body`` to a new file, which is complete when this returns; return its path.
 
-        ``name``: of the camera, or "cameras"; ``size``: stated length in bytes, if any. Raises a 413 above ``most``
-        bytes, a 507 if the disk has no room, a 408 if the client sends nothing; then nothing is kept.
+        The file is a part until :meth:`complete` renames it, when it was checked. ``name``: of the camera, or
+        "cameras"; ``size``: stated length in bytes, if any. Raises a 413 above ``most`` bytes, a 507 if the disk has no
+        room, a 408 if the client sends nothing; then nothing is kept.
         """
         folder = await run_in_threadpool(self.new_folder, self.folder(film_id) / VIDEOS)
         part = folder / f"{name}.{secrets.token_hex(4)}{PART}"
@@ -90,8 +93,6 @@ class FilmFiles:
         try:
             with await run_in_threadpool(private_files.open_new, part) as stream:
                 await self._write(stream, body, most)
-            done = part.with_suffix("")
-            await run_in_threadpool(part.replace, done)
         except OSError as error:
             await run_in_threadpool(part.unlink, missing_ok=True)
             if error.errno in FULL:
@@ -100,7 +101,11 @@ class FilmFiles:
         except BaseException:  # also if the client is gone
             part.unlink(missing_ok=True)
             raise
-        return done
+        return part
+
+    def complete(self, part: Path) -> Path:
+        """Rename a received file that was checked; return its path."""
+        return part.replace(part.with_suffix(""))
 
     async def _write(self, stream: IO[bytes], body: AsyncIterator[bytes], most: int) -> None:
         held, received, checked = bytearray(), 0, 0
@@ -132,12 +137,14 @@ class FilmFiles:
             "database): free some space, or delete films that are not needed; then upload it again",
         )
 
-    def keep_only(self, film_id: str, name: str, kept: str | None) -> None:
-        """Remove the uploaded files of ``name`` but ``kept``, and what was detected in them."""
-        for path in (self.folder(film_id) / VIDEOS).glob(f"{name}.*"):
-            if path.name != kept and path.suffix != PART:
-                path.unlink(missing_ok=True)
+    def keep_only(self, film_id: str, name: str, kept: str | None) -> list[Path]:
+        """Remove the checked files of ``name`` but ``kept``, and what was detected in them; return what was removed."""
+        files = (self.folder(film_id) / VIDEOS).glob(f"{name}.*")
+        removed = [path for path in files if path.name != kept and path.suffix != PART]
+        for path in removed:
+            path.unlink(missing_ok=True)
         shutil.rmtree(self.detected(film_id), ignore_errors=True)
+        return removed
 
     def set_aside(self, film_id: str) -> None:
         """Rename the folder of a film that is being deleted, which :meth:`remove` finishes."""

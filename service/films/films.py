@@ -6,6 +6,7 @@ import logging
 from collections.abc import Mapping
 from importlib.util import find_spec
 from pathlib import Path
+from threading import Lock
 from typing import Any
 
 from sqlalchemy import func, select
@@ -15,6 +16,7 @@ from sqlalchemy.orm.attributes import flag_modified
 from wingfit.cameras.files.camera_set import CameraSet
 from wingfit.cameras.files.project import read_project
 from wingfit.cameras.files.read import recognise
+from wingfit.cameras.video.source import same_film
 from wingfit.client.films import answers as a
 from wingfit.records.errors import DatasetError, counted, fail
 from wingfit.records.limits import MAX_DESCRIPTION_BYTES
@@ -39,6 +41,7 @@ class Films:
     def __init__(self, settings: Settings, database: Database) -> None:
         self._settings, self._database = settings, database
         self.files, self.videos = FilmFiles(settings.data), Videos()
+        self._keeping = Lock()
 
     def start(self) -> None:
         """Remove what an earlier process left; warn of folders that belong to no film of the database."""
@@ -86,26 +89,31 @@ class Films:
                 f"{held / MIB:.1f} MiB, this one {size / MIB:.1f} MiB more; delete films that are not needed",
             )
 
-    def keep(self, film_id: str, name: str, path: Path) -> a.Film:
-        """Check the uploaded file ``path``, make it the file ``name`` of a film, and return the film.
+    def keep(self, film_id: str, name: str, part: Path) -> a.Film:
+        """Check the uploaded file ``part``, make it the file ``name`` of a film, and return the film.
 
         Raises a 422 if the file is not valid, a 409 if the film is tracked; then the file is removed.
         """
+        path = part
         try:
-            facts = self._facts(film_id, name, path)
-            with self._database.write() as session:
-                row = store.one(session, FilmRow, film_id)
-                _check_idle(session, film_id)
-                self._check_sizes(row, name, path, facts)
-                if name != CALIBRATION:
-                    self._check_share(session, row, name, path.stat().st_size)
-                _put(row, name, path, facts)
+            facts = self._facts(film_id, name, part)
+            # Of two uploads at once, the one that is stored last is kept, and only what it replaces is removed.
+            with self._keeping:
+                with self._database.write() as session:
+                    row = store.one(session, FilmRow, film_id)
+                    _check_idle(session, film_id)
+                    self._check_sizes(row, name, part, facts)
+                    if name != CALIBRATION:
+                        self._check_share(session, row, name, part.stat().st_size)
+                    path = self.files.complete(part)
+                    _put(row, name, path, facts)
+                removed = self.files.keep_only(film_id, name, path.name)
         except BaseException:
-            self.videos.forget(path)
+            self.videos.forget(part)
             path.unlink(missing_ok=True)
             raise
-        self.videos.forget(path.parent)
-        self.files.keep_only(film_id, name, path.name)
+        for old in removed:
+            self.videos.forget(old)
         return self.view(row)
 
     def _facts(self, film_id: str, name: str, path: Path) -> dict[str, Any]:
@@ -119,11 +127,19 @@ class Films:
                 raise fail(
                     name, None, "is no video in a known container; upload AVI, MP4, MOV, MKV, WebM, MTS, WMV or MPEG"
                 )
+            self._check_own(row, name, path)
             return self.videos.facts(path, _camera_of(row, name)["stated_rate_hz"])
         except DatasetError as error:
             raise refused(f"the file {name} cannot be used", error, f"files.{name}") from None
         except VideoTimeoutError as error:
             raise invalid(str(error), [error_item(f"files.{name}", None, str(error))]) from None
+
+    def _check_own(self, row: FilmRow, name: str, path: Path) -> None:
+        """Raise DatasetError if the video ``path`` of camera ``name`` is that of another camera too."""
+        for other, file in views.uploaded(row).items():
+            video = self.files.video(row.id, file)
+            if other not in (name, CALIBRATION) and video.is_file() and same_film(video, path):
+                raise fail(name, None, f"is the video of camera {other!r} too; upload the one that this camera filmed")
 
     def _check_sizes(self, row: FilmRow, name: str, path: Path, facts: Mapping[str, Any]) -> None:
         """Raise a 422 if the images of a video have another size than its camera was calibrated with."""

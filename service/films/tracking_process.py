@@ -23,7 +23,7 @@ from wingfit.cameras.track.report import film_report
 from wingfit.cameras.track.result import TrackedFilm
 from wingfit.records.errors import DatasetError, fail
 from wingfit.service.films.child import FAULTS, listed
-from wingfit.service.films.files import COVARIANCE, REPORT, RESULT, TRACKS, VIDEOS
+from wingfit.service.films.files import COVARIANCE, REPORT, RESULT, TRACKS
 from wingfit.service.films.summary import summary
 from wingfit.service.storage.disk_space import FULL
 
@@ -46,14 +46,8 @@ def main(arguments: list[str]) -> None:
 
 
 def _refuse(error: DatasetError) -> NoReturn:
-    print(json.dumps({"faults": [[_place(where), *rest] for where, *rest in listed(error)]}), flush=True)
+    print(json.dumps({"faults": listed(error)}), flush=True)
     sys.exit(FAULTS)
-
-
-def _place(where: str | None) -> str:
-    """Return ``where`` something is wrong in the user's words: the folders of the server mean nothing to them."""
-    path = Path(where or "")
-    return f"video of camera {path.stem}" if path.parent.name == VIDEOS else str(where)
 
 
 def _write(found: TrackedFilm, folder: Path) -> None:

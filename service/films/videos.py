@@ -63,7 +63,9 @@ class _Process:
             status = self._child.returncode
             how = f"signal {signal.Signals(-status).name}" if status < 0 else f"status {status}"
             raise fail(
-                self._path.stem, None, f"OpenCV fails on it ({how}); convert it, for example to MP4 with H.264"
+                self._path.name.split(".")[0],
+                None,
+                f"OpenCV fails on it ({how}); convert it, for example to MP4 with H.264",
             ) from None
         except VideoTimeoutError:
             self.close()

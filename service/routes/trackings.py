@@ -18,8 +18,8 @@ from wingfit.records.files.archive import write_zip
 from wingfit.service.container import DOWNLOAD_SLOT, UPLOAD_SLOT, Service, ServiceDep
 from wingfit.service.datasets.new_datasets import opened, stored
 from wingfit.service.films import views
-from wingfit.service.films.description import LABELS, write_description
-from wingfit.service.films.files import COVARIANCE, REPORT, TRACKS, TrackingFiles
+from wingfit.service.films.description import DESCRIPTION, LABELS, write_description
+from wingfit.service.films.files import CAMERAS, COVARIANCE, REPORT, TRACKS, TrackingFiles
 from wingfit.service.films.films import require_opencv
 from wingfit.service.films.requests import CALIBRATION, FilmedDatasetIn, TrackingIn
 from wingfit.service.http import csv_text
@@ -69,6 +69,7 @@ def submit(request: Request, service: ServiceDep, body: TrackingIn, idempotency_
 
     def plan() -> TrackingRow:
         film = _film(service, body.film_id)
+        _check_frames(film, body)
         spec = _spec(service, body)
         require_opencv()
         _check(service, film, spec)
@@ -205,6 +206,16 @@ def _film(service: Service, film_id: str) -> FilmRow:
     return row
 
 
+def _check_frames(film: FilmRow, body: TrackingIn) -> None:
+    """Raise a 422 if a film ends before the first frame that is to be tracked; a container may not state its end."""
+    for camera in film.cameras:
+        if 0 < (camera["frames"] or 0) <= body.first_frame:
+            message = (
+                f"the film of camera {camera['name']} has {camera['frames']} frames, counted from 0; begin earlier"
+            )
+            raise invalid("there is no frame to track", [error_item("body.first_frame", body.first_frame, message)])
+
+
 def _spec(service: Service, body: TrackingIn) -> dict[str, Any]:
     """Return the settings of a tracking, as its row stores them."""
     if body.dataset_id is not None and body.places:
@@ -265,10 +276,21 @@ def _tracked(service: Service, number: int, tracking_id: str) -> TrackingFiles:
         message = "there is no such tracking; GET /v1/trackings lists them"
         where = f"body.recordings.{number}.tracking_id"
         raise invalid(problem.detail, [error_item(where, tracking_id, message)]) from None
+    tracks, covariance = (_file(service, row.id, name) for name in (TRACKS, COVARIANCE))
+    return TrackingFiles(tracks, covariance, _cameras(service, film, tracks.parent))
+
+
+def _cameras(service: Service, film: FilmRow, folder: Path) -> Path:
+    """Return the file of cameras of the tracks in ``folder``; a 409 if another has replaced it."""
+    copied = folder / CAMERAS
+    if copied.is_file():
+        return copied
+    # Of a tracking by an earlier version, whose description names the file of the film.
     if film.calibration is None or CALIBRATION in views.absent(film, service.films.files):
         raise conflict(f"film {film.id} has no file of cameras on this server; upload it again")
-    cameras = service.films.files.video(film.id, film.calibration)
-    return TrackingFiles(_file(service, row.id, TRACKS), _file(service, row.id, COVARIANCE), cameras)
+    if film.calibration not in (folder / DESCRIPTION).read_text(encoding="utf-8"):
+        raise conflict(f"the cameras of film {film.id} were replaced after it was tracked: track it again")
+    return service.films.files.video(film.id, film.calibration)
 
 
 def _check(service: Service, film: FilmRow, spec: dict[str, Any]) -> None:
@@ -288,7 +310,7 @@ def _check(service: Service, film: FilmRow, spec: dict[str, Any]) -> None:
 def _where(place: str) -> str:
     """Return where in the request something is that stands at ``place`` in the files of a description."""
     if not place.startswith(LABELS):
-        return "body.places"
+        return "body.film_id" if ": films." in place else "body.places"
     line = re.search(r", line (\d+)", place)
     return f"body.labels.{int(line[1]) - 2}" if line else "body.labels"  # after the header
 

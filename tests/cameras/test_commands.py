@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from tests.cameras.films import FILM, FRAMES, NAMES, RATE, SIZE, cameras, wing, write_film
+from tests.cameras.video.test_late_frames import packets
 from tests.command_line import in_process
 from wingfit.cameras.files.read import read_cameras
 from wingfit.cli.main import app
@@ -82,8 +83,8 @@ def test_markers_without_known_places_get_names(film: Path) -> None:
     assert apart.min(1).max() < 5e-4
 
 
-def test_a_film_that_was_cut_off_is_remarked(film: Path) -> None:
-    """The remark of ``wingfit track``; the right camera's images are a video that ends early."""
+def video(film: Path) -> Path:
+    """The right camera's images as a video."""
     path = film.parent / "right.avi"
     writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), RATE, SIZE)
     for number in range(FRAMES):
@@ -91,6 +92,12 @@ def test_a_film_that_was_cut_off_is_remarked(film: Path) -> None:
         assert image is not None
         writer.write(image)
     writer.release()
+    return path
+
+
+def test_a_film_that_was_cut_off_is_remarked(film: Path) -> None:
+    """The remark of ``wingfit track``; the right camera's images are a video that ends early."""
+    path = video(film)
     raw = path.read_bytes()
     path.write_bytes(raw[: int(0.75 * len(raw))])
     other = film.parent / "cut.yaml"
@@ -100,6 +107,21 @@ def test_a_film_that_was_cut_off_is_remarked(film: Path) -> None:
     instants = int(out.split(" instants")[0])
     assert FRAMES // 2 < instants < FRAMES - 3
     assert f"the film of right ends at frame {instants}, of {FRAMES} that its container states" in err
+
+
+def test_a_damaged_frame_moves_none_of_those_behind_it(film: Path) -> None:
+    path = video(film)
+    packet = packets(path)[18]
+    path.write_bytes(path.read_bytes().replace(packet, bytes(len(packet))))
+    other = film.parent / "damaged.yaml"
+    other.write_text(FILM.replace("path: right,", "path: right.avi,"))
+    code, _, err = wingfit("track", other, "-o", "tracks.csv")
+    assert code == 0, err
+    assert "remark: 1 frame of camera right could not be decoded: 18" in err
+    table = read_table(Path("tracks.csv").read_bytes(), "tracks.csv")
+    assert table.times()[-1] == pytest.approx((FRAMES - 1) / RATE)
+    found = np.stack([table.track(name)[-1] for name in NAMES])
+    assert found == pytest.approx(wing((FRAMES - 1) / RATE), abs=5e-4)
 
 
 def test_what_cannot_be_tracked_is_explained(film: Path) -> None:
@@ -118,6 +140,45 @@ def test_what_cannot_be_tracked_is_explained(film: Path) -> None:
     assert wingfit("track", film, "--store", "detected")[0] == 2
 
 
+def test_films_that_do_not_fit_their_cameras_are_refused(film: Path) -> None:
+    stated = (film.parent / "cameras.yaml").read_text()
+    other = film.parent / "other.yaml"
+    other.write_text(FILM.replace("cameras.yaml", "others.yaml"))
+    for old, new, words in (
+        ("size_px: [320, 240]", "size_px: [640, 480]", "films 320 x 240 px and was calibrated at 640 x 480 px"),
+        (
+            "row_us: 0.0",
+            "row_us: 60",
+            "row_us 60 in the file of cameras makes 14.4 ms for 240 rows, more than a fr",
+        ),
+    ):
+        (film.parent / "others.yaml").write_text(stated.replace(old, new, 1))
+        code, _, err = wingfit("track", other)
+        assert (code, f"camera left: {words}" in err) == (1, True), err
+    other.write_text(FILM + "first_frame: 25\n")
+    code, _, err = wingfit("track", other)
+    assert (code, "the film has 25 frames, counted from 0; begin before its end" in err) == (1, True), err
+
+
+def test_films_of_different_lengths_are_remarked(film: Path) -> None:
+    other = film.parent / "slow.yaml"
+    other.write_text(FILM.replace("right, rate_hz: 100", "right, rate_hz: 80"))
+    code, _, err = wingfit("track", other)
+    assert code == 0, err
+    assert "do not last equally long: left 0.25 s, right 0.3125 s; what all cameras filmed is tracked" in err
+
+
+def test_what_cannot_be_written_is_named(film: Path) -> None:
+    short = film.parent / "short.yaml"
+    short.write_text(FILM + "last_frame: 8\n")
+    Path("full.npz").symlink_to("/dev/full")
+    code, _, err = wingfit("track", short, "--covariance", "full.npz")
+    assert (code, "cannot write full.npz: No space left on device" in err) == (1, True), err
+    Path("detected").write_text("a file")
+    code, _, err = wingfit("track", short, "--store", "detected/within")
+    assert (code, "cannot be written (Not a directory): free the disk, or choose" in err) == (1, True), err
+
+
 def test_cameras_of_another_program_are_converted() -> None:
     rows = []
     for camera in cameras():
@@ -131,6 +192,7 @@ def test_cameras_of_another_program_are_converted() -> None:
     )
     assert code == 0, err
     assert "320 x 240 px, lens pinhole" in out
+    assert "camera 1 and camera 2 are 0.454 m apart" in out
     assert "cameras written to cameras.yaml" in err
     found = read_cameras(Path("cameras.yaml")).cameras
     for one, true in zip(found, cameras(), strict=True):

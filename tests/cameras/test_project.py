@@ -53,7 +53,7 @@ def test_labels_are_read(film: Path) -> None:
 
 def test_cameras_without_film_are_left_out_with_their_covariance(film: Path) -> None:
     left, right = cameras()
-    three = (left, replace(left, name="middle"), right)
+    three = (left, replace(left, name="middle", translation=left.translation + 0.1), right)
     count = len(left.parameter_names)
     covariance = np.diag(np.repeat([1.0, 2.0, 3.0], count)) * 1e-4
     write_cameras(film.parent / "cameras.yaml", CameraSet(three, covariance))
@@ -72,7 +72,7 @@ def test_cameras_without_film_are_left_out_with_their_covariance(film: Path) -> 
         ("version: 1", "version: 2", ["'wingfit film 2' is not"]),
         ("path: left,", "path: lefft,", ["line 6", "there is no", "lefft", "paths count from the folder of film.yaml"]),
         ("{path: left, rate_hz: 100}", "left", ["line 6", "is no mapping with the keys path, rate_hz"]),
-        ("{path: right,", "{path: left,", ["line 7", "is the film of camera 'left' too"]),
+        ("{path: right,", "{path: left,", ["line 7", "camera 'right' has the film of camera 'left'"]),
         ("path: left,", "path: 7,", ["line 6", "7 is no path; state that of a file or folder"]),
         ("cameras.yaml", "other.yaml", ["line 3", "there is no", "other.yaml"]),
         ("  right: {path: right, rate_hz: 100}\n", "", ["line 5", "1 films", "2 to 8 cameras"]),
@@ -90,6 +90,7 @@ def test_cameras_without_film_are_left_out_with_their_covariance(film: Path) -> 
         ("continuous", "continuous\nfirst_frame: 9\nlast_frame: 9", ["line 6", "from 10 to", "not included"]),
         ("  kind: dot", "  kind: dot\n  wing: markers.csv", ["line 8", "has both 'wing' and 'places'; keep one"]),
         ("markers.csv", "left", ["left", "cannot be read", "check the path"]),
+        ("markers.csv", "m" * 300, ["line 10", "File name too long", "check the path"]),
     ],
 )  # fmt: skip
 def test_what_cannot_be_read_is_refused(film: Path, old: str, new: str, words: list[str]) -> None:
@@ -115,6 +116,10 @@ def table(rows: list[str]) -> str:
         (table([f"m{k},{x / 1e3},{y / 1e3},{z}" for k, (x, y, z) in enumerate(PLACES)]), ["extend over 0.0"]),
         (table([f"m{k // 2},{x},{y},{z}" for k, (x, y, z) in enumerate(PLACES)]), ["two markers have the name 'm0'"]),
         (table([f"m{k},{x},{y},{'' if k == 3 else z}" for k, (x, y, z) in enumerate(PLACES)]), ["'m3' has no place"]),
+        (
+            table([f"m{k},{x},{y},{z}" for k, (x, y, z) in enumerate((*PLACES, PLACES[3]))]),
+            ["the markers 'm3' and 'm12' have one place; give each its own"],
+        ),
         (table([f"m{k},{x},{y},{z}" for k, (x, y, z) in enumerate(PLACES[:5])]), ["5 markers; at least 6 are needed"]),
         ("marker,x_m,y_m\nm0,0,0\n", ["z_m"]),
     ],
@@ -124,6 +129,19 @@ def test_places_that_cannot_be_are_refused(film: Path, text: str, words: list[st
     with pytest.raises(DatasetError) as refused:
         read_film(film)
     assert all(word in str(refused.value) for word in words), str(refused.value)
+
+
+@pytest.mark.parametrize("linked", [False, True])
+def test_two_cameras_have_no_copies_of_one_film(film: Path, linked: bool) -> None:
+    for number, camera in enumerate(("left", "right")):
+        (film.parent / camera / "1.png").write_bytes(b"alike")
+        (film.parent / camera / "2.png").write_bytes(b"%d" % number)
+    assert len(read_film(film).films) == 2
+    right = film.parent / "right" / "2.png"
+    right.unlink()
+    (right.hardlink_to if linked else right.symlink_to)(film.parent / "left" / "2.png")
+    with pytest.raises(DatasetError, match=r"camera 'right' has the film of camera 'left', or a copy of it"):
+        read_film(film)
 
 
 def test_a_file_that_is_missing_is_named(tmp_path: Path) -> None:

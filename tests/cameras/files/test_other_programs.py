@@ -76,6 +76,23 @@ def test_what_a_file_of_opencv_does_not_state_is_requested(tmp_path: Path) -> No
         read_cameras(path, sizes_px=[(640, 480)])
 
 
+OPENCV = """%YAML:1.0
+---
+image_width: 640
+image_height: 480
+camera_matrix: !!opencv-matrix
+   rows: 3
+   cols: 3
+   dt: d
+   data: [ 600., 0., 320., 0., 600., 240., 0., 0., 1. ]
+distortion_coefficients: !!opencv-matrix
+   rows: 5
+   cols: 1
+   dt: d
+   data: [ 0.1, 0., 0., 0., 0. ]
+"""
+
+
 def test_bad_files_of_opencv_are_refused(tmp_path: Path) -> None:
     camera = cameras()[1]
     skewed = camera.matrix.copy()
@@ -97,6 +114,36 @@ def test_bad_files_of_opencv_are_refused(tmp_path: Path) -> None:
     (tmp_path / "broken.yml").write_text("%YAML:1.0\n---\ncamera_matrix: !!opencv-matrix\n   rows: 3\n  cols: [")
     with pytest.raises(DatasetError, match="OpenCV cannot read this file"):
         read_cameras(tmp_path / "broken.yml")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("rows: 3", "rows: 100000", "camera_matrix is no matrix: its rows, cols, dt and data do not belong together"),
+        ("rows: 3", "rows: -3", "camera_matrix is no matrix"),
+        ("rows: 5", "rows: 7", "distortion_coefficients is no matrix"),
+        ("image_width: 640", "image_width: .Nan", r"no whole number from 1 to 100000; write the file again"),
+        ("image_width: 640", 'image_width: "wide"', "no whole number from 1 to 100000"),
+        ("image_width: 640", "image_width: 640.5", "no whole number from 1 to 100000"),
+        ("image_width: 640", f"a: {'[' * 50_000}", "nested deeper than 32 levels"),
+    ],
+)  # fmt: skip
+def test_numbers_that_do_not_belong_together_are_refused(tmp_path: Path, old: str, new: str, message: str) -> None:
+    """OpenCV raises its own errors for some of them, and ends the process for lists in lists."""
+    assert OPENCV.count(old) == 1
+    path = tmp_path / "camera.yml"
+    path.write_text(OPENCV)
+    assert read_cameras(path).cameras[0].size_px == (640, 480)
+    path.write_text(OPENCV.replace(old, new))
+    with pytest.raises(DatasetError, match=message):
+        read_cameras(path)
+
+
+def test_elements_in_elements_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "camera.xml"
+    path.write_text(f"<?xml version='1.0'?>\n<opencv_storage>\n{'<a>' * 50_000}")
+    with pytest.raises(DatasetError, match="nested deeper than 32 levels"):
+        read_cameras(path)
 
 
 @pytest.mark.skipif(not (DATA / "left_intrinsics.yml").is_file(), reason=f"no left_intrinsics.yml in {DATA}")
@@ -146,6 +193,16 @@ def test_anipose(tmp_path: Path) -> None:
         ("size = [ 1024, 800,]", 'size = [ 1024, "800" ]', "not all of these are finite numbers"),
         ("[cam_0]", "[cam_0", "not valid TOML"),
         ('name = "camera 0"', "name = 3", "3 is no text"),
+        ('name = "camera 0"', 'name = "camera\\n0"', "is no name; give one line of at most 100 characters"),
+        ('name = "camera 0"', f'name = "{"c" * 101}"', "is no name; give one line"),
+        ('name = "camera 0"', 'name = "camera 0"\nfisheye = "yes"', "yes is neither true nor false"),
+        ("size = [ 1024, 800,]", f"size = [ 1{'0' * 400}, 800,]", "not all of these are finite numbers"),
+        ("[cam_0]", f"[cam_0]\na = {'[' * 5000}", "not valid TOML"),
+        (
+            "rotation = [",
+            "rotation = [100.0, 0.0, 0.0] # [",
+            "100 rad; at most 6.283: state the rotation vector in rad",
+        ),
         ("[0.0, 0.0, 1.0]]", "[0.0, 0.5, 1.0]]", "no matrix of a camera"),
         ("distortions = [0.0, ", "distortions = [", ""),
     ],

@@ -8,7 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.cameras.calibrate.simulated import LENSES
 from tests.cameras.files.samples import assert_same, cameras, with_covariance
+from wingfit.cameras.camera import Lens, LensModel
 from wingfit.cameras.files.camera_set import CameraSet
 from wingfit.cameras.files.project import write_cameras
 from wingfit.cameras.files.read import read_cameras
@@ -59,6 +61,22 @@ def test_units_stand_in_the_names(tmp_path: Path) -> None:
             r"line \d+, column \d+: cameras\[0\].focal_px.*a list of 2",
         ),
         ("row_us: 12.5", "row_us: -1", "time between rows -1e-06 s; it must be 0"),
+        (
+            "row_us: 12.5",
+            "row_us: 2500",
+            "2500 us from row to row make 2 s for 800 rows; at most 1 s: state row_us in micro",
+        ),
+        ("centre_px: [511.5,", "centre_px: [1e9,", r"principal point 1e\+09, 399.5 px; it must lie in"),
+        (
+            "rotation_rad: [",
+            "rotation_rad: [45.0, 0, 0] # [",
+            "45 rad; at most 6.283: state the rotation vector in radians",
+        ),
+        (
+            "{model: brown, k1: -0.",
+            "{model: brown, k1: 1e30, k2: 0.0, p1: 0.0, p2: 0.0, k3: 0.0} # ",
+            r"the lens has k1 = 1e\+30, .* at most 1000: calibrate again",
+        ),
         ("row_us: 12.5", "row_s: 12.5", r"cameras\[3\].row_us: the key 'row_us' is missing"),
         ("name: camera 1", "name: camera 0", "two cameras have the same name"),
         ("name: camera 1", "name: 7", r"cameras\[1\].name: 7 is no text"),
@@ -95,6 +113,22 @@ def test_a_covariance_that_cannot_be_is_refused(tmp_path: Path) -> None:
         with pytest.raises(DatasetError, match=message):
             write_cameras(tmp_path / "cameras.yaml", replace(given, covariance=covariance))
     assert not list(tmp_path.iterdir())
+
+
+def test_two_cameras_at_one_place_are_refused(tmp_path: Path) -> None:
+    one, other = cameras()[:2]
+    moved = replace(one, name="moved", translation=one.translation + np.array([0, 0, 5e-4]))
+    with pytest.raises(DatasetError, match=r"camera 0 and moved are 0\.5 mm apart; at least 1 mm: check the unit of"):
+        write_cameras(tmp_path / "cameras.yaml", CameraSet((one, other, moved)))
+
+
+@pytest.mark.parametrize("model", LENSES)
+def test_strong_distortion_is_no_fault(model: LensModel, tmp_path: Path) -> None:
+    """Lenses of 10 mm and more have large coefficients, which act on small angles."""
+    narrow = next(one for one in cameras() if one.lens.model == model)
+    matrix = narrow.matrix * [[12.0, 1, 1], [1, 12.0, 1], [1, 1, 1]]
+    lens = Lens(model, tuple(300.0 * value for value in narrow.lens.coefficients))
+    write_cameras(tmp_path / "cameras.yaml", CameraSet((replace(narrow, matrix=matrix, lens=lens),)))
 
 
 def test_a_rotation_that_is_none_is_not_written(tmp_path: Path) -> None:

@@ -47,6 +47,18 @@ def video(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
     return write(tmp_path_factory.mktemp("long") / request.param, CODECS[request.param])
 
 
+def packets(path: Path) -> list[bytes]:
+    """The packets of the container, which are not decoded."""
+    video = cv2.VideoCapture(str(path))
+    video.set(cv2.CAP_PROP_FORMAT, -1)
+    found = list[bytes]()
+    while True:
+        there, packet = video.read()
+        if not there:
+            return found
+        found.append(np.asarray(packet).tobytes())
+
+
 class Counted:
     """A video whose decoded frames are counted."""
 
@@ -101,6 +113,34 @@ def test_the_same_frame_is_decoded_to_the_same_pixels(video: Path) -> None:
         assert again is not None
         assert image is not None
         assert np.array_equal(again, image)
+
+
+@pytest.mark.parametrize("content", ["zeros", "random"])
+def test_a_damaged_packet_costs_one_frame(content: str, tmp_path: Path) -> None:
+    """The frames behind it keep their numbers, whether they are counted or sought."""
+    path = write(tmp_path / "whole.avi", "MJPG", 300)
+    raw, packet = bytearray(path.read_bytes()), packets(path)[150]
+    assert raw.count(packet) == 1
+    at = raw.find(packet)
+    damage = bytes(len(packet)) if content == "zeros" else np.random.default_rng(1).bytes(len(packet))
+    raw[at : at + len(packet)] = damage
+    path.write_bytes(bytes(raw))
+    expected = [None if number == 150 else number for number in range(300)]
+    for first in (0, 140, 150, 151, 200):
+        frames = Film(path).opened()
+        found = [(number, None if image is None else shown(image)) for number, image in frames.read(first)]
+        assert found == list(zip(range(first, 300), expected[first:], strict=True))
+        assert frames.ended == 300
+
+
+def test_a_damaged_packet_without_index_ends_the_film(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = write(tmp_path / "whole.avi", "MJPG", 300)
+    raw, packet = path.read_bytes(), packets(path)[150]
+    path.write_bytes(raw.replace(packet, bytes(len(packet))))
+    monkeypatch.setattr(source, "read_index", lambda *_: None)
+    frames = Film(path).opened()
+    assert [shown(image) for _, image in frames.read()] == list(range(150))
+    assert frames.ended == 150
 
 
 @pytest.mark.parametrize("wrong", ["shifted", "missing", "none"])

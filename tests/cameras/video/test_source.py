@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import struct
+import zlib
 from pathlib import Path
 
 import cv2
@@ -63,6 +66,28 @@ def test_a_frame_that_cannot_be_used_is_none(tmp_path: Path) -> None:
     (folder / "frame2.png").write_bytes(b"\x89PNG torn")
     cv2.imwrite(str(folder / "frame3.png"), np.zeros((48, 65), np.uint8))
     assert levels(Film(folder, 100.0)) == [(0, 30.0), (1, None), (2, None), (3, 60.0)]
+
+
+def test_a_name_that_is_no_text_is_read_or_refused(tmp_path: Path, video: Path) -> None:
+    """OpenCV itself ends the process at such a name."""
+    folder = write_images(tmp_path / "images", [1, 2])
+    (folder / "frame2.png").rename(folder / os.fsdecode(b"frame2\xff.png"))
+    assert levels(Film(folder, 100.0)) == [(0, 30.0), (1, 40.0)]
+    other = video.rename(video.with_name(os.fsdecode(b"film\xff.avi")))
+    with pytest.raises(DatasetError, match="its name is not in UTF-8, which OpenCV does not open; rename the file"):
+        Film(other).opened()
+
+
+def test_a_bomb_of_an_image_is_refused(tmp_path: Path) -> None:
+    """The head of a PNG states 60,000 x 60,000 pixels."""
+    folder = write_images(tmp_path / "images", [1, 2])
+    head = b"IHDR" + struct.pack(">IIBBBBB", 60_000, 60_000, 8, 0, 0, 0, 0)
+    bomb = b"\x89PNG\r\n\x1a\n" + struct.pack(">I", 13) + head + struct.pack(">I", zlib.crc32(head))
+    (folder / "frame2.png").write_bytes(bomb)
+    assert levels(Film(folder, 100.0)) == [(0, 30.0), (1, None)]
+    (folder / "frame1.png").write_bytes(bomb)
+    with pytest.raises(DatasetError, match=r"frame1\.png: cannot be read as an image; save it as PNG"):
+        Film(folder, 100.0).opened()
 
 
 @pytest.mark.parametrize("channels", [3, 4])

@@ -136,6 +136,27 @@ def test_a_file_that_is_damaged_is_named_by_its_recording(
     assert str(data) not in str(found)
 
 
+def test_cameras_are_those_of_the_tracks(
+    served: Api, film: str, folder: Path, data: Path, trackings: list[str]
+) -> None:
+    """They stay so if others replace them in the film afterwards; tracks of earlier versions have no copy."""
+    body = _body(trackings, recordings=_body(trackings)["recordings"][:1])
+    before = served.client.post("/v1/trackings/dataset", json=body).json()["dataset"]["id"]
+    stated = (folder / "cameras.yaml").read_bytes()
+    copied = data / "films" / film / "tracked" / trackings[0] / "cameras.yaml"
+    assert put(served.client, film, "cameras", stated.replace(b"700.0", b"701.0")).status_code == 200
+    try:
+        after = served.client.post("/v1/trackings/dataset", json=body).json()["dataset"]["id"]
+        copied.unlink()
+        refused = served.client.post("/v1/trackings/dataset", json=body)
+    finally:
+        copied.write_bytes(stated)
+    found = [read_zip(served.client.get(f"/v1/datasets/{one}/archive").content, "a.zip") for one in (before, after)]
+    assert [one.cameras[0].focal_px for one in found if isinstance(one, Dataset)] == pytest.approx([700.0, 700.0])
+    assert refused.status_code == 409
+    assert "were replaced after it was tracked: track it again" in refused.json()["detail"]
+
+
 def test_recordings_of_other_cameras_have_no_common_frame(
     served: Api, folder: Path, data: Path, trackings: list[str]
 ) -> None:

@@ -131,6 +131,8 @@ def test_damaged_detections_are_made_anew(served: Api, data: Path, film: str, do
         ({"light": "strobe", "clocks_within_ms": 2.0}, "body.clocks_within_ms", "leave it out"),
         ({"clocks_within_ms": 1001}, "body.clocks_within_ms", "1000"),
         ({"first_frame": 9, "last_frame": 9}, "body.last_frame", "more than first_frame, 9"),
+        ({"first_frame": 25}, "body.first_frame", "camera left has 25 frames, counted from 0; begin earlier"),
+        ({"places": [*MARKERS, MARKERS[3] | {"marker": "m99"}]}, "body.places", "'m03' and 'm99' have one place"),
         ({"first_frame": 2.5}, "body.first_frame", "integer"),
         ({"dataset_id": "ds_0"}, "body.places", "not both"),
         ({"dataset_id": "ds_0", "places": []}, "body.dataset_id", "there is no such dataset"),

@@ -8,6 +8,7 @@ import shutil
 import socket
 import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,7 @@ import pytest
 
 from tests.cameras.films import SIZE, cameras
 from tests.service.conftest import Api, toy_service
-from tests.service.films.films import CAMERAS, FRAMES, RATE, new_film, put, write_video
+from tests.service.films.films import CAMERAS, FRAMES, RATE, new_film, put, uploaded, write_video
 from tests.service.shapes import valid
 from wingfit.cameras.files.camera_set import CameraSet
 from wingfit.cameras.files.project import write_cameras
@@ -118,7 +119,7 @@ PLAYLIST = b"#EXTM3U\n#EXT-X-TARGETDURATION:1\n#EXTINF:1,\nfile:///etc/passwd\n#
         ("left", b"no video at all", "is no video in a known container; upload AVI, MP4"),
         ("left", b"", "is no video in a known container"),
         ("left", PLAYLIST, "is no video in a known container"),
-        ("left", AVI, "cannot be read as a video"),
+        ("left", AVI, "video of camera left: cannot be read as a video"),
         ("cameras", b"\xff\xfe nothing", "none of the known files of cameras"),
         ("cameras", b"1,2\n" * 11, "is a file of DLT coefficients; convert it: wingfit cameras convert"),
         ("cameras", b"format: wingfit cameras\nversion: 9\ncameras: []\n", "version 1"),
@@ -130,6 +131,7 @@ def test_a_file_that_cannot_be_used_is_not_kept(served: Api, data: Path, name: s
     assert answer.status_code == 422, answer.text
     (error,) = answer.json()["errors"]
     assert (error["where"], words in error["message"]) == (f"files.{name}", True), error
+    assert str(data) not in answer.text
     assert stored(data, film) == []
     assert served.get(f"/v1/films/{film}")["cameras"][0]["bytes"] is None
 
@@ -188,6 +190,15 @@ def test_videos_have_the_size_of_the_calibration(served: Api, data: Path, folder
     assert (answer.status_code, answer.json()["errors"][0]["where"]) == (422, "files.cameras")
 
 
+def test_two_cameras_have_no_copies_of_one_video(served: Api, film: str, folder: Path) -> None:
+    answer = put(served.client, film, "right", (folder / "left.avi").read_bytes())
+    assert answer.status_code == 422
+    (error,) = answer.json()["errors"]
+    assert error["where"] == "files.right"
+    assert "is the video of camera 'left' too; upload the one that this camera filmed" in error["message"]
+    assert put(served.client, film, "left", (folder / "left.avi").read_bytes()).status_code == 200  # itself again
+
+
 def test_a_replaced_file_is_removed_with_what_was_detected(served: Api, data: Path, folder: Path) -> None:
     film = new_film(served)["id"]
     put(served.client, film, "left", (folder / "left.avi").read_bytes())
@@ -201,6 +212,16 @@ def test_a_replaced_file_is_removed_with_what_was_detected(served: Api, data: Pa
     second = served.client.get(f"/v1/films/{film}/frames/left/3")
     assert first.headers["etag"] != second.headers["etag"]
     assert first.content != second.content
+
+
+def test_uploads_of_one_file_at_once_leave_one(served: Api, data: Path, folder: Path) -> None:
+    film, video = uploaded(served, folder)["id"], (folder / "left.avi").read_bytes()
+    with ThreadPoolExecutor(4) as pool:
+        answers = list(pool.map(lambda _: put(served.client, film, "left", video), range(6)))
+    assert {answer.status_code for answer in answers} == {200}, [answer.text for answer in answers]
+    assert served.get(f"/v1/films/{film}")["ready"]
+    assert sorted(path.name.split(".")[0] for path in stored(data, film)) == ["cameras", "left", "right"]
+    assert served.client.get(f"/v1/films/{film}/frames/left/3").status_code == 200
 
 
 @pytest.fixture
@@ -228,12 +249,13 @@ def test_a_file_that_is_too_large_is_refused(small: Api, tmp_path: Path) -> None
 def test_no_owner_fills_the_disk_with_films(small: Api, tmp_path: Path) -> None:
     noise = np.random.default_rng(1).integers(0, 255, (240, 320, 3), dtype=np.uint8)
     write_video(tmp_path / "noise.avi", [noise] * 16)
-    video = (tmp_path / "noise.avi").read_bytes()
+    write_video(tmp_path / "other.avi", [noise[::-1].copy()] * 16)
+    video, another = ((tmp_path / name).read_bytes() for name in ("noise.avi", "other.avi"))
     assert 0.7e6 < len(video) < 2**20
     film, other = new_film(small)["id"], new_film(small)["id"]
     assert put(small.client, film, "left", video).status_code == 200
-    assert put(small.client, film, "right", video).status_code == 200
-    assert put(small.client, film, "right", video).status_code == 200  # in place of the one before
+    assert put(small.client, film, "right", another).status_code == 200
+    assert put(small.client, film, "right", another).status_code == 200  # in place of the one before
     answer = put(small.client, other, "left", video)
     assert (answer.status_code, "WINGFIT_MAX_FILMS_MIB" in answer.text) == (429, True), answer.text
     assert stored(tmp_path / "data", other) == []
