@@ -118,7 +118,8 @@ export function showFaults(error, focus = true) {
   const rest = (error?.errors ?? []).filter((item) => !place(item, placed));
   showErrors(form(), $("plan-errors"), error && { message: error.message, errors: rest });
   for (const control of placed) control.setAttribute("aria-invalid", "true");
-  if (focus) placed[0]?.focus();
+  const first = [...form().elements].find((control) => placed.includes(control));
+  if (focus) first?.focus();
 }
 
 // Write ``item`` at its field, which is unfolded; false if it names none that is shown.
@@ -126,6 +127,11 @@ function place(item, placed) {
   const name = item.where.split(".").filter((one) => one !== "body" && !/^\d+$/.test(one))[0];
   const node = name ? form().querySelector(`[data-field="${CSS.escape(name)}"]`) : null;
   if (!node || node.closest("[hidden]")) return false;
+  const known = node.querySelector(".fault"); // of a list, an entry for each of its items
+  if (known) {
+    known.append(`; ${item.message}`);
+    return true;
+  }
   const control = node.querySelector("input, select");
   const note = el("small", { className: "fault", id: `plan-fault-${name}` }, item.message);
   node.append(note);
