@@ -256,7 +256,9 @@ def test_a_finished_run_gives_its_genes(
     seen.page.route("**/plan", planned)
     seen.show(f"dataset={dataset['id']}")
     seen.wait(f"{READY} && document.querySelector('#plan-form select[name=at]').value === 'run_1'")
-    assert seen.page.evaluate("document.querySelector('#plan-form select[name=preset]').disabled")
+    seen.page.click("#plan-summary")
+    assert not seen.page.is_visible("#plan-form select[name=preset]")
+    assert seen.page.inner_text("#plan-summary") == "Settings: model of the run"
     seen.page.click("#plan-start")
     seen.wait(DONE)
     assert sent[-1]["genome"] == {"C_l": 1.3, "stroke_bias.angle": 0.01}
