@@ -50,7 +50,7 @@ async def plan(request: Request, service: ServiceDep, held: HeldSlots, dataset_i
     dataset = await run_in_threadpool(service.datasets.flapping, dataset_id)
     spec = await run_in_threadpool(_spec, body, dataset)
     async with service.plans.slot():
-        found = await while_awaited(request, lambda gone: _planned(dataset, spec, gone))
+        found = await while_awaited(request, lambda gone: planned(dataset, spec, gone))
         await held.enter_async_context(service.answers.slot())
     return JSONResponse(found)
 
@@ -66,7 +66,7 @@ def _spec(body: PlanIn, dataset: Dataset) -> PlanSpec:
     return replace(spec, **{name: getattr(body, name) for name in _OF_PLAN})
 
 
-def _planned(dataset: Dataset, spec: PlanSpec, gone: Callable[[], bool]) -> dict[str, Any]:
+def planned(dataset: Dataset, spec: PlanSpec, gone: Callable[[], bool]) -> dict[str, Any]:
     """Return the plan as plain data; raise a 422 where ``spec`` does not fit, a 503 if the client has hung up."""
     with closing(make_evaluator("in_process")) as evaluator:
         try:

@@ -16,7 +16,7 @@ export function drawAdditions(plan, dataset) {
   list($("plan-for-effects"), effects, "separation_factor");
   $("plan-t").hidden = !plan.effects.length;
   $("plan-t-note").hidden = effects.length > 0;
-  $("plan-t-note").textContent = "No two of the effects that will be detected need to be told apart.";
+  $("plan-t-note").textContent = "No two of the effects that will be detected need to be distinguished.";
   const beyond = [...new Set([...genes, ...effects].flatMap((one) => one.beyond))];
   $("plan-beyond").hidden = !beyond.length;
   $("plan-beyond").textContent = `Marked: ${beyond.join(" and ")} beyond the recorded range; the rig must allow it.`;
@@ -74,7 +74,7 @@ function conditions(plan, dataset) {
     traces: [
       dots(look, dataset.recordings, "recorded", { size: 8, color: look.faint }),
       ...proposed(look, genes, "for the genes", { size: 15, symbol: "circle-open", color: look.accent, line: { width: 2.5 } }, "top center"),
-      ...proposed(look, effects, "to tell effects apart", { size: 13, symbol: "diamond-open", color: look.series[1], line: { width: 2.5 } }, "bottom center"),
+      ...proposed(look, effects, "to distinguish effects", { size: 13, symbol: "diamond-open", color: look.series[1], line: { width: 2.5 } }, "bottom center"),
     ],
     showlegend: true, xaxis: axis(look, across.title), yaxis: axis(look, up.title),
   }));

@@ -1,4 +1,4 @@
-// Which effects will be seen and told apart, and from what size: a sortable table with marks on an axis of sizes.
+// Which effects will be seen and distinguished, and from what size: a sortable table with marks on an axis of sizes.
 
 import { $, correlation, DASH, el, plural, rounded, significant } from "../base/format.js";
 import { spoken } from "../base/labels.js";
@@ -14,14 +14,14 @@ const COLUMNS = [
   { head: "Sizes, relative to the typical one", axis: true },
   { head: "Seen from", key: "seen", number: true, of: (one) => last(one.smallest_part), title: "smallest size that is detected with the stated probability" },
   { head: "× typical", key: "part", number: true, of: (one) => last(one.smallest_part) },
-  { head: "Told apart from", key: "told", number: true, of: (one, alike) => (isChoice(one) && !alike.has(one.name) ? 0 : last(one.separable_part)), title: "smallest size, times the typical one, at which the effect is told from the one that it is most like" },
+  { head: "Distinguished from", key: "apart", number: true, of: (one, alike) => (isChoice(one) && !alike.has(one.name) ? 0 : last(one.separable_part)), title: "smallest size, times the typical one, at which the effect is distinguished from the one that it is most like" },
   { head: "Diagnosed from", key: "diagnosed", number: true, of: (one) => last(one.diagnosed_part), title: "size, times the typical one, from which a diagnosis counts it as evidence" },
   { head: "In the genes", key: "explained", number: true, of: (one) => one.explained_percent, title: "part of its change that the genes imitate" },
   { head: "Most like", key: "like", of: (one) => -one.cosine, title: "sorted by likeness; 1 means no difference" },
 ];
 
 let plan = null;
-let sort = "told";
+let sort = "apart";
 let ascending = false;
 
 export function drawEffects(next) {
@@ -30,11 +30,11 @@ export function drawEffects(next) {
   $("plan-effects-part").hidden = !effects.length;
   if (!effects.length) return;
   $("plan-effects-note").textContent = `Seen: detected with a probability of ${significant(100 * power)} %, false alarms of all effects together ${significant(100 * alarm)} %. `
-    + `Told apart: its likelihood is ${significant(odds)} times that of the effect that it is most like. Left of the line at 1, an effect of typical size is enough.`;
+    + `Distinguished: its likelihood is ${significant(odds)} times that of the effect that it is most like. Left of the line at 1, an effect of typical size is enough.`;
   drawHead();
   drawRows();
   $("plan-confused-part").hidden = !confused.length;
-  $("plan-confused-title").textContent = `${plural(confused.length, "pair")} of effects that typical sizes do not tell apart`;
+  $("plan-confused-title").textContent = `${plural(confused.length, "pair")} of effects that typical sizes do not distinguish`;
   const titles = new Map(effects.map((one) => [one.name, one.title]));
   const link = (name) => el("a", { href: `#effects=${encodeURIComponent(name)}` }, titles.get(name) ?? spoken(name));
   $("plan-confused").tBodies[0].replaceChildren(...confused.map((pair) => el("tr", {}, el("td", {}, link(pair.one)), el("td", {}, link(pair.other)),
@@ -106,8 +106,8 @@ function ruler() {
 }
 
 function marks(one) {
-  const { smallest_part: seen, separable_part: told, diagnosed_part: diagnosed } = one;
-  const words = [seen === null ? "" : `seen from ${times(seen)}`, told === null ? "not told apart by its size" : `told apart from ${times(told)}`, diagnosed === null ? "" : `diagnosed from ${times(diagnosed)}`];
+  const { smallest_part: seen, separable_part: apart, diagnosed_part: diagnosed } = one;
+  const words = [seen === null ? "" : `seen from ${times(seen)}`, apart === null ? "not distinguished by its size" : `distinguished from ${times(apart)}`, diagnosed === null ? "" : `diagnosed from ${times(diagnosed)}`];
   const text = `${words.filter(Boolean).join(", ")} times the typical size`;
   const node = el("div", { className: "plan-sizes", role: "img", ariaLabel: text, title: text });
   const put = (className, value, until = null) => {
@@ -117,10 +117,10 @@ function marks(one) {
     node.append(mark);
   };
   put("typical", 1);
-  const known = [seen, told, diagnosed].filter((value) => value !== null);
+  const known = [seen, apart, diagnosed].filter((value) => value !== null);
   if (known.length > 1) put("line", Math.min(...known), Math.max(...known));
   if (diagnosed !== null) put(diagnosed > LARGEST ? "diagnosed beyond" : "diagnosed", diagnosed);
-  if (told !== null) put(told > LARGEST ? "told beyond" : "told", told);
+  if (apart !== null) put(apart > LARGEST ? "apart beyond" : "apart", apart);
   if (seen !== null) put(seen > LARGEST ? "seen beyond" : "seen", seen);
   return node;
 }

@@ -69,12 +69,12 @@ const run = () => runs.find(({ id }) => id === field("at").value) ?? null;
 // What depends on other fields, and what the folded settings differ in.
 function follow() {
   $("plan-suspects-part").hidden = field("compare").value !== "these";
-  for (const name of OF_MODEL) field(name).disabled = Boolean(run()); // the run has its model
-  const changed = STATED.filter((name) => shown(name) && !field(name).disabled && field(name).value !== (DEFAULTS[name] ?? (name === "preset" ? field(name).options[0]?.value ?? "" : "")))
+  for (const label of OF_MODEL.map((name) => field(name).closest("label"))) label.hidden = label.dataset.of !== dataset.kind || Boolean(run()); // the run has its model
+  const changed = STATED.filter((name) => shown(name) && field(name).value !== (DEFAULTS[name] ?? (name === "preset" ? field(name).options[0]?.value ?? "" : "")))
     .map((name) => `${caption(name)} ${field(name).value}`);
   const [chosen, fitted] = [ticked("recordings"), dataset.recordings.filter((one) => !one.held_out)];
   const count = chosen.length === fitted.length && fitted.every(({ name }) => chosen.includes(name)) ? null : plural(chosen.length, "recording");
-  const words = [count, ...changed].filter(Boolean);
+  const words = [run() ? "model of the run" : null, count, ...changed].filter(Boolean);
   $("plan-summary").textContent = words.length ? `Settings: ${words.join("; ")}` : "Settings: noise, beats, frames and recordings as they are";
 }
 
@@ -97,7 +97,7 @@ export async function values() {
   if (recordings.join("\n") !== usual.join("\n")) body.recordings = recordings.length ? recordings : [""];
   for (const name of ["add", ...STATED]) {
     const input = field(name);
-    if (!shown(name) || input.disabled) continue;
+    if (!shown(name)) continue;
     if (name === "axes") body.axes = input.value.split(" ");
     else if (input.tagName === "SELECT") body[name] = input.value;
     else if (input.validity.badInput) body[name] = NO_NUMBER;
@@ -118,7 +118,8 @@ export function showFaults(error, focus = true) {
   const rest = (error?.errors ?? []).filter((item) => !place(item, placed));
   showErrors(form(), $("plan-errors"), error && { message: error.message, errors: rest });
   for (const control of placed) control.setAttribute("aria-invalid", "true");
-  if (focus) placed[0]?.focus();
+  const first = [...form().elements].find((control) => placed.includes(control));
+  if (focus) first?.focus();
 }
 
 // Write ``item`` at its field, which is unfolded; false if it names none that is shown.
@@ -126,6 +127,11 @@ function place(item, placed) {
   const name = item.where.split(".").filter((one) => one !== "body" && !/^\d+$/.test(one))[0];
   const node = name ? form().querySelector(`[data-field="${CSS.escape(name)}"]`) : null;
   if (!node || node.closest("[hidden]")) return false;
+  const known = node.querySelector(".fault"); // of a list, an entry for each of its items
+  if (known) {
+    known.append(`; ${item.message}`);
+    return true;
+  }
   const control = node.querySelector("input, select");
   const note = el("small", { className: "fault", id: `plan-fault-${name}` }, item.message);
   node.append(note);

@@ -21,8 +21,12 @@ export function drawGenes(plan) {
       : el("th", { scope: "col", className }, title ? el("abbr", { title }, text) : text)))));
   $("plan-genes").tBodies[0].replaceChildren(...genes.map((gene) => row(gene, half, target)));
   $("plan-genes-note").textContent = `Thick: one standard error on either side; thin: 95 %. A gene is identified where the thick bar lies within the band of ±${significant(target)} %; else it is hollow.`
-    + (most > half ? ` An arrow: wider than ±${half} %.` : "") + (genes.some((gene) => !gene.beats_for_target) ? " A dash: no number of beats is enough, record something else." : "");
+    + (most > half ? ` An arrow: wider than ±${half} %.` : "") + (genes.some((gene) => !gene.beats_for_target) ? " A dash: no number of beats is enough, record something else." : "")
+    + (genes.some(otherwise) ? " Per cent of a weight refer to its share of the sum of its group, those of a gene near zero to a part of its range." : "");
 }
+
+// Whether the relative error is not simply the standard error over the value.
+const otherwise = ({ value, standard_error: error, relative_percent: relative }) => Math.abs(100 * error - relative * Math.abs(value)) > 0.05 * relative * Math.abs(value);
 
 // The next of 1, 2, 5 times a power of ten.
 function round(least) {

@@ -9,7 +9,7 @@ const SOURCES = { stated: "as stated", recordings: "as seen in the recordings", 
 export function counted({ effects, confused, power }) {
   const alike = new Set(confused.flatMap(({ one, other }) => [one, other]));
   const detected = effects.filter((one) => one.detection_probability >= power);
-  return { detected, told: detected.filter(({ name }) => !alike.has(name)), alike };
+  return { detected, apart: detected.filter(({ name }) => !alike.has(name)), alike };
 }
 
 export function words(plan) {
@@ -20,8 +20,8 @@ export function words(plan) {
     ? `These recordings identify ${known.length} of ${plural(genes.length, "gene")}; not ${vague.join(", ")}.`
     : `These recordings identify ${genes.length === 1 ? "the gene" : `all ${genes.length} genes`}.`];
   if (effects.length) {
-    const { detected, told } = counted(plan);
-    parts.push(`Of ${plural(effects.length, "effect")} of typical size, ${detected.length} will be detected, and ${told.length} told apart from all others.`);
+    const { detected, apart } = counted(plan);
+    parts.push(`Of ${plural(effects.length, "effect")} of typical size, ${detected.length} will be detected, and ${apart.length} distinguished from all others.`);
   }
   if (proposals.length) {
     const { words: first, standard_error_factor: factor } = proposals[0];
@@ -32,12 +32,12 @@ export function words(plan) {
 
 export function drawHead(plan) {
   const { genes, effects, noise, recordings, seconds, beats, frames, markers, kind } = plan;
-  const { detected, told } = counted(plan);
+  const { detected, apart } = counted(plan);
   const every = genes.filter((gene) => gene.identified).length;
   $("plan-sentence").textContent = words(plan);
   const cells = [keyNumber("genes identified", `${every} of ${genes.length}`, "", true)];
   if (effects.length) {
-    cells.push(keyNumber("effects detected", `${detected.length} of ${effects.length}`, "", true), keyNumber("told apart from all others", `${told.length} of ${effects.length}`, "", true));
+    cells.push(keyNumber("effects detected", `${detected.length} of ${effects.length}`, "", true), keyNumber("distinguished from all others", `${apart.length} of ${effects.length}`, "", true));
   }
   const per = kind === "forces" ? "samples" : "frames";
   cells.push(keyNumber(`${significant(beats, 3)} beats of ${significant(frames, 3)} ${per}${markers ? `, ${plural(markers, "marker")}` : ""}; ${significant(seconds, 3)} s of flapping`, String(recordings.length), recordings.length === 1 ? "recording" : "recordings"));

@@ -49,7 +49,7 @@ export async function showPlan(next) {
   }
   if (dataset !== next) return;
   const counted = next.recordings.filter((one) => !one.held_out).length;
-  $("plan-about").textContent = `What recordings like these will show: how well each gene will be known, which effects will be told apart, what to record next. The ${plural(counted, "recording")} to fit ${counted === 1 ? "is" : "are"} counted, with the noise seen in ${counted === 1 ? "it" : "them"}: after more data, plan again. Nothing is stored.`;
+  $("plan-about").textContent = `What recordings like these will show: how well each gene will be known, which effects will be distinguished, what to record next. The ${plural(counted, "recording")} to fit ${counted === 1 ? "is" : "are"} counted, with the noise seen in ${counted === 1 ? "it" : "them"}: after more data, plan again. Nothing is stored.`;
   show();
   await showForm(next);
   const { stop = null, failure = null } = plans.get(next.id) ?? {};
@@ -61,7 +61,7 @@ function showCommand({ id }) {
   ready = null;
   $("plan-part").replaceChildren(
     el("h3", { id: "plan-title", tabIndex: -1 }, "Plan"),
-    el("p", { className: "quiet" }, "What recordings like these will show: how well each gene will be known, which effects will be told apart, what to record next. Your machine simulates the rig: download the dataset, and plan there."),
+    el("p", { className: "quiet" }, "What recordings like these will show: how well each gene will be known, which effects will be distinguished, what to record next. Your machine simulates the rig: download the dataset, and plan there."),
     copyable(`${command(`wingfit datasets download ${id} -o ${id}.zip`)} && wingfit plan ${id}.zip --rig my_rig.py`, "commands that plan with a rig of your own"));
 }
 

@@ -64,6 +64,10 @@ def closed(seen: Seen) -> None:
     seen.page.context.close()
 
 
+def body_of(route: Route) -> dict[str, Any]:
+    return dict(route.request.post_data_json or {})
+
+
 def answered(route: Route, status: int, body: dict[str, Any]) -> None:
     route.fulfill(status=status, content_type="application/json", body=json.dumps(body))
 
@@ -89,7 +93,7 @@ def test_a_plan_is_asked_for_and_drawn(browser: Browser, api: Api, dataset: dict
     with seen.page.expect_response("**/plan") as found_out:
         seen.page.click("#plan-start")
     seen.wait(DONE)
-    plan, sent = found_out.value.json(), found_out.value.request.post_data_json
+    plan, sent = found_out.value.json(), dict(found_out.value.request.post_data_json or {})
     defaults = {"target_percent": 7.5, "power": 0.9, "axes": ["x"], "preset": "proposed"}
     assert (
         sent | {"suspects": sorted(sent["suspects"])} == {"suspects": sorted(FEW), "add": 1, "beats": BEATS} | defaults
@@ -124,7 +128,7 @@ def _check_genes(seen: Seen, plan: dict[str, Any]) -> None:
 
 
 def _check_effects(seen: Seen, plan: dict[str, Any]) -> None:
-    """One row for each, worst told apart first; sorted by another column on request."""
+    """One row for each, least distinguished first; sorted by another column on request."""
     titles = {one["name"]: one["title"] for one in plan["effects"]}
     alike = {titles[name] for pair in plan["confused"] for name in (pair["one"], pair["other"])}
     assert titles["scale_error"] in alike, "a scale and a unit look the same"
@@ -246,13 +250,15 @@ def test_a_finished_run_gives_its_genes(
     sent: list[dict[str, Any]] = []
 
     def planned(route: Route) -> None:
-        sent.append(route.request.post_data_json)
+        sent.append(body_of(route))
         answered(route, 200, plan)
 
     seen.page.route("**/plan", planned)
     seen.show(f"dataset={dataset['id']}")
     seen.wait(f"{READY} && document.querySelector('#plan-form select[name=at]').value === 'run_1'")
-    assert seen.page.evaluate("document.querySelector('#plan-form select[name=preset]').disabled")
+    seen.page.click("#plan-summary")
+    assert not seen.page.is_visible("#plan-form select[name=preset]")
+    assert seen.page.inner_text("#plan-summary") == "Settings: model of the run"
     seen.page.click("#plan-start")
     seen.wait(DONE)
     assert sent[-1]["genome"] == {"C_l": 1.3, "stroke_bias.angle": 0.01}
@@ -286,7 +292,7 @@ def test_a_wing_is_planned_and_series_are_where_their_rig_is(browser: Browser, a
     with seen.page.expect_response("**/plan") as found_out:
         seen.page.click("#plan-start")
     seen.wait(DONE)
-    sent = found_out.value.request.post_data_json
+    sent = dict(found_out.value.request.post_data_json or {})
     assert (sent["suspects"], sent["recordings"]) == (None, [wing["recordings"][0]["name"]])
     assert len(seen.rows("plan-genes")) == 18
     assert not seen.page.is_visible("#plan-effects-part")
@@ -316,11 +322,11 @@ def _check_long(seen: Seen, of_genes: dict[str, Any]) -> None:
         box.check()
     seen.page.click("#plan-start")
     seen.wait("document.getElementById('plan-status').textContent.includes('Computing')")
-    assert waiting[0].request.post_data_json["suspects"] is None
+    assert body_of(waiting[0])["suspects"] is None
     genes = [gene | {"relative_percent": 33.0} for gene in of_genes["genes"]]
     answered(waiting[0], 200, of_genes | {"genes": genes})
     seen.wait("document.getElementById('plan-status').textContent.includes('the effects follow')")
-    assert waiting[1].request.post_data_json["suspects"] == []
+    assert body_of(waiting[1])["suspects"] == []
     seen.page.click("#plan-cancel")
     seen.wait(DONE)
     assert seen.page.inner_text("#toast") == "The plan was cancelled; what is shown has no effects"

@@ -19,8 +19,11 @@ from tests.service.shapes import valid
 from wingfit.calibration.search import CalibrationSpec, resolved
 from wingfit.client.force_answers import ForceSimulation, Models
 from wingfit.client.planning.answers import Plan
+from wingfit.planning import PlanSpec
 from wingfit.records import LowPass, Recording
 from wingfit.service.app import create_app
+from wingfit.service.http.problems import ProblemError
+from wingfit.service.planning.routes import planned
 from wingfit.service.runs.requests import Preset
 from wingfit.service.runs.spec_views import run_name
 from wingfit.service.settings import Settings
@@ -230,6 +233,19 @@ def test_plans_that_cannot_be_made_are_refused(api: Api, dataset: Json, body: Js
     (error,) = answer.json()["errors"]
     assert error["where"] == where
     assert words in f"{error['message']} {error['value']}"
+
+
+def test_a_plan_ends_within_a_simulation_once_nobody_waits_for_it() -> None:
+    looks: list[int] = []
+
+    def gone() -> bool:
+        looks.append(len(looks))
+        return len(looks) > 5
+
+    with pytest.raises(ProblemError, match="the client has hung up") as raised:
+        planned(force_data.dataset(), PlanSpec(), gone)
+    assert raised.value.status == 503
+    assert len(looks) < 20, "no further simulation is begun"
 
 
 def test_a_plan_of_an_unknown_dataset_is_refused(api: Api) -> None:
