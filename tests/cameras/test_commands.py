@@ -179,6 +179,22 @@ def test_what_cannot_be_written_is_named(film: Path) -> None:
     assert (code, "cannot be written (Not a directory): free the disk, or choose" in err) == (1, True), err
 
 
+def test_images_of_one_camera_are_not_those_of_another() -> None:
+    for folder, content in (("a", b"one"), ("b", b"other"), ("copy", b"one")):
+        Path(folder).mkdir()
+        (Path(folder) / "1.png").write_bytes(content)
+    Path("hidden").mkdir()
+    Path("hidden/._1.png").write_bytes(b"beside an image")
+    for words, expected in (
+        (["left=a", "left=b"], "camera 'left' is given twice"),
+        (["left=a", "right=copy"], "'right' has the images of 'left', or copies of"),
+        (["left=a", "right=hidden"], "hidden holds no images"),
+        (["left=a", "right=b"], "this is no image that OpenCV reads"),
+    ):
+        code, _, err = wingfit("cameras", "boards", *words, "--board", "9x6", "--square-mm", "25")
+        assert (code > 0, expected in " ".join(err.replace("│", "").split())) == (True, True), err
+
+
 def test_cameras_of_another_program_are_converted() -> None:
     rows = []
     for camera in cameras():

@@ -14,6 +14,7 @@ import pytest
 from tests.service import toy
 from tests.service.conftest import As
 from tests.service.films.films import ended, submitted, uploaded, write_videos
+from tests.tracking.alignment.recorded import ROBIRD
 from wingfit.service.settings import Settings
 
 ADMINISTRATION = re.compile(r"/v1/(?:keys|backup)(?:/|$)")
@@ -63,6 +64,17 @@ def test_every_call_with_an_id_is_closed_to_other_owners(as_: As, calls: list[Ca
         assert answer.json()["type"] == "urn:wingfit:problem:not-found"
         tried += 1
     assert tried >= 33
+    named = {"tracking_id": tracking, "name": "run", "rig": "vacuum_chamber", "flap_frequency_hz": 3.0}
+    named |= {"phase_lag_deg": 0.0, "pressure_mbar": 10.0, "temperature_c": 20.0}
+    wing = (ROBIRD / "dataset.yaml").read_text()
+    for path, sent, where in (
+        ("/v1/trackings", {"film_id": film, "kind": "dot", "light": "continuous"}, "body.film_id"),
+        ("/v1/trackings/dataset", {"name": "films", "description": wing, "recordings": [named]}, "body.recordings.0"),
+    ):
+        answer = bob.client.post(path, json=sent)
+        assert answer.status_code == 422, answer.text
+        assert answer.json()["errors"][0]["where"].startswith(where)
+        assert "there is no such" in answer.json()["errors"][0]["message"]
     assert ended(ann, tracking)["state"] == "SUCCEEDED"
     assert ann.diagnosis(diagnosis)["state"] == ann.run(run)["state"] == "SUCCEEDED"
 
