@@ -10,6 +10,7 @@ from wingfit.service.units import MM
 
 Json = dict[str, Any]
 SHOWN = 12
+SHOWN_ADVICE = 3
 NOMINAL = "nominal model alone"
 
 
@@ -33,8 +34,8 @@ def print_finding(finding: Json) -> None:
     for key, label in (("law", "free-form law of the residual"), ("proof", "held-out recordings")):
         if finding[key]:
             say(f"{label}: {finding[key]['words']}")
-    if finding["advice"]:
-        say(f"next recording: {finding['advice'][0]['words']}")
+    for rank, one in enumerate(finding["advice"][:SHOWN_ADVICE]):
+        say(f"{'or' if rank else 'next recording'}: {one['words']}")
     remarks(finding["remarks"])
 
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal
 
+from wingfit.diagnosis.advice.advised import Advice
 from wingfit.diagnosis.evidence.fitted_model import FittedModel
 from wingfit.records.array_types import Array, Float
 from wingfit.records.dataset import AnyKind
@@ -276,35 +277,6 @@ class FreeLaw:
     words: str
     terms: tuple[Term, ...]
     explained: float
-
-
-@dataclass(frozen=True)
-class AdvisedCondition:
-    """A condition of a flapping rig to record; ``airspeed`` in m/s."""
-
-    flap_frequency_hz: float
-    phase_lag_deg: float
-    pressure_mbar: float
-    airspeed: float
-    angle_of_attack_deg: float
-
-
-@dataclass(frozen=True)
-class Advice:
-    """What to record next, because predictions of the hypotheses ``between`` differ there.
-
-    ``separation``: root mean square difference of the predictions in standard deviations of the noise; ``resolves``:
-    estimated probability that the recording decides between the hypotheses. Of a flapping rig the ``condition`` is
-    given; of any other the ``recording`` that is made again, and the ``change``. The rest is None.
-    """
-
-    words: str
-    separation: float
-    resolves: float
-    between: tuple[str, ...]
-    condition: AdvisedCondition | None = None
-    recording: str | None = None
-    change: str | None = None
 
 
 @dataclass(frozen=True)

@@ -9,14 +9,14 @@ import numpy as np
 
 from wingfit.calibration.evaluator import Evaluator
 from wingfit.diagnosis.subject import select_suspects
+from wingfit.inference.campaign.responses import Response
+from wingfit.inference.campaign.sampling import Sampling, spread_markers, typical_sampling
 from wingfit.inference.design import Information
 from wingfit.planning.additions import Additions, Option, pairs_to_separate
 from wingfit.planning.effects import FALSE_ALARM, ODDS, Contrasts, Evidence, confused_pairs, planned_effects
 from wingfit.planning.genes import GeneErrors, planned_genes
 from wingfit.planning.outcome import ConfusedPair, Plan, Proposal, Variant
-from wingfit.planning.responses import Response
 from wingfit.planning.rigs import BeatRig, PlannedRig, Said, SeriesRig
-from wingfit.planning.sampling import Sampling, spread_markers, typical_sampling
 from wingfit.planning.simulated import Columns, columns_of
 from wingfit.planning.spec import PlanSpec
 from wingfit.records import AnyRecording, Dataset, Recording, SeriesDataset, Wing

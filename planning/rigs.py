@@ -12,18 +12,25 @@ from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.preparation import fitted_through, prepare_rig, searched_genes
 from wingfit.calibration.problem import base_genome
 from wingfit.calibration.spec import CalibrationSpec
+from wingfit.diagnosis.advice.series_candidates import Candidate as SeriesCandidate
+from wingfit.diagnosis.advice.series_candidates import candidates as series_candidates
 from wingfit.diagnosis.candidate_conditions import candidate_conditions, settings_beyond
 from wingfit.diagnosis.rig_subject import RigSubject
 from wingfit.diagnosis.rigs import subject_of
-from wingfit.diagnosis.verdict.next_series import Candidate as SeriesCandidate
-from wingfit.diagnosis.verdict.next_series import candidates as series_candidates
+from wingfit.inference.campaign.noise_level import NoiseLevel
+from wingfit.inference.campaign.responses import Response, kept_channels
+from wingfit.inference.campaign.sampling import (
+    Sampling,
+    blank_on_grid,
+    seen_sampling,
+    spread_markers,
+    typical_sampling,
+)
 from wingfit.inference.design import Information
 from wingfit.inference.noise.series import SeriesNoise, cosine_transform, noise_of
 from wingfit.planning.description import is_described
-from wingfit.planning.noise import NoiseLevel, noise_for
+from wingfit.planning.noise import noise_for
 from wingfit.planning.outcome import PlannedNoise
-from wingfit.planning.responses import Response, kept_channels
-from wingfit.planning.sampling import Sampling, blank_on_grid, sampling_of, spread_markers, typical_sampling
 from wingfit.planning.simulated import Simulator
 from wingfit.planning.spec import PlanSpec
 from wingfit.records import AnyRecording, Condition, Dataset, Recording, Series, SeriesDataset, Wing
@@ -113,7 +120,7 @@ class BeatRig:
         subject = subject_of(dataset, calibration)
         free = searched_genes(calibration, subject.model)
         fitted = dataset.select(calibration.recordings) if calibration.recordings else dataset.fitted
-        samplings = tuple(sampling_of(one, spec) for one in fitted)
+        samplings = tuple(_sampling(one, spec) for one in fitted)
         usual = typical_sampling(samplings)
         level = noise_for(dataset, fitted, spec)
         planned = tuple(
@@ -249,6 +256,12 @@ def _new(found: Iterable[SeriesCandidate]) -> list[SeriesCandidate]:
 
 def _axes(dataset: Dataset) -> tuple[str, ...]:
     return tuple(axis for axis in ("x", "z") if all(axis in one.forces for one in dataset.recordings))
+
+
+def _sampling(recording: Recording, spec: PlanSpec) -> Sampling:
+    """Return how ``recording`` was sampled, with the numbers that ``spec`` states."""
+    found = seen_sampling(recording)
+    return Sampling(float(spec.beats or found.beats), float(spec.frames or found.frames))
 
 
 def _markers(wing: Wing | None, recording: Recording, spec: PlanSpec) -> tuple[str, ...]:

@@ -24,7 +24,7 @@ from wingfit.inference.noise.mean_beat import fourier_basis
 from wingfit.planning import PlanSpec
 from wingfit.planning.effects import FALSE_ALARM, ODDS, Contrasts
 from wingfit.planning.make import Making
-from wingfit.planning.noise import NoiseLevel, noise_for
+from wingfit.planning.noise import noise_for
 from wingfit.planning.rigs import BeatRig
 from wingfit.records import Dataset, Gene, Recording, Vehicle
 from wingfit.records.array_types import Array

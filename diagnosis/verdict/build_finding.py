@@ -7,12 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 
+from wingfit.diagnosis.advice.advise import advise
+from wingfit.diagnosis.advice.advised import Advice
 from wingfit.diagnosis.evidence.fit import with_measured_jacobian
 from wingfit.diagnosis.evidence.intervals import gene_values
 from wingfit.diagnosis.evidence.nominal import Nominal
 from wingfit.diagnosis.evidence.refit import Refit
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
-from wingfit.diagnosis.finding import Advice, Finding, Floors, GeneValue, Proof, RecordingMisfit, amount
+from wingfit.diagnosis.finding import CONFIDENT, Finding, Floors, GeneValue, Proof, RecordingMisfit, amount
 from wingfit.diagnosis.location.in_series import channel_misfits, series_location, series_overlays
 from wingfit.diagnosis.location.located import Located
 from wingfit.diagnosis.location.series_law import series_law
@@ -22,8 +24,6 @@ from wingfit.diagnosis.subject import Subject
 from wingfit.diagnosis.verdict.fitted_models import fitted_models
 from wingfit.diagnosis.verdict.held_out import held_out_refutes
 from wingfit.diagnosis.verdict.locate_in_beat import locate_in_beat
-from wingfit.diagnosis.verdict.next_experiment import rank_conditions, separations
-from wingfit.diagnosis.verdict.next_series import Candidate, rank_recordings, series_separations
 from wingfit.diagnosis.verdict.noise_remarks import drift_sentence, marker_remarks, noise_remarks
 from wingfit.diagnosis.verdict.proof import (
     ResidualPair,
@@ -46,7 +46,7 @@ from wingfit.diagnosis.verdict.reservations import (
 from wingfit.diagnosis.verdict.series_remarks import series_remarks
 from wingfit.diagnosis.verdict.verdict import Decision, decide, hypotheses, summary
 from wingfit.diagnosis.verdict.weigh_hypotheses import explains_drift
-from wingfit.records import AnyRecording, Condition
+from wingfit.records import AnyRecording
 
 Step = tuple[float, str, Finding | None]
 
@@ -80,27 +80,13 @@ def build_finding(state: SearchState, name: str, held_out: Sequence[AnyRecording
     if located is None:
         raise ValueError("the misfit was not located")
     advice: tuple[Advice, ...] = ()
-    if decision.verdict != "adequate":
-        for part, ranked in _advice(state):
+    if decision.verdict != "adequate" or decision.probabilities["adequate"] < CONFIDENT:
+        rest = decision.verdict == "partly named"
+        for part, ranked in advise(state.context, state.final_weights, floor, rest=rest):
             advice = ranked
             yield 0.75 + 0.2 * part, "comparing what to record next", None
     finding = _finding(state, name, decision, best, own, validation, advice, located, refuted=refuted)
     yield 1.0, "done", replace(finding, remarks=(*finding.remarks, *failed))
-
-
-def _advice(state: SearchState) -> Iterator[tuple[float, tuple[Advice, ...]]]:
-    """Compare what could be recorded next; yields the fraction done and the advice so far."""
-    context, weights = state.context, state.final_weights
-    if state.data.kind == "series":
-        tried = list[tuple[float, Candidate]]()
-        for part, candidate in series_separations(context, weights):
-            tried += [candidate] if candidate else []
-            yield part, rank_recordings(context, weights, tried)
-        return
-    apart = list[tuple[float, Condition]]()
-    for part, condition in separations(context, weights):
-        apart += [condition] if condition else []
-        yield part, rank_conditions(state.data, weights, apart)
 
 
 def _locate(

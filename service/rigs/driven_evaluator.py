@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from wingfit.calibration.problem import Misfit, Problem
-from wingfit.diagnosis.verdict.next_series import STEPS
+from wingfit.diagnosis.advice.series_candidates import STEPS
 from wingfit.records import Gene, Series
 from wingfit.records.array_types import ArrayLike
 from wingfit.rigs.rig_model import RigModel, Simulated, observation
@@ -103,7 +103,7 @@ class _DrivenUnit:
 def _changes(recording: Series, model: RigModel) -> tuple[dict[str, float], dict[str, float]]:
     """Return in which settings and by which factors of inputs ``recording`` differs from that of the same name.
 
-    Factors are multiples of 1 / STEPS (:func:`wingfit.diagnosis.verdict.next_series.candidates`).
+    Factors are multiples of 1 / STEPS (:func:`wingfit.diagnosis.advice.series_candidates.candidates`).
     """
     (recorded,) = [one for one in model.all_recordings if one.name == recording.name]
     settings = {name: value for name, value in recording.settings.items() if value != recorded.settings[name]}

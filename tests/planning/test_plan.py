@@ -11,7 +11,7 @@ import pytest
 
 import wingfit
 from wingfit import CalibrationSpec, Channel, Gene, PlanSpec, Quantity, Rig, Run, Series, SeriesDataset
-from wingfit.planning.responses import coefficients
+from wingfit.inference.campaign.responses import coefficients
 from wingfit.records import Dataset
 
 EXAMPLES = Path(__file__).parents[2] / "examples"

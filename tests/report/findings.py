@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+from wingfit.diagnosis.advice.advised import Advice, AdvisedCondition
 from wingfit.diagnosis.finding import (
-    Advice,
-    AdvisedCondition,
     Exponent,
     Finding,
     Floors,

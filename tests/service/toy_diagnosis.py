@@ -15,9 +15,8 @@ import numpy as np
 from tests.service.toy import UNLUCKY
 from wingfit import report
 from wingfit.calibration.evaluator import Evaluator
+from wingfit.diagnosis.advice.advised import Advice, AdvisedCondition
 from wingfit.diagnosis.finding import (
-    Advice,
-    AdvisedCondition,
     Exponent,
     Finding,
     Floors,

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wingfit.inference.campaign.noise_level import NoiseLevel
+from wingfit.inference.campaign.sampling import Sampling
 from wingfit.inference.design import Information
-from wingfit.planning.noise import NoiseLevel
-from wingfit.planning.sampling import Sampling
 from wingfit.records import Recording, Wing
 from wingfit.records.array_types import Array, Bool, Float, Mask
 from wingfit.sim.wing.alignment import REFERENCE_HARMONICS, recorded_crossing

@@ -1,4 +1,4 @@
-"""How a planned recording is sampled, and the grid of instants on which a plan simulates it."""
+"""How a new recording is sampled, and the grid of instants on which it is simulated before it is made."""
 
 from __future__ import annotations
 
@@ -7,8 +7,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wingfit.planning.description import is_described
-from wingfit.planning.spec import PlanSpec
 from wingfit.records import Condition, Recording, Wing
 from wingfit.records.dataset import ForceAxis
 
@@ -32,20 +30,18 @@ class Sampling:
         return self.beats * self.frames
 
 
-def sampling_of(recording: Recording, spec: PlanSpec) -> Sampling:
-    """Return how ``recording`` was sampled, with the numbers that ``spec`` states; the default if it has no values.
+def seen_sampling(recording: Recording) -> Sampling:
+    """Return how ``recording`` was sampled; the default if it has no values.
 
     Under a strobe, beats are the apparent ones: successive frames show nearly the same phase of different beats.
     """
-    if is_described(recording) or len(recording.times) < 2:
-        found = Sampling(BEATS[recording.kind], FRAMES[recording.kind])
-    else:
-        step = float(np.median(np.diff(recording.times))) * recording.condition.flap_frequency
-        advance = abs(step - round(step)) if recording.kind == "tracks" else step
-        frames = 1.0 / advance if advance > 0.0 else FRAMES[recording.kind]
-        part = float(recording.valid.any(axis=0).sum()) or 1.0
-        found = Sampling(float(recording.valid.sum()) / part / frames, frames)
-    return Sampling(float(spec.beats or found.beats), float(spec.frames or found.frames))
+    if not recording.valid.any() or len(recording.times) < 2:
+        return Sampling(BEATS[recording.kind], FRAMES[recording.kind])
+    step = float(np.median(np.diff(recording.times))) * recording.condition.flap_frequency
+    advance = abs(step - round(step)) if recording.kind == "tracks" else step
+    frames = 1.0 / advance if advance > 0.0 else FRAMES[recording.kind]
+    part = float(recording.valid.any(axis=0).sum()) or 1.0
+    return Sampling(float(recording.valid.sum()) / part / frames, frames)
 
 
 def typical_sampling(samplings: Sequence[Sampling]) -> Sampling:
@@ -57,7 +53,7 @@ def typical_sampling(samplings: Sequence[Sampling]) -> Sampling:
 def blank_on_grid(
     like: Recording, condition: Condition, name: str, sampling: Sampling, markers: tuple[str, ...]
 ) -> Recording:
-    """Return a recording under ``condition`` on the grid of a plan, without values; all else is that of ``like``."""
+    """Return a recording under ``condition`` on a grid of equal steps, without values; all else is that of ``like``."""
     frames = int(min(max(round(sampling.frames), LEAST_GRID), GRID_FRAMES[like.kind]))
     times = np.arange(GRID_BEATS * frames) / (frames * condition.flap_frequency)
     forces: tuple[ForceAxis, ...] = ("x", "z") if like.kind == "forces" else ()

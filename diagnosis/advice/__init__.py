@@ -1,0 +1,1 @@
+"""What to record next: proposals, what they cost, and how probably they settle which hypothesis is right."""
