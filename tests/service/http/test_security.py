@@ -104,7 +104,7 @@ def test_nothing_answers_that_is_not_described(client: httpx.Client) -> None:
     ):
         assert path not in described
         assert client.get(path).status_code == 404, path
-    styles = {f"{part}style.css" for part in ("", "dataset/", "films/", "importing/", "lists/")}
+    styles = {f"{part}style.css" for part in ("", "dataset/", "films/", "importing/", "lists/", "planning/")}
     assert linked <= {"icon.svg", "app.js", "docs"} | styles
     assert all(path.startswith("/v1/") for path in described)
 
