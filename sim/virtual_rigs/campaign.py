@@ -29,7 +29,7 @@ from wingfit.records import (
     Station,
     Wing,
 )
-from wingfit.records.array_types import Array, Mask
+from wingfit.records.array_types import Array, Float, Mask
 from wingfit.records.blas_threads import one_blas_thread
 from wingfit.records.dataset import Rig
 from wingfit.sim.solver.numerics import Numerics
@@ -182,17 +182,28 @@ def record(
     beat = model.beat(genome.values, blank)
     if beat.reason:
         raise ValueError(f"the true wing fails under {name_of(condition)}: {beat.reason}")
+    return film(model.wing, condition, beat.tracks, tracking, rng)
+
+
+def film(
+    wing: Wing, condition: Condition, beat: Float[Array, "n M 3"], tracking: Tracking, rng: np.random.Generator
+) -> Recording:
+    """Return the tracks that cameras record of a periodic motion, with noise and gaps.
+
+    ``beat`` [n, M, 3] (m): positions of the M markers of ``wing`` at n equal steps of a beat.
+    """
     frames = (FRAMES_PER_BEAT + 1) * tracking.beats
     strobe = condition.flap_frequency * (FRAMES_PER_BEAT + 1) / FRAMES_PER_BEAT
     times = np.arange(frames) / strobe
     trigger = rng.uniform(0.0, 1.0)
-    tracks = _sample(beat.tracks, condition.flap_frequency * times + trigger)
+    tracks = _sample(beat, condition.flap_frequency * times + trigger)
     tracks = np.round(tracks + _noise(tracks.shape, tracking, rng), 5)
     tracks[_gaps(tracks.shape[:2], tracking, rng)] = np.nan
-    names = [m.name for m in model.wing.markers]
+    names = [m.name for m in wing.markers]
     visible = np.sort(rng.permutation(len(names))[: len(names) - LOST_MARKERS])
     seen, values = tuple(names[k] for k in visible), tracks[:, visible].reshape(frames, -1)
-    return Recording(name_of(condition), blank.rig, condition, np.round(times, 7), seen, values)
+    rig = blank_recording(wing, condition).rig
+    return Recording(name_of(condition), rig, condition, np.round(times, 7), seen, values)
 
 
 def _sample(tracks: Array, beats: Array) -> Array:
