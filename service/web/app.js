@@ -60,9 +60,9 @@ function drawLists() {
   if (atHome) drawHome(atHome, { ...starting, onDelete: async (dataset) => (await remove("datasets", dataset.id, dataset.name)) && poll() });
 }
 
-// What could not be fetched meanwhile is fetched when the server is back.
+// What could not be fetched meanwhile is fetched when the server is back; pages with forms keep what was typed.
 function setAway(away) {
-  if (!away && takeMissed()) route();
+  if (!away && takeMissed() && !["import", ...FILM_PAGES].includes(pageOf(parameters()))) route();
   $("away").hidden = !away;
   $("away").textContent = away ? "The server does not answer. The page may be out of date; it continues when the server is back." : "";
 }

@@ -152,7 +152,12 @@ def test_a_header_of_100_000_columns_is_refused_before_its_names_are_compared() 
 
 def test_many_wrong_names_of_columns_are_compared_until_the_report_is_full(monkeypatch: pytest.MonkeyPatch) -> None:
     compared: list[str] = []
-    monkeypatch.setattr("wingfit.records.files.tracks.nearest", lambda name, _: compared.append(name) or "known: m1")
+
+    def nearest(name: str, _: object) -> str:
+        compared.append(name)
+        return "known: m1"
+
+    monkeypatch.setattr("wingfit.records.files.tracks.nearest", nearest)
     header = ",".join(["time_s", *(f"n{k}_x_m" for k in range(2000))])
     with pytest.raises(DatasetError):
         read_tracks(f"{header}\n".encode(), "f.csv", ["m1"])

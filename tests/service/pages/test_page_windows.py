@@ -70,8 +70,8 @@ def test_what_is_deleted_in_another_window_is_not_shown_any_more(seen: Seen, api
     run = finished(api, "to delete")
     seen.open(run["id"])
     seen.wait("!document.getElementById('run').hidden")
-    api.client.delete(f"/v1/runs/{run['id']}")
     seen.page.click("#run [data-action=delete]")
+    assert api.client.delete(f"/v1/runs/{run['id']}").status_code == 204
     seen.page.click("#confirm-yes")
     seen.wait(f"{TEXT.format('toast')} === 'to delete was deleted already'")
     seen.wait("location.hash === ''")
