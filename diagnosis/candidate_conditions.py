@@ -8,7 +8,7 @@ from itertools import pairwise, product
 
 import numpy as np
 
-from wingfit.records import Condition, Recording
+from wingfit.records import Condition, Recording, RigLimits
 from wingfit.records.array_types import Array
 
 MAX_BETWEEN = 32  # candidates within the recorded range
@@ -20,28 +20,30 @@ TILT = np.radians(20.0)  # of the least and of the largest angle of attack
 AMBIENT_PA = 101_325.0  # an open chamber
 
 
-def candidate_conditions(recordings: Sequence[Recording]) -> tuple[Condition, ...]:
+def candidate_conditions(recordings: Sequence[Recording], limits: RigLimits | None = None) -> tuple[Condition, ...]:
     """Return conditions that the rigs of ``recordings`` did not run, at most MAX_BETWEEN + MAX_BEYOND, far apart.
 
     The first are combinations of the flap frequencies and phase lags of a rig, and their midpoints, with every air
     stream (pressure, airspeed, angle of attack). The others go beyond what was recorded: a slower beat, less and more
-    wind, another angle of attack, and a chamber at ambient pressure; the user knows whether the rig allows them. None
-    in free flight, where the vehicle and not the experimenter chooses the combinations.
+    wind, another angle of attack, and a chamber at ambient pressure; the user knows whether the rig allows them. Where
+    ``limits`` of the rig are stated, they go up to these instead, and no condition is outside. None in free flight,
+    where the vehicle and not the experimenter chooses the combinations.
     """
+    stated = limits or RigLimits()
     recorded = [one.condition for one in recordings]
     between, beyond = list[Condition](), list[Condition]()
     for rig in dict.fromkeys(one.rig for one in recordings if one.rig != "free_flight"):
         ran = [one.condition for one in recordings if one.rig == rig]
-        between += _combinations(ran)
-        beyond += [one for one in _beyond(ran) if settings_beyond(one, ran)]
+        between += [one for one in _combinations(ran) if stated.allow(one)]
+        beyond += [one for one in _beyond(ran, stated) if settings_beyond(one, ran) and stated.allow(one)]
     near = list(_farthest_first(between, recorded, MAX_BETWEEN))
     return (*near, *_farthest_first(beyond, [*recorded, *near], MAX_BEYOND, ran=recorded))
 
 
 def settings_beyond(condition: Condition, recorded: Sequence[Condition]) -> tuple[str, ...]:
     """Return the settings of ``condition`` that lie outside of the range of all that were ``recorded``, in words."""
-    names = {"flap frequency": "flap_frequency", "pressure": "pressure", "airspeed": "airspeed",
-             "angle of attack": "angle_of_attack"}  # fmt: skip
+    names = {"flap frequency": "flap_frequency", "phase lag": "phase_lag", "pressure": "pressure",
+             "airspeed": "airspeed", "angle of attack": "angle_of_attack"}  # fmt: skip
     found = list[str]()
     for words, name in names.items():
         ran, own = [getattr(one, name) for one in recorded], getattr(condition, name)
@@ -51,27 +53,31 @@ def settings_beyond(condition: Condition, recorded: Sequence[Condition]) -> tupl
     return tuple(found)
 
 
-def _beyond(ran: Sequence[Condition]) -> Iterator[Condition]:
+def _beyond(ran: Sequence[Condition], limits: RigLimits) -> Iterator[Condition]:
     """Yield conditions outside of those that a rig ``ran``, combined with its frequencies and lags."""
     frequencies, lags = (_levels([getattr(c, name) for c in ran]) for name in ("flap_frequency", "phase_lag"))
-    slower, streams = SLOWER * frequencies[0], list(_streams_beyond(ran))
-    for lag in lags:
-        for stream in _streams(ran):
-            yield replace(stream, flap_frequency=slower, phase_lag=lag)
-        for f, stream in product((slower, *frequencies), streams):
+    others, streams = limits.flap_frequency or (SLOWER * frequencies[0],), list(_streams_beyond(ran, limits))
+    for lag in dict.fromkeys((*lags, *(limits.phase_lag or ()))):
+        for f, stream in product(others, _streams(ran)):
+            yield replace(stream, flap_frequency=f, phase_lag=lag)
+        for f, stream in product((*others, *frequencies), streams):
             yield replace(stream, flap_frequency=f, phase_lag=lag)
 
 
-def _streams_beyond(ran: Sequence[Condition]) -> Iterator[Condition]:
+def _streams_beyond(ran: Sequence[Condition], limits: RigLimits) -> Iterator[Condition]:
     """Yield air streams outside of those in ``ran``."""
     blown, still = [c for c in ran if c.airspeed > 0], [c for c in ran if c.airspeed == 0]
     if blown:
         speeds, angles = ([getattr(c, name) for c in blown] for name in ("airspeed", "angle_of_attack"))
-        low, high = WIND[0] * min(speeds), WIND[1] * max(speeds)
-        least, most = max(min(angles) - TILT, -np.pi / 2), min(max(angles) + TILT, np.pi / 2)
+        low, high = limits.airspeed or (WIND[0] * min(speeds), WIND[1] * max(speeds))
+        tilted = max(min(angles) - TILT, -np.pi / 2), min(max(angles) + TILT, np.pi / 2)
+        least, most = limits.angle_of_attack or tilted
         for speed, angle in product((low, *_levels(speeds), high), (least, *_levels(angles), most)):
             yield replace(blown[0], airspeed=speed, angle_of_attack=angle)
-    if still and max(c.pressure for c in still) < 0.5 * AMBIENT_PA:
+    if still and limits.pressure:
+        for pressure in limits.pressure:
+            yield replace(still[0], pressure=pressure)
+    elif still and max(c.pressure for c in still) < 0.5 * AMBIENT_PA:
         yield replace(still[0], pressure=AMBIENT_PA)
 
 

@@ -14,7 +14,7 @@ from wingfit.calibration.preparation import fitted_through
 from wingfit.calibration.spec import CalibrationSpec, model_for
 from wingfit.diagnosis.candidate_conditions import candidate_conditions, normalised
 from wingfit.diagnosis.subject import BeatSubject, ChannelLocation
-from wingfit.records import Condition, Dataset, Recording, Vehicle, Wing
+from wingfit.records import Condition, Dataset, Recording, RigLimits, Vehicle, Wing
 from wingfit.records.array_types import Array, Float
 from wingfit.records.dataset import ForceAxis
 from wingfit.rigs.suspect import Suspect
@@ -59,9 +59,14 @@ class _Rig:
         """Return the nominal model with the effects ``names`` added, switched off."""
         return self.model.with_effects(*names)
 
+    @property
+    def rig_limits(self) -> RigLimits | None:
+        """What the rig allows; None if that is not stated."""
+        return self.dataset.rig_limits
+
     def candidate_conditions(self) -> tuple[Condition, ...]:
         """Return conditions that could be recorded next (:func:`.candidate_conditions.candidate_conditions`)."""
-        return candidate_conditions(self.dataset.recordings)
+        return candidate_conditions(self.dataset.recordings, self.dataset.rig_limits)
 
     def simulated_recording(self, model: Model, genome: Float[Array, " G"], condition: Condition) -> Recording | None:
         """Return what the rig would record of ``model`` with ``genome`` [G] under ``condition``; None if that fails.

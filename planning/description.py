@@ -8,7 +8,14 @@ from pathlib import Path
 import numpy as np
 
 from wingfit.records.dataset import AnyDataset, Dataset, Recording
-from wingfit.records.description.convert import RecordingFile, to_cameras, to_frame_error, to_recording, to_rig
+from wingfit.records.description.convert import (
+    RecordingFile,
+    to_cameras,
+    to_frame_error,
+    to_recording,
+    to_rig,
+    to_rig_limits,
+)
 from wingfit.records.description.dataset_file import SeriesDatasetFile
 from wingfit.records.description.explain import check_description
 from wingfit.records.description.yaml_text import read_yaml
@@ -68,8 +75,9 @@ def described(raw: bytes, file: str) -> Dataset:
     for k, entry in enumerate(entries):
         recordings.append(to_recording(entry, blank, document, ("recordings", k), faults))
     faults.raise_any()
-    held_out, frame = tuple(checked.held_out), to_frame_error(checked)
-    return Dataset(checked.name, rig, tuple(recordings), held_out, checked.description, frame, to_cameras(checked))
+    held_out, frame, cameras = tuple(checked.held_out), to_frame_error(checked), to_cameras(checked)
+    limits = to_rig_limits(checked)
+    return Dataset(checked.name, rig, tuple(recordings), held_out, checked.description, frame, cameras, limits)
 
 
 def is_described(recording: Recording) -> bool:

@@ -128,7 +128,7 @@ class BeatRig:
             for one, sampling in zip(fitted, samplings, strict=True)
         )
         candidates = list[Candidate]()
-        for k, condition in enumerate(candidate_conditions(dataset.recordings) if spec.add else ()):
+        for k, condition in enumerate(candidate_conditions(dataset.recordings, dataset.rig_limits) if spec.add else ()):
             like = min(fitted, key=lambda one: _unlike(one.condition, condition))
             blank = _blank(like, condition, f"candidate-{k + 1}", usual, planned[0].markers, calibration)
             candidates.append(_candidate(blank, condition, dataset.recordings))

@@ -14,6 +14,7 @@ from wingfit.records.dataset import (
     FrameError,
     LowPass,
     Recording,
+    RigLimits,
     wing_or_vehicle,
 )
 from wingfit.records.drive import Drive, FourBarDrive, FourierDrive
@@ -62,6 +63,7 @@ __all__ = [
     "Pitch",
     "Quantity",
     "Recording",
+    "RigLimits",
     "Rod",
     "Series",
     "SeriesDataset",

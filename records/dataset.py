@@ -123,12 +123,33 @@ class FrameError:
 
 
 @dataclass(frozen=True)
+class RigLimits:
+    """What a rig allows: least and largest value of each setting of a condition, in its unit; None: not stated."""
+
+    flap_frequency: tuple[float, float] | None = None
+    phase_lag: tuple[float, float] | None = None
+    pressure: tuple[float, float] | None = None
+    airspeed: tuple[float, float] | None = None
+    angle_of_attack: tuple[float, float] | None = None
+
+    def allow(self, condition: Condition) -> bool:
+        """Return whether the rig can be set to ``condition``, as far as its limits are stated."""
+        for one in fields(self):
+            stated, value = getattr(self, one.name), getattr(condition, one.name)
+            room = 1e-9 * max(abs(value), 1.0)
+            if stated is not None and not stated[0] - room <= value <= stated[1] + room:
+                return False
+        return True
+
+
+@dataclass(frozen=True)
 class Dataset(Recorded[Recording]):
     """A wing with recordings of tracks, or a vehicle with recordings of forces; ``rig`` describes the wing or vehicle.
 
     Recordings named in ``held_out`` are used for validation only, never for fitting. ``frame_error``: of the frame of
     the tracks, which all recordings share; None if unknown, and for a vehicle. ``cameras``: which filmed all recordings
-    of a wing, in the frame of the tracks; empty if unknown.
+    of a wing, in the frame of the tracks; empty if unknown. ``rig_limits``: conditions that can be recorded; None if
+    they are not stated.
     """
 
     name: str
@@ -138,6 +159,7 @@ class Dataset(Recorded[Recording]):
     description: str = ""
     frame_error: FrameError | None = None
     cameras: tuple[CameraPose, ...] = ()
+    rig_limits: RigLimits | None = None
 
     def __post_init__(self) -> None:
         refuse_text(self, "held_out")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -26,7 +26,7 @@ from wingfit.diagnosis.evidence.context import FitContext
 from wingfit.diagnosis.subject import beat_subject
 from wingfit.inference.campaign.noise_level import NoiseLevel, seen_noise
 from wingfit.inference.campaign.sampling import seen_sampling
-from wingfit.records import Recording
+from wingfit.records import Recording, RigLimits
 from wingfit.records.array_types import Array, Bool, Float, Mask
 from wingfit.sim.wing.flexible_wing import FlexibleWing
 
@@ -109,20 +109,30 @@ class InBeat:
         if seen is None:
             return None
         kept = self._kept(seen)
-        apart, distance = self.rivals.apart(seen.of(self._level, self.context.data.noise, kept))
         share = share_of(self._channels, float(kept.sum()))
+        apart, distance = self.rivals.apart(seen.of(self._level, self.context.data.noise, kept), share)
         resolves = self.settling.probability(self.settling.elsewhere(apart, distance), share, self._samples)
         condition = recording.condition
         beyond = settings_beyond(condition, [one.condition for one in self._recordings])
         what = f"record {condition_in_words(condition)}"
         if beyond:
-            what += f", {' and '.join(beyond)} beyond what was recorded, if the rig allows it"
+            known = self._allows(beyond)
+            what += f", {' and '.join(beyond)} beyond what was recorded, {'as' if known else 'if'} the rig allows"
         details = {"condition": advised_condition(condition), "beyond": beyond}
         return Proposal("condition", what, nearest(apart), resolves, cost_of(recording), details)
+
+    def _allows(self, settings: Sequence[str]) -> bool:
+        """Return whether limits of all these ``settings`` are stated."""
+        limits: RigLimits | None = getattr(self.context.subject, "rig_limits", None)
+        return limits is not None and all(getattr(limits, one.replace(" ", "_")) is not None for one in settings)
 
     @property
     def _samples(self) -> float:
         return self.context.data.policy.effective_samples
+
+    def _share(self, channels: Bool[Mask, " C"]) -> float:
+        """Return the part of all channels that further ``channels`` of a new recording are."""
+        return share_of(self._channels, float(channels.sum()))
 
     def _kept(self, seen: Simulated) -> Bool[Mask, " C"]:
         return np.array([name in self._tracked for name in seen.channels])
@@ -140,9 +150,9 @@ class InBeat:
 
     def _again(self, number: int, times: float) -> Proposal:
         recording = self._recordings[number]
-        apart, distance = self.rivals.apart(self._recorded(number).longer(times))
-        expected = self.settling.again(number, apart, distance)
         share = share_of(self._channels, self._channels[number])
+        apart, distance = self.rivals.apart(self._recorded(number).longer(times), share)
+        expected = self.settling.again(number, apart, distance)
         resolves = self.settling.probability(expected, share, self._samples, times)
         many = f", {times:g} times as many beats" if times > 1.0 else ""
         details = {"condition": advised_condition(recording.condition), "recording": recording.name}
@@ -183,11 +193,11 @@ class InBeat:
             return []
         masks = [np.array([name.rpartition("_")[0] == one.marker.name for name in seen.channels]) for one in places]
         noise = self.context.data.noise
-        alone = [self.rivals.apart(seen.of(self._level, noise, one))[0] for one in masks]
+        alone = [self.rivals.apart(seen.of(self._level, noise, one), self._share(one))[0] for one in masks]
         squares = np.array([one[0, 1:].min() for one in alone])
         best = best_places(places, squares, model.wing.span)
         new = np.any([masks[k] for k in best], axis=0)
-        apart, distance = self.rivals.apart(seen.of(self._level, noise, new))
+        pair = self.rivals.apart(seen.of(self._level, noise, new), self._share(new))
         advised = tuple(places[k].advised(float(np.sqrt(squares[k]))) for k in best)
         at = ", ".join(
             one.marker or f"{100 * one.span:.0f} % of the span and {100 * one.chord:.0f} % of the chord"
@@ -195,7 +205,7 @@ class InBeat:
         )
         what = f"record {recording.name} again with further markers at {at}"
         details = {"condition": advised_condition(recording.condition), "recording": recording.name, "places": advised}
-        return [self._with_more("markers", what, number, (apart, distance), float(new.sum()), details)]
+        return [self._with_more("markers", what, number, pair, float(new.sum()), details)]
 
     def _axes(self, number: int) -> list[Proposal]:
         """Return the proposal to record again with the axis of the force that was not used."""
@@ -206,13 +216,13 @@ class InBeat:
         seen = None if like is None else simulated(self.context, self.rivals, like)
         if seen is None or (new := ~self._kept(seen)).sum() == 0:
             return []
-        apart, distance = self.rivals.apart(seen.of(self._level, self.context.data.noise, new))
+        pair = self.rivals.apart(seen.of(self._level, self.context.data.noise, new), self._share(new))
         channels = tuple(np.array(seen.channels)[new].tolist())
         what = f"record {recording.name} again with {' and '.join(channels)}, if its noise is that of the other axis"
         details = {
             "condition": advised_condition(recording.condition), "recording": recording.name, "channels": channels
         }  # fmt: skip
-        return [self._with_more("sensor", what, number, (apart, distance), float(new.sum()), details)]
+        return [self._with_more("sensor", what, number, pair, float(new.sum()), details)]
 
     def _with_more(
         self,
@@ -224,7 +234,8 @@ class InBeat:
         details: dict[str, object],
     ) -> Proposal:
         """Return the proposal of a repetition with ``channels`` more, in which the rivals are apart by ``new``."""
-        apart, distance = self.rivals.apart(self._recorded(number))
+        own = share_of(self._channels, self._channels[number])
+        apart, distance = self.rivals.apart(self._recorded(number), own)
         expected = self.settling.again(number, apart, distance)
         part = channels / (channels + self._channels[number])
         expected = expected.with_part(self.settling.elsewhere(*new), part)

@@ -94,11 +94,11 @@ class InSeries:
         if seen is None:
             return None
         data, name = self.context.data, candidate.recording.name
-        apart, distance = self.rivals.apart(seen, lambda k: _own_genes(self.rivals.refits[k].fit, candidate))
         (number,) = [r for r, one in enumerate(data.recordings) if one.name == name]
         group = next(one for one in data.experiments if number in one)
         channels = [float(one.used.sum()) for one in data.reduced]
         share = share_of(channels, channels[number])
+        apart, distance = self.rivals.apart(seen, share, lambda k: _own_genes(self.rivals.refits[k].fit, candidate))
         if candidate.change == "as it was":  # it repeats the error of the model
             expected, samples, kind = self.settling.again(group[0], apart, distance), 0.0, "repeat"
         else:
@@ -139,7 +139,10 @@ class InSeries:
     def _differentiated(
         self, rival: Fit, candidate: Candidate, *, adapt: bool
     ) -> tuple[Float[Array, "T C"], Float[Array, "T C F"]] | None:
-        """Return the difference of the prediction of ``rival``, and its derivatives if it may ``adapt``; None: fails."""
+        """Return the difference of the prediction of ``rival``, and its derivatives if it may ``adapt``.
+
+        None where it cannot be simulated.
+        """
         problem: Problem = replace(rival.problem, recordings=(candidate.recording,))
 
         def simulate(units: Array) -> tuple[Outputs, tuple[str | None, ...]]:

@@ -40,7 +40,7 @@ class Proposal:
 
 
 def ranked(proposals: Sequence[Proposal], names: tuple[str, ...], titles: str, *, rest: bool) -> tuple[Advice, ...]:
-    """Return up to MAX_ADVICE of ``proposals`` as advice, those first that settle most probably, cheaper ones of equals.
+    """Return up to MAX_ADVICE of ``proposals`` as advice: the most probable to settle it first, cheap before dear.
 
     ``names`` and ``titles`` of the hypotheses that they distinguish; ``rest``: whether the question is what is missing
     beside a named effect, which no hypothesis predicts.
@@ -58,7 +58,8 @@ def _order(one: Proposal) -> tuple[float, float, float]:
 
 
 def _advice(one: Proposal, names: tuple[str, ...], titles: str, *, rest: bool) -> Advice:
-    words = f"{one.what} ({cost_in_words(one.cost)}): there the predictions of {titles} differ by {one.separation:.2g} sigma"
+    words = f"{one.what} ({cost_in_words(one.cost)}): "
+    words += f"there the predictions of {titles} differ by {one.separation:.2g} sigma"
     resolves = None if rest else one.resolves
     if rest:
         words += "; whether it shows what else is missing cannot be computed, since no hypothesis predicts that"

@@ -101,45 +101,63 @@ class Rivals:
             found.append(weight * slopes.T @ slopes + np.eye(slopes.shape[1]) / PRIOR_SD**2)
         return found
 
+    @cached_property
+    def _elsewhere(self) -> list[Array]:
+        """Mean square change [F, F] of all recordings so far by the genes of each rival, in variances of the noise."""
+        jacobians = [one.fit.jacobian for one in self.refits]
+        return [(one * self.data.weight[:, None]).T @ one / self.data.noise**2 for one in jacobians]
+
     def stacked(self, slopes: Sequence[Float[Array, "n _"]], values: Sequence[Float[Array, " n"]]) -> Array:
-        """Return the changes [n, P] of a :class:`Prediction` from ``slopes`` [n, F] and ``values`` [n] of each rival."""
+        """Return the changes [n, P] of a :class:`Prediction`; ``slopes`` [n, F] and ``values`` [n]: of each rival."""
         differences = [one - values[0] for one in values]
         return np.hstack([*slopes, np.stack(differences, axis=1)])
 
     def apart(
-        self, seen: Prediction, new: Callable[[int], Bool[Mask, " F"]] | None = None
+        self, seen: Prediction, share: float, new: Callable[[int], Bool[Mask, " F"]] | None = None
     ) -> tuple[Float[Array, "K K"], Float[Array, "K K"]]:
         """Return by how much the prediction of each rival (column) differs from that of the right one (row).
 
         The first matrix is the mean square in variances of the noise, the second the squared distance of all samples in
-        those of their noise. ``new``: of the genes of rival k, those [F] that are unknown in the recording, such as its
-        start; None: all recordings have the same.
+        those of their noise. Genes that adapt to the new recording fit the others worse: that counts as a difference
+        too, as if it were in the new one, which has the ``share`` of all channels. ``new``: of the genes of rival k,
+        those [F] that are unknown in the recording, such as its start; None: all recordings have the same.
         """
         count, ends = len(self.numbers), np.cumsum([0, *(len(one.fit.unit) for one in self.refits)])
         mean, distance = np.zeros((count, count)), np.zeros((count, count))
         for j, (weight, whole) in enumerate(zip(self._weights, self._known, strict=True)):
             genes = np.arange(ends[j], ends[j + 1])
-            known = whole if new is None else forgotten(whole, new(j))
+            own = np.zeros(len(genes), bool) if new is None else new(j)
+            known = whole if new is None else forgotten(whole, own)
+            worse = self._elsewhere[j] * (1.0 - share) / share * ~own * ~own[:, None]
             for k in range(count):
                 if k != j:
                     select = np.zeros((len(seen.mean), len(genes) + 1))
                     select[genes, np.arange(len(genes))] = 1.0
                     select[ends[-1] + j, -1] += 1.0
                     select[ends[-1] + k, -1] -= 1.0
-                    mean[k, j], distance[k, j] = _adapted(seen, select, known, weight)
+                    mean[k, j], distance[k, j] = _adapted(seen, select, known, worse, weight)
         return mean, distance
 
 
 def _adapted(
-    seen: Prediction, select: Float[Array, "P Q"], known: Float[Array, "F F"], weight: float
+    seen: Prediction,
+    select: Float[Array, "P Q"],
+    known: Float[Array, "F F"],
+    worse: Float[Array, "F F"],
+    weight: float,
 ) -> tuple[float, float]:
-    """Return mean square and squared distance of the last of the changes ``select`` after the first F adapt."""
+    """Return mean square and squared distance of the last of the changes ``select`` after the first F adapt.
+
+    ``known`` [F, F]: information about these; ``worse`` [F, F]: mean square change of other recordings by them.
+    """
     genes = np.arange(select.shape[1] - 1)
     both = weight * select.T @ seen.true @ select
     both[np.ix_(genes, genes)] += known
     distance = squared_distance(after_fit(both, genes, np.zeros(len(genes))), len(genes), np.empty(0, int)) / weight
-    move = np.append(-np.linalg.solve(both[np.ix_(genes, genes)], both[genes, -1]), 1.0)
-    return max(float(move @ (select.T @ seen.mean @ select) @ move), 0.0), distance
+    move = -np.linalg.solve(both[np.ix_(genes, genes)], both[genes, -1])
+    change = np.append(move, 1.0)
+    mean = float(change @ (select.T @ seen.mean @ select) @ change + move @ worse @ move)
+    return max(mean, 0.0), distance
 
 
 def forgotten(information: Float[Array, "F F"], unknown: Bool[Mask, " F"]) -> Float[Array, "F F"]:

@@ -29,9 +29,20 @@ def inconsistencies(dataset: DatasetFile) -> Iterator[Inconsistency]:
         yield from _series(dataset)
     else:
         yield from _vehicle(dataset) if isinstance(dataset, VehicleDatasetFile) else _wing(dataset)
+        yield from _limits(dataset)
     recordings = [recording.name for recording in dataset.recordings]
     yield from _unique(("recordings",), recordings, "name", ignore_case=True)
     yield from _references(("held_out",), dataset.held_out, recordings, "recording")
+
+
+def _limits(dataset: WingDatasetFile | VehicleDatasetFile) -> Iterator[Inconsistency]:
+    """Yield limits of the rig of which the least value is not below the largest."""
+    stated = dataset.rig_limits
+    for key in type(stated).model_fields if stated else ():
+        values = getattr(stated, key)
+        if values is not None and values[0] >= values[1]:
+            message = f"is [{values[0]}, {values[1]}]; the first must be less than the second: exchange them"
+            yield ("rig_limits", key), values[0], message
 
 
 def _wing(dataset: WingDatasetFile) -> Iterator[Inconsistency]:

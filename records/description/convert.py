@@ -18,12 +18,12 @@ from pydantic import BaseModel
 
 from wingfit.records.array_types import Array, Float
 from wingfit.records.camera_pose import CameraPose
-from wingfit.records.dataset import Condition, FrameError, Recording
+from wingfit.records.dataset import Condition, FrameError, Recording, RigLimits
 from wingfit.records.description.camera_file import CameraFile
 from wingfit.records.description.dataset_file import VehicleDatasetFile, WingDatasetFile
 from wingfit.records.description.fields import models_in, tag_of
-from wingfit.records.description.vehicle_file import VehicleFile, VehicleRecordingFile
-from wingfit.records.description.wing_file import FrameErrorFile, WingFile, WingRecordingFile
+from wingfit.records.description.vehicle_file import VehicleFile, VehicleLimitsFile, VehicleRecordingFile
+from wingfit.records.description.wing_file import FrameErrorFile, WingFile, WingLimitsFile, WingRecordingFile
 from wingfit.records.description.yaml_text import Document, Path
 from wingfit.records.errors import Faults, nearest
 from wingfit.records.files.table import Samples
@@ -54,6 +54,16 @@ def to_frame_error(dataset: WingDatasetFile | VehicleDatasetFile) -> FrameError 
 def describe_frame_error(error: FrameError) -> dict[str, object]:
     """Convert the errors of a frame to the plain data that ``dataset.yaml`` has under its key ``frame_error``."""
     return to_data(error, FrameErrorFile)
+
+
+def to_rig_limits(dataset: WingDatasetFile | VehicleDatasetFile) -> RigLimits | None:
+    """Convert the limits of the rig in a checked description to SI units; None if they are not stated."""
+    return to_dataclass(RigLimits, dataset.rig_limits) if dataset.rig_limits else None
+
+
+def describe_rig_limits(limits: RigLimits, rig: Wing | Vehicle) -> dict[str, object]:
+    """Convert limits to the plain data that ``dataset.yaml`` has under its key ``rig_limits``."""
+    return to_data(limits, VehicleLimitsFile if isinstance(rig, Vehicle) else WingLimitsFile)
 
 
 def to_cameras(dataset: WingDatasetFile | VehicleDatasetFile) -> tuple[CameraPose, ...]:

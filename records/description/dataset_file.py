@@ -15,9 +15,11 @@ from pydantic import BeforeValidator, Field
 from wingfit.records.description.camera_file import MOST_CAMERAS, CameraFile
 from wingfit.records.description.fields import Name, Prose, Strict, Title, whole
 from wingfit.records.description.series_file import ChannelFile, QuantityFile, SeriesRecordingFile
-from wingfit.records.description.vehicle_file import VehicleFile, VehicleRecordingFile
-from wingfit.records.description.wing_file import FrameErrorFile, WingFile, WingRecordingFile
+from wingfit.records.description.vehicle_file import VehicleFile, VehicleLimitsFile, VehicleRecordingFile
+from wingfit.records.description.wing_file import FrameErrorFile, WingFile, WingLimitsFile, WingRecordingFile
 from wingfit.records.limits import MAX_QUANTITIES, MAX_RECORDINGS
+
+LIMITS = "[least, largest] value of the settings that the rig allows: no recording beyond is proposed"
 
 
 class _DatasetFile(Strict):
@@ -41,6 +43,7 @@ class WingDatasetFile(_DatasetFile):
         max_length=MOST_CAMERAS,
         description="which filmed all recordings, two to eight; leave out if unknown",
     )
+    rig_limits: WingLimitsFile | None = Field(None, description=LIMITS)
     recordings: list[WingRecordingFile] = Field(min_length=1, max_length=MAX_RECORDINGS)
 
 
@@ -48,6 +51,7 @@ class VehicleDatasetFile(_DatasetFile):
     """A dataset of a vehicle: its description, and recordings of the forces of its wings."""
 
     vehicle: VehicleFile
+    rig_limits: VehicleLimitsFile | None = Field(None, description=LIMITS)
     recordings: list[VehicleRecordingFile] = Field(min_length=1, max_length=MAX_RECORDINGS)
 
 

@@ -55,6 +55,8 @@ Estimates = Annotated[
     Field(default_factory=dict, max_length=MAX_ESTIMATES),
 ]
 
+TWO = Field(min_length=2, max_length=2)
+
 
 class Strict(BaseModel):
     """Base class of all models of ``dataset.yaml``: unknown keys are errors."""

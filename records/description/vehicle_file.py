@@ -111,16 +111,29 @@ Noise = Annotated[
 ]
 
 
+_Pitch = Annotated[Decimal, limits("[-90, 90] deg", "nose up from level", _DEGREES)]
+_Speed = Annotated[Decimal, limits("[0, 100] m/s", "level speed through the air")]
+
+
+class VehicleLimitsFile(fields.Strict):
+    """Least and largest value to which the rig can be set, for recordings that are proposed; leave out what is free."""
+
+    flap_frequency_hz: Annotated[list[fields.Frequency], fields.TWO] | None = None
+    body_pitch_deg: Annotated[list[_Pitch], fields.TWO] | None = None
+    pressure_mbar: Annotated[list[fields.Pressure], fields.TWO] | None = None
+    airspeed_m_s: Annotated[list[_Speed], fields.TWO] | None = None
+
+
 class VehicleRecordingFile(fields.WindowFile):
     """One recording of a vehicle; its forces are in ``recordings/<name>.csv``."""
 
     name: fields.Name
     rig: Literal["wind_tunnel", "free_flight", "vacuum_chamber"]
     flap_frequency_hz: fields.Frequency
-    body_pitch_deg: Annotated[Decimal, limits("[-90, 90] deg", "nose up from level", _DEGREES)]
+    body_pitch_deg: _Pitch
     pressure_mbar: fields.Pressure
     temperature_c: fields.Temperature
-    airspeed_m_s: Annotated[Decimal, limits("[0, 100] m/s", "level speed through the air")] = Decimal(0)
+    airspeed_m_s: _Speed = Decimal(0)
     gravity_m_s2: Annotated[Decimal, limits("[0, 30] m/s^2", "downwards", "give a positive number")] = Decimal(
         "9.80665"
     )

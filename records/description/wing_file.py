@@ -132,17 +132,32 @@ Correlation = Annotated[Decimal, limits("[-0.9999, 0.9999]", "correlation of the
 LEAST_EIGENVALUE = 1e-6  # of a matrix of correlations: of less, the inverse is not accurate
 
 
+_Lag = Annotated[Decimal, limits("[-180, 180] deg", "lag of the rear rod", "give degrees of drive phase")]
+_Speed = Annotated[Decimal, limits("[0, 100] m/s", "speed of the airstream, aft")]
+_Incidence = Annotated[Decimal, limits("[-90, 90] deg", "of the rig", "give degrees")]
+
+
+class WingLimitsFile(fields.Strict):
+    """Least and largest value to which the rig can be set, for recordings that are proposed; leave out what is free."""
+
+    flap_frequency_hz: Annotated[list[fields.Frequency], fields.TWO] | None = None
+    phase_lag_deg: Annotated[list[_Lag], fields.TWO] | None = None
+    pressure_mbar: Annotated[list[fields.Pressure], fields.TWO] | None = None
+    airspeed_m_s: Annotated[list[_Speed], fields.TWO] | None = None
+    angle_of_attack_deg: Annotated[list[_Incidence], fields.TWO] | None = None
+
+
 class WingRecordingFile(fields.WindowFile):
     """One recording of a wing; its tracks (positions of markers over time) are in ``recordings/<name>.csv``."""
 
     name: fields.Name
     rig: Literal["vacuum_chamber", "wind_tunnel"]
     flap_frequency_hz: fields.Frequency
-    phase_lag_deg: Annotated[Decimal, limits("[-180, 180] deg", "lag of the rear rod", "give degrees of drive phase")]
+    phase_lag_deg: _Lag
     pressure_mbar: fields.Pressure
     temperature_c: fields.Temperature
-    airspeed_m_s: Annotated[Decimal, limits("[0, 100] m/s", "speed of the airstream, aft")] = Decimal(0)
-    angle_of_attack_deg: Annotated[Decimal, limits("[-90, 90] deg", "of the rig", "give degrees")] = Decimal(0)
+    airspeed_m_s: _Speed = Decimal(0)
+    angle_of_attack_deg: _Incidence = Decimal(0)
     gravity_m_s2: Annotated[Decimal, limits("[0, 30] m/s^2", "along -z", "give a positive number")] = Decimal("9.80665")
     standard_deviation_m: Noise | None = Field(
         None, description="known noise: one number, or [x, y, z] for every marker recorded; leave out if unknown"

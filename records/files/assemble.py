@@ -19,10 +19,12 @@ from wingfit.records.description.convert import (
     describe_frame_error,
     describe_recording,
     describe_rig,
+    describe_rig_limits,
     to_cameras,
     to_frame_error,
     to_recording,
     to_rig,
+    to_rig_limits,
 )
 from wingfit.records.description.dataset_file import SeriesDatasetFile
 from wingfit.records.description.explain import check_description
@@ -84,8 +86,8 @@ def assemble(
         recordings.append(recording)
     faults.raise_any()
     frame = to_frame_error(checked)
-    held_out, cameras = tuple(checked.held_out), to_cameras(checked)
-    return Dataset(checked.name, rig, tuple(recordings), held_out, checked.description, frame, cameras)
+    held_out, cameras, limits = tuple(checked.held_out), to_cameras(checked), to_rig_limits(checked)
+    return Dataset(checked.name, rig, tuple(recordings), held_out, checked.description, frame, cameras, limits)
 
 
 def _read_all(
@@ -155,6 +157,7 @@ def describe(dataset: Dataset) -> dict[str, object]:
         "vehicle" if isinstance(dataset.rig, Vehicle) else "wing": describe_rig(dataset.rig),
         **({"frame_error": describe_frame_error(dataset.frame_error)} if dataset.frame_error else {}),
         **({"cameras": describe_cameras(dataset.cameras)} if dataset.cameras else {}),
+        **({"rig_limits": describe_rig_limits(dataset.rig_limits, dataset.rig)} if dataset.rig_limits else {}),
         "recordings": [describe_recording(recording) for recording in dataset.recordings],
         **({"held_out": list(dataset.held_out)} if dataset.held_out else {}),
     }

@@ -17,7 +17,7 @@ from wingfit.diagnosis.candidate_conditions import (
     candidate_conditions,
     settings_beyond,
 )
-from wingfit.records import Condition, Recording
+from wingfit.records import Condition, Recording, RigLimits
 from wingfit.sim.virtual_rigs.balance import TRIALS
 from wingfit.sim.virtual_rigs.balance import blank_recording as blank_forces
 from wingfit.sim.virtual_rigs.campaign import SMALL, blank_recording, name_of, robird_wing, vacuum
@@ -83,3 +83,23 @@ def test_jittering_settings_count_as_one() -> None:
 
 def test_none_is_proposed_in_free_flight() -> None:
     assert candidate_conditions([replace(one, rig="free_flight") for one in VEHICLE]) == ()
+
+
+def test_nothing_is_proposed_beyond_the_stated_limits() -> None:
+    """And a setting with limits is proposed up to them, also where a rig without limits would not go."""
+    pitch = (np.radians(20.0), np.radians(80.0))
+    limits = RigLimits(flap_frequency=(9.0, 14.5), airspeed=(0.3, 1.0), angle_of_attack=pitch)
+    found = candidate_conditions(VEHICLE, limits)
+    assert all(limits.allow(one) for one in found)
+    assert range_of(found, "flap_frequency") == pytest.approx((9.0, 14.5))
+    assert range_of([one for one in found if one.airspeed > 0], "angle_of_attack") == pytest.approx(pitch)
+    assert max(one.airspeed for one in found) == pytest.approx(1.0)
+    assert not all(limits.allow(one) for one in candidate_conditions(VEHICLE))
+
+
+def test_limits_hold_their_ends_and_what_is_not_stated_is_free() -> None:
+    limits = RigLimits(pressure=(1e3, 1e5))
+    inside = vacuum(0.0, 0.0, 3.0)
+    assert limits.allow(replace(inside, pressure=1e5))
+    assert limits.allow(replace(inside, pressure=1e3, flap_frequency=900.0))
+    assert not limits.allow(replace(inside, pressure=1.01e5))
