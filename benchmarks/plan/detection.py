@@ -19,6 +19,7 @@ from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.preparation import as_fitted
 from wingfit.calibration.problem import base_genome
 from wingfit.calibration.spec import CalibrationSpec
+from wingfit.inference.campaign.noise_level import NoiseLevel
 from wingfit.inference.design import detection_probability, odds_probability
 from wingfit.inference.noise.mean_beat import fourier_basis
 from wingfit.planning import PlanSpec

@@ -72,9 +72,7 @@ def candidate_sentence(
     if removed < WORTH_MENTIONING:
         return ""
     titles = " with ".join(suspects[name].title.lower() for name in best.names)
-    return (
-        f" Most of it, {100.0 * removed:.0f} %, would go with {titles}: too little evidence to add to the model."
-    )
+    return f" Most of it, {100.0 * removed:.0f} %, would go with {titles}: too little evidence to add to the model."
 
 
 def accepted_sentence(data: WhitenedData, decision: Decision, nominal: Refit, floor: float) -> str:
