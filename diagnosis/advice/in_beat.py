@@ -113,11 +113,13 @@ class InBeat:
         apart, distance = self.rivals.apart(seen.of(self._level, self.context.data.noise, kept), share)
         resolves = self.settling.probability(self.settling.elsewhere(apart, distance), share, self._samples)
         condition = recording.condition
-        beyond = settings_beyond(condition, [one.condition for one in self._recordings])
+        known = getattr(self.context.subject, "dataset", None)  # with the recordings that are held out
+        recorded: Sequence[Recording] = self._recordings if known is None else known.recordings
+        beyond = settings_beyond(condition, [one.condition for one in recorded])
         what = f"record {condition_in_words(condition)}"
         if beyond:
-            known = self._allows(beyond)
-            what += f", {' and '.join(beyond)} beyond what was recorded, {'as' if known else 'if'} the rig allows"
+            allowed = "as" if self._allows(beyond) else "if"
+            what += f", {' and '.join(beyond)} beyond what was recorded, {allowed} the rig allows"
         details = {"condition": advised_condition(condition), "beyond": beyond}
         return Proposal("condition", what, nearest(apart), resolves, cost_of(recording), details)
 

@@ -34,26 +34,23 @@ class Place:
 
 
 def places_on(wing: Wing, tracked: Sequence[str]) -> tuple[Place, ...]:
-    """Return the described markers that are not ``tracked``, or places of a grid if all are."""
+    """Return the described markers that are not ``tracked``, and the places of a grid."""
     planform, root = Planform(wing), wing.stations[0].y
-    others = [one for one in wing.markers if one.name not in tracked]
-    if others:
-        found = list[Place]()
-        for one in others:
-            x, y, _ = one.position
-            chord = float(np.clip(planform.fraction(x, y), 0.0, 1.0))
-            found.append(Place(one, float(np.clip((y - root) / wing.span, 0.0, 1.0)), chord, new=False))
-        return tuple(found)
+    found = list[Place]()
+    for one in wing.markers:
+        x, y, _ = one.position
+        if one.name not in tracked:
+            span = float(np.clip((y - root) / wing.span, 0.0, 1.0))
+            found.append(Place(one, span, float(planform.fraction(x, y)), new=False))
     stations = np.array([(s.y, s.leading_edge, s.chord) for s in wing.stations])
     height = float(np.mean([one.position[2] for one in wing.markers])) if wing.markers else 0.0
-    new = list[Place]()
     for span in SPAN:
         y = root + span * wing.span
         edge, width = (float(np.interp(y, stations[:, 0], stations[:, k])) for k in (1, 2))
         for chord in CHORD:
-            marker = Marker(NAME.format(len(new) + 1), (edge + chord * width, y, height), 0.0)
-            new.append(Place(marker, span, chord, new=True))
-    return tuple(new)
+            marker = Marker(NAME.format(len(found) + 1), (edge + chord * width, y, height), 0.0)
+            found.append(Place(marker, span, chord, new=True))
+    return tuple(found)
 
 
 def with_markers(model: FlexibleWing, places: Sequence[Place]) -> FlexibleWing:

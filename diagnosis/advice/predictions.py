@@ -63,7 +63,7 @@ def first_on_grid(
 def fixed_separation(context: FitContext, rivals: Rivals, recording: Recording) -> float | None:
     """Return the least root mean square difference of the others from ``recording``, which the first predicts.
 
-    In standard deviations of the noise, with genes as they are: an upper bound of the difference when they adapt. None
+    In standard deviations of the noise, with genes as they are: an upper bound, since they may adapt. None
     where one cannot be simulated.
     """
     found = list[float]()

@@ -12,8 +12,8 @@ from wingfit.diagnosis.advice.advised import Advice, AdviceKind, AdvisedConditio
 from wingfit.records import Condition
 from wingfit.records.array_types import Array, Float
 
-MAX_ADVICE = 6  # proposals that are reported
-MOST_OF_KIND = 3
+MAX_ADVICE = 5  # proposals that are reported
+MOST_OF_KIND = 2
 ALIKE = 0.02  # difference of probabilities that is not worth a more expensive recording
 SETTLES = 0.05  # increase of the probability that is worth four times as many beats
 

@@ -14,7 +14,7 @@ import pytest
 
 from tests.report.findings import bare, force_finding, wing_finding, with_verdict
 from wingfit.diagnosis.finding import VERDICTS, Finding, Interval
-from wingfit.report import finding_from_json, finding_json
+from wingfit.report import finding_from_json, finding_json, html
 from wingfit.report.schema import finding_schema, schema_text
 
 jsonschema: Any = import_module("jsonschema")
@@ -85,3 +85,16 @@ def test_what_is_no_finding_is_refused_by_name(changed: dict[str, Any], said: st
     with pytest.raises(ValueError, match=said):
         finding_from_json(data)
     assert not jsonschema.Draft202012Validator(finding_schema()).is_valid(data)
+
+
+def test_advice_of_an_earlier_version_is_read_and_shown() -> None:
+    """It has no kind, cost or places, and only conditions, of which the probability was always given."""
+    data = finding_json(wing_finding())
+    new = ("kind", "cost", "beyond", "places", "channels")
+    for one in data["advice"]:
+        for name in new:
+            del one[name]
+    jsonschema.Draft202012Validator(finding_schema()).validate(data)
+    again = finding_from_json(data)
+    assert again == wing_finding()
+    assert "5 Hz, 14° of lag, 10 mbar" in html(again)

@@ -12,6 +12,7 @@ import pytest
 
 from tests.report.findings import around, bare, force_finding, load, recording, times, wing_finding, with_verdict
 from tests.report.pages import LOADS, page
+from wingfit.diagnosis.advice.advised import Advice, AdvisedCost, AdvisedPlace
 from wingfit.diagnosis.finding import VERDICTS, Finding, Interval, MarkerMisfit, Verdict
 from wingfit.report import html
 
@@ -262,3 +263,23 @@ def test_what_is_left_out_of_the_page_is_counted() -> None:
         f"{len(finding.missing) * 20 - 30} more, with smaller loads, are in the JSON."
         in page(replace(finding, missing=finding.missing * 20)).text
     )
+
+
+def test_the_best_three_proposals_are_shown_with_their_cost_and_what_changes() -> None:
+    finding = wing_finding()
+    cost = AdvisedCost(1, 400, 12.5, 28.0)
+    place = AdvisedPlace(0.85, 0.9, 0.1, 0.4, 3.0)
+    advice = (
+        Advice("w1", 3.0, 0.9, ("a",), kind="markers", recording="slow", cost=cost, places=(place,)),
+        Advice("w2", 2.0, None, ("a",), kind="repeat", recording="fast", cost=cost),
+        Advice("w3", 1.0, 0.2, ("a",), kind="sensor", recording="fast", cost=cost, channels=("force_z",)),
+        Advice("w4", 1.0, 0.1, ("a",), recording="other", change="with a start 2 times as large"),
+    )
+    text = page(replace(finding, advice=advice)).text
+    assert "slow again, further markers at 85 % of the span, 90 % of the chord" in text
+    assert "fast again, 28 beats" in text
+    assert "fast again, with force_z" in text
+    assert "not computed" in text
+    assert text.count("13 s") + text.count("12 s") == 3
+    assert "The finding as JSON has 1 more." in text
+    assert "start 2 times" not in text
