@@ -211,7 +211,8 @@ def test_an_installed_rig_is_calibrated_and_diagnosed(seen: Seen, api: Api, deca
     assert 'rig="decay"' in program
     arm = upload(api, arm_dataset(), write_netcdf)
     seen.show(f"dataset={arm}")
-    seen.wait(f"{TEXT.format('dataset-name')} === 'arm'")
+    name = api.get(f"/v1/datasets/{arm}")["name"]  # with a number: the service has another one of that name
+    seen.wait(f"{TEXT.format('dataset-name')} === '{name}'")
     seen.page.click("#installed-form [value=runs]")
     seen.wait("!document.getElementById('installed-errors').hidden")
     assert "'decay' does not simulate" in seen.page.inner_text("#installed-errors")
