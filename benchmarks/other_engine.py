@@ -33,7 +33,7 @@ from wingfit.records.array_types import Array
 from wingfit.sim.virtual_rigs.campaign import SMALL, Tracking, film, robird_wing
 from wingfit.sim.wing.flexible_wing import FlexibleWing
 
-SEED, NUMBER = 11, 48
+SEED, NUMBER = 11, 24
 DIVISIONS = ("4", "8x1")  # of the true wing; the model has "4"
 LAWS: tuple[Law, ...] = tuple(law for law in get_args(Law) if law != "energy")  # that is the model's own
 SPREAD = 1.6  # the true genes are up to this factor above or below the estimates
@@ -128,19 +128,18 @@ def main() -> None:
     except ImportError as missing:
         sys.exit(str(missing))
     found = measured(options.seed, options.n, options.jobs)
-    for row in found["by_trial"]:
-        print(" ".join(f"{name}={value}" for name, value in row.items()))
     if options.json:
         print(json.dumps(found))
 
 
 def measured(seed: int, count: int, jobs: int) -> dict[str, Any]:
-    """Run ``count`` trials in ``jobs`` processes, and return shares of right and wrong verdicts, in per cent."""
+    """Run ``count`` trials in ``jobs`` processes; print each, and return shares of right and wrong ones in per cent."""
     trials, began, rows = [planned(seed, number) for number in range(count)], time.monotonic(), []
     show("simulating and diagnosing")
     with ProcessPoolExecutor(jobs) as pool:
         for row in pool.map(outcome, trials):
             rows.append(row)
+            print(" ".join(f"{name}={value}" for name, value in row.items()), flush=True)
             show_count("trials", len(rows), count, began)
     return {**summary(rows), "seed": seed, "by_trial": rows, "commit": commit(), "cpu": cpu()}
 
