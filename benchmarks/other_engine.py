@@ -28,6 +28,7 @@ from benchmarks.peers.exudyn_engine import SAMPLES, Law, Settings, load_exudyn, 
 from benchmarks.peers.wing import PeerWing, peer_wing
 from wingfit import CalibrationSpec, DiagnosisSpec
 from wingfit.diagnosis.finding import NAMING, Finding
+from wingfit.diagnosis.policy import POLICY
 from wingfit.records import Condition, Dataset
 from wingfit.records.array_types import Array
 from wingfit.sim.virtual_rigs.campaign import SMALL, Tracking, film, robird_wing
@@ -41,6 +42,7 @@ TRACKING = Tracking(noise=(3e-4, 3e-4, 4e-4), beats=3)
 CONDITIONS = tuple(one for k, one in enumerate(SMALL) if k not in (4, 9))  # two are held out
 BEATS, RAMP, STEPS = 14, 4, 480  # simulated from rest; of which the start-up; steps of each
 SURE = 0.95
+VISIBLE = math.sqrt(1.0 + POLICY.negligible**2)  # least strength: what leaves less beyond the noise counts as nothing
 
 Change = Callable[[PeerWing, float], PeerWing]
 
@@ -206,13 +208,14 @@ def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
         return round(100.0 * sum(which) / len(which), 1) if which else None
 
     nothing = [row for row in rows if row["hidden"] == "nothing"]
-    hidden = [row for row in rows if row["hidden"] != "nothing"]
+    hidden = [row for row in rows if row["hidden"] != "nothing" and row["strength"] >= VISIBLE]
     listed = [row for row in hidden if HIDDEN[row["hidden"]].right]
     unlisted = [row for row in hidden if not HIDDEN[row["hidden"]].right]
     sure = [row for row in rows if row["probability"] >= SURE]
     return {
         "trials": len(rows),
         "nothing_hidden": {"n": len(nothing), "adequate_percent": percent(_are(nothing, "adequate"))},
+        "too_weak": {"n": len(rows) - len(nothing) - len(hidden)},
         "listed": {
             "n": len(listed),
             "first_percent": percent([row["first"] for row in listed]),
@@ -234,9 +237,9 @@ def _are(rows: list[dict[str, Any]], verdict: str) -> list[bool]:
 
 
 def _holds(row: dict[str, Any]) -> bool:
-    """Whether what a finding says is true: nothing is missing, this is, or something that the library has not."""
+    """Whether what a finding says is true: nothing to be seen is missing, this is, or something unlisted."""
     if row["verdict"] == "adequate":
-        return bool(row["hidden"] == "nothing")
+        return bool(row["hidden"] == "nothing" or row["strength"] < VISIBLE)
     if row["verdict"] == "unnamed":
         return bool(row["hidden"] != "nothing")
     right = HIDDEN[row["hidden"]].right

@@ -14,16 +14,12 @@ from wingfit.sim.virtual_rigs.campaign import robird_wing
 from wingfit.sim.wing.flexible_wing import FlexibleWing
 
 
-def found(verdict: str, *named: str, first: tuple[str, ...] = ()) -> Any:
+def row(hidden: str, verdict: str, *named: str, first: tuple[str, ...] = (), strength: float = 2.0) -> dict[str, Any]:
     hypotheses = (SimpleNamespace(effects=()), SimpleNamespace(effects=first or named))
-    return SimpleNamespace(
-        verdict=verdict, named=named, hypotheses=hypotheses, probabilities={verdict: 0.97}, strength=2.0
+    found: Any = SimpleNamespace(
+        verdict=verdict, named=named, hypotheses=hypotheses, probabilities={verdict: 0.97}, strength=strength
     )
-
-
-def row(hidden: str, verdict: str, *named: str, first: tuple[str, ...] = ()) -> dict[str, Any]:
-    right = bench.HIDDEN[hidden].right
-    return {"hidden": hidden} | bench.judged(found(verdict, *named, first=first), right)
+    return {"hidden": hidden} | bench.judged(found, bench.HIDDEN[hidden].right)
 
 
 def test_a_third_hides_nothing_and_everything_is_hidden() -> None:
@@ -54,13 +50,15 @@ def test_right_and_wrong_verdicts_are_counted() -> None:
         row("upwash", "unnamed"),
         row("damped joint", "named", "viscoelastic"),
         row("soft joint", "ambiguous", "damage", "backlash"),
+        row("airspeed", "adequate", strength=1.03),
     ]
     total = bench.summary(rows)
     assert total["nothing_hidden"] == {"n": 2, "adequate_percent": 50.0}
     assert total["listed"] == {"n": 4, "first_percent": 50.0, "right_percent": 25.0, "adequate_percent": 25.0}
     assert total["unlisted"] == {"n": 2, "unnamed_percent": 50.0, "adequate_percent": 0.0}
-    assert total["wrong_percent"] == 37.5
-    assert total["said_95"] == {"n": 8, "right_percent": 50.0}
+    assert total["too_weak"] == {"n": 1}
+    assert total["wrong_percent"] == 33.3
+    assert total["said_95"] == {"n": 9, "right_percent": 55.6}
 
 
 def test_the_motion_of_the_engine_is_filmed() -> None:
