@@ -44,6 +44,7 @@ def test_right_and_wrong_verdicts_are_counted() -> None:
     rows = [
         row("nothing", "adequate"),
         row("nothing", "named", "damage"),
+        row("nothing", "named", "cubic_stiffness"),
         row("airspeed", "named", "airspeed_error"),
         row("airspeed", "named", "airspeed_error", "damage"),
         row("stroke amplitude", "adequate", first=("stroke_amplitude",)),
@@ -53,12 +54,12 @@ def test_right_and_wrong_verdicts_are_counted() -> None:
         row("airspeed", "adequate", strength=1.03),
     ]
     total = bench.summary(rows)
-    assert total["nothing_hidden"] == {"n": 2, "adequate_percent": 50.0}
+    assert total["nothing_hidden"] == {"n": 3, "adequate_percent": 33.3, "law_of_springs_named": 1}
     assert total["listed"] == {"n": 4, "first_percent": 50.0, "right_percent": 25.0, "adequate_percent": 25.0}
     assert total["unlisted"] == {"n": 2, "unnamed_percent": 50.0, "adequate_percent": 0.0}
     assert total["too_weak"] == {"n": 1}
-    assert total["wrong_percent"] == 33.3
-    assert total["said_95"] == {"n": 9, "right_percent": 55.6}
+    assert total["wrong_percent"] == 30.0
+    assert total["said_95"] == {"n": 10, "right_percent": 60.0}
 
 
 def test_the_motion_of_the_engine_is_filmed() -> None:
