@@ -176,7 +176,7 @@ class _VideoFrames(Frames):
     def _grabbed(self, video: Any, number: int) -> int | None:
         """Decode the next frame of ``video``, ``number`` if none is damaged; return its number, None at the end.
 
-        A damaged packet ends what OpenCV decodes, or is passed over; the index then tells which frame is next.
+        A damaged packet ends what OpenCV decodes, or is passed over; the index then shows which frame is next.
         """
         cv2 = opencv()
         step = 1e3 / self._stated_hz if self._stated_hz > 0 else np.inf

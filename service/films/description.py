@@ -25,7 +25,7 @@ def write_description(folder: Path, row: FilmRow, spec: Mapping[str, Any], files
     ``row``: the film, all of whose files are there; ``spec``: settings of a tracking.
     """
     named = {name: str(files.video(row.id, file).resolve()) for name, file in uploaded(row).items()}
-    # A copy, which tells later with which cameras the tracks were made.
+    # A copy, which shows later with which cameras the tracks were made.
     _write(folder / CAMERAS, Path(named[CALIBRATION]).read_bytes().decode())
     markers: dict[str, Any] = {"kind": spec["kind"]}
     if spec["places"]:

@@ -143,11 +143,11 @@ def test_too_many_numbers() -> None:
 def test_a_header_of_100_000_columns_is_refused_before_its_names_are_compared() -> None:
     header = ",".join(["time_s", *(f"n{k}_x_m" for k in range(100_000))])
     began = time.process_time()
-    with pytest.raises(DatasetError) as told:
+    with pytest.raises(DatasetError) as refused:
         read_tracks(f"{header}\n".encode(), "f.csv", [f"m{k}" for k in range(50)])
     assert time.process_time() - began < 1.0, "comparing each name with those of the markers takes seconds"
-    assert told.value.count == 1
-    assert "f.csv, line 1: has 100001 columns; at most 3001 columns are read: remove" in str(told.value)
+    assert refused.value.count == 1
+    assert "f.csv, line 1: has 100001 columns; at most 3001 columns are read: remove" in str(refused.value)
 
 
 def test_many_wrong_names_of_columns_are_compared_until_the_report_is_full(monkeypatch: pytest.MonkeyPatch) -> None:

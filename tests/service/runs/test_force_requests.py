@@ -245,7 +245,7 @@ def test_a_plan_ends_within_a_simulation_once_nobody_waits_for_it() -> None:
     with pytest.raises(ProblemError, match="the client has hung up") as raised:
         planned(force_data.dataset(), PlanSpec(), gone)
     assert raised.value.status == 503
-    assert len(looks) < 20, "no further simulation is begun"
+    assert len(looks) < 20, "no further simulation starts"
 
 
 def test_a_plan_of_an_unknown_dataset_is_refused(api: Api) -> None:
