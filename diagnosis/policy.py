@@ -58,6 +58,12 @@ class Policy:
     imitation: float = _threshold(
         2.0, "effective samples, relative", "how steeply a hypothesis that leaves more becomes improbable"
     )
+    several_left: float = _threshold(
+        0.25,
+        "nominal residual RMS",
+        "recordings with a beat: several effects, none of which is probable alone, compete with an unknown law that "
+        "leaves this little, since together they imitate more than one does; right ones leave less",
+    )
     single: float = _threshold(
         0.885,
         "probability",

@@ -14,7 +14,8 @@ but a fraction of the residual (`Policy.unknown_residual`) at the cost of the ge
 explain the residual of the nominal model, only hypotheses that are worth their genes compete with the second. Those
 that are hardly worth them are possible if they explain most of the residual, their sizes cannot all be zero, and there
 are recordings to predict. With a beat, a hypothesis that leaves too much is less probable (`Policy.most_left`): almost
-any smooth omission is imitated in part by some effect.
+any smooth omission is imitated in part by some effect. Several effects together imitate more of it, so they compete
+with an unknown law that leaves less (`Policy.several_left`).
 """
 
 from __future__ import annotations
@@ -67,10 +68,7 @@ def weigh(
     genes = np.array([one.freedom for one in hypotheses], float)
     effects = np.array([len(one.trials) for one in hypotheses], float)
     evidence = _evidence(data, tau + excess, genes, effects, suspects)
-    unknown = (
-        -0.5 * data.effective_samples * np.log(tau + policy.unknown_residual**2 * excess[0])
-        - data.gene_cost * policy.unknown_genes
-    )
+    unknown = _unknown(data, tau + policy.unknown_residual**2 * excess[0])
     possible = np.ones(len(hypotheses), bool)
     drift_alone = only_drifts(data, nominal, floor)
     if nominal_refuted(data, nominal.excess, floor, error) or (drifts(data) and not drift_alone):
@@ -85,8 +83,10 @@ def weigh(
     imitates = _imitation(data, hypotheses, floor, error)
     weight = np.where(possible, evidence - imitates, -np.inf)
     if data.kind != "series":
+        closer = _unknown(data, tau + policy.several_left**2 * excess[0])
+        several = _imitation_by_several(hypotheses, weight, unknown, closer)
         rest = _UnknownRest(data, hypotheses, excess, floor, error, suspects, imitates)
-        weight = _with_unknown_rest(hypotheses, weight, rest.log_odds)
+        weight = _with_unknown_rest(hypotheses, weight, rest.log_odds) - several
         unknown = max(unknown, weight[effects >= MANY].max(initial=-np.inf))
     top = max(weight.max(), unknown)
     weight, other = np.exp(weight - top), np.exp(unknown - top)
@@ -144,6 +144,21 @@ def _with_unknown_rest(hypotheses: Sequence[Refit], weight: Array, log_odds: Cal
             whole, both = found[k], np.logaddexp(0.0, odds[best])
             found[k] = whole - both
             found[best] = np.logaddexp(found[best], whole + odds[best] - both)
+    return found
+
+
+def _imitation_by_several(hypotheses: Sequence[Refit], weight: Array, unknown: float, closer: float) -> Array:
+    """Return what [H] to subtract from the log ``weight`` [H] of several effects of which none is probable alone.
+
+    ``unknown``, ``closer``: log weights of an unknown law, and of one that leaves `Policy.several_left`. Several
+    effects imitate more than one does; but an effect that is more probable alone than the unknown law lends weight to
+    others.
+    """
+    found, names = np.zeros(len(hypotheses)), [set(one.names) for one in hypotheses]
+    for k, own in enumerate(names):
+        if len(own) > 1:
+            alone = max((weight[j] for j, other in enumerate(names) if other and other < own), default=-np.inf)
+            found[k] = min(closer - unknown, max(unknown - alone, 0.0))
     return found
 
 
@@ -228,6 +243,11 @@ def _evidence(data: WhitenedData, excess: Array, genes: Array, effects: Array, s
     return np.asarray(
         -0.5 * data.effective_samples * np.log(excess) - data.gene_cost * genes - np.log(max(suspects, 2)) * effects
     )
+
+
+def _unknown(data: WhitenedData, excess: float) -> float:
+    """Return the log evidence for a law outside the library that leaves ``excess``, as in :func:`_evidence`."""
+    return float(-0.5 * data.effective_samples * np.log(excess) - data.gene_cost * data.policy.unknown_genes)
 
 
 def nominal_suffices(data: WhitenedData, nominal: Refit, suspects: int) -> bool:

@@ -105,6 +105,24 @@ def test_further_effects_that_an_unknown_law_may_replace_are_not_named() -> None
     assert verdict(5.0, refit(1.6, ("d",)), refit(0.3, ("a", "b"))) == ("named", ("a", "b")), "of its own effects only"
 
 
+def test_several_effects_must_leave_less_than_one() -> None:
+    """Together they imitate more of a law outside the library; what noise explains is no imitation."""
+    left = 5.0 * 0.26
+    assert verdict(5.0, refit(left, ("a",), 3))[0] == "named"
+    assert verdict(5.0, refit(4.5, ("a",)), refit(left, ("a", "b")))[0] == "unnamed"
+    assert verdict(5.0, refit(4.5, ("a",)), refit(5.0 * 0.1, ("a", "b")))[0] == "named"
+    before = replace(POLICY, several_left=POLICY.unknown_residual)
+    weights = weigh(
+        cast("WhitenedData", SimpleNamespace(**{**vars(data()), "policy": before})),
+        refit(5.0),
+        [refit(4.5, ("a",)), refit(left, ("a", "b"))],
+        0.0,
+        40,
+    )
+    assert decide(weights).verdict == "named", "that alone makes the difference"
+    assert verdict(1.5, refit(1.4, ("a",)), refit(0.25, ("a", "b")))[0] == "named", "within the noise"
+
+
 def test_sharing_with_parts_beside_an_unknown_law_loses_no_probability() -> None:
     names = ((), ("a",), ("b",), ("a", "b"), ("a", "b", "c"))
     each = [refit(1.0, one) for one in names]
