@@ -64,6 +64,12 @@ class Policy:
         "recordings with a beat: several effects, none of which is probable alone, compete with an unknown law that "
         "leaves this little, since together they imitate more than one does; right ones leave less",
     )
+    partial_doubt: float = _threshold(
+        0.2,
+        "probability",
+        "recordings with a beat: of effects that leave more than noise and the form of a law explain, about one in "
+        "five imitated a law outside the library",
+    )
     single: float = _threshold(
         0.885,
         "probability",

@@ -12,7 +12,7 @@ from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.finding import NAMING, Proof, Verdict, amount
 from wingfit.diagnosis.verdict.noise_doubt import noise_may_hide
 from wingfit.diagnosis.verdict.verdict import Decision
-from wingfit.diagnosis.verdict.weigh_hypotheses import HypothesisWeights, nominal_refuted, tolerated_excess
+from wingfit.diagnosis.verdict.weigh_hypotheses import HypothesisWeights, leaves_a_rest, nominal_refuted
 from wingfit.records import Series
 from wingfit.rigs.suspect import Suspect
 
@@ -27,8 +27,7 @@ def partly(decision: Decision, data: WhitenedData, nominal: Refit, floor: float)
 
     ``floor`` (m or N): discretisation error.
     """
-    left, enough = decision.best.excess, tolerated_excess(data, nominal.excess, floor)
-    if decision.verdict not in NAMING or left <= enough or not nominal_refuted(data, left, floor):
+    if decision.verdict not in NAMING or not leaves_a_rest(data, nominal, decision.best, floor):
         return decision
     found = dict(decision.probabilities)
     found[decision.verdict], found["partly named"] = 0.0, found[decision.verdict]

@@ -95,7 +95,21 @@ def weigh(
     if noise_may_hide(data, nominal.fit):  # as far as no hypothesis has shown how large the noise is
         doubted = max(float(probabilities[0]) - policy.doubted_noise, 0.0)
         probabilities[0], unknown = probabilities[0] - doubted, unknown + doubted
+    if data.kind != "series":
+        partial = [leaves_a_rest(data, nominal, one, floor) for one in refits]
+        doubted = policy.partial_doubt * np.array([0.0, *(probabilities[1:] * partial)])
+        probabilities, unknown = probabilities - doubted, unknown + float(doubted.sum())
     return HypothesisWeights(hypotheses, evidence - evidence[0], probabilities, unknown, excess, data.policy)
+
+
+def leaves_a_rest(data: WhitenedData, nominal: Refit, refit: Refit, floor: float) -> bool:
+    """Return whether ``refit`` leaves more than noise, discretisation and the form of a law explain.
+
+    Then something else is missing too, the law is another one, or the effects imitate what is missing. ``floor`` (m or
+    N): discretisation error.
+    """
+    enough = tolerated_excess(data, nominal.excess, floor)
+    return refit.excess > enough and nominal_refuted(data, refit.excess, floor)
 
 
 @dataclass(frozen=True)
