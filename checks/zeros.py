@@ -57,6 +57,6 @@ def _filled(values: Array) -> tuple[Array, float]:
 
 
 def _repeated(values: Array) -> int:
-    """How often the most frequent number of ``values`` [T, A] occurs on the axis where that is rarest; NaN never does."""
+    """How often the most frequent number of ``values`` [T, A] occurs, on the axis where that is rarest; NaN is none."""
     found = (np.unique(axis[np.isfinite(axis)], return_counts=True)[1] for axis in values.T)
     return int(min(counts.max(initial=0) for counts in found))

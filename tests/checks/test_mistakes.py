@@ -169,7 +169,7 @@ def test_the_standard_atmosphere_in_mmhg_is_a_warning_and_mountains_are_not() ->
 
 
 def test_numbers_that_a_coarse_converter_repeats_fill_no_gaps() -> None:
-    """With few steps in the range, both axes often have one number at once; one that fills gaps is found all the same."""
+    """With few steps in the range, both axes often have one number at once; one that fills gaps is still found."""
     first = good_vehicle().recordings[0]
     phase = first.times * first.condition.flap_frequency
     peak = np.exp(-((((phase + 0.5) % 1.0 - 0.5) / 0.05) ** 2))
