@@ -125,18 +125,19 @@ def _look_alikes(state: SearchState, best: Refit) -> list[StartPoint]:
     """Return start points in which one effect of the hypothesis ``best`` is replaced by one known to look similar.
 
     A score test does not see what the nominal genes, or a similar effect fitted first, have already absorbed. Choices,
-    such as two signs, may explain the recordings equally, and exactly.
+    such as two signs, may explain the recordings equally, and exactly. Otherwise, where ``best`` leaves only noise, an
+    effect may be more probable only if it has fewer genes, such as a stall without a vortex.
     """
     exact = best.excess <= tolerated_excess(state.data, 0.0, 0.0)
-    if exact and not any(part.suspect.positions for part in best.trials):
-        return []
+    choice = any(part.suspect.positions for part in best.trials)
     found = {trials[0].suspect.name: trials[0] for trials in state.trials if trials}
     starts = []
     for part in best.trials:
         others = [trial for trial in best.trials if trial is not part]
         for name, trial in found.items():
             alike = name in part.suspect.confused_with or part.suspect.name in trial.suspect.confused_with
-            if alike and name not in best.names:
+            smaller = len(trial.suspect.genes) < len(part.suspect.genes)
+            if alike and name not in best.names and (choice or smaller or not exact):
                 starts += start_points(trial, others, best)
     return starts
 

@@ -13,6 +13,7 @@ from tests.checks.samples import good_vehicle, good_wing
 from tests.oracles.mistakes import KINDS
 from wingfit.checks import DatasetWarning, check_dataset, examine, load_dataset
 from wingfit.checks.repair import repaired
+from wingfit.checks.zeros import check_zero_forces
 from wingfit.records import Dataset, DatasetError, Materials, save_dataset
 from wingfit.records import load_dataset as read_dataset
 from wingfit.records.files.folder import contents
@@ -165,3 +166,19 @@ def test_the_standard_atmosphere_in_mmhg_is_a_warning_and_mountains_are_not() ->
 
     assert causes(76_000.0) == ["the pressure is in mmHg"]
     assert causes(75_000.0) == causes(77_000.0) == []
+
+
+def test_numbers_that_a_coarse_converter_repeats_fill_no_gaps() -> None:
+    """With few steps in the range, both axes often have one number at once; one that fills gaps is still found."""
+    first = good_vehicle().recordings[0]
+    phase = first.times * first.condition.flap_frequency
+    peak = np.exp(-((((phase + 0.5) % 1.0 - 0.5) / 0.05) ** 2))
+    forces = np.stack([np.sin(2 * np.pi * phase) + peak, 0.3 * np.cos(2 * np.pi * phase) + 0.8 * peak], axis=1)
+    noise = np.random.default_rng(1).normal(0.0, 0.01, forces.shape)
+    coarse = replace(first, values=np.round((forces + noise) / 0.2) * 0.2)
+    assert (coarse.values == 1.0).all(axis=1).sum() > 30
+    assert check_zero_forces(coarse) is None
+    lost = np.random.default_rng(2).random(len(phase)) < 0.3
+    found = check_zero_forces(replace(coarse, values=np.where(lost[:, None], 0.0, coarse.values)))
+    assert found is not None
+    assert "are exactly 0 N on every axis" in found.value

@@ -126,6 +126,15 @@ def test_a_hypothesis_at_the_noise_has_no_look_alikes() -> None:
     assert _look_alikes(state(cubic, gain), cast("Any", refit(cubic, excess=0.05))) == []
 
 
+def test_a_hypothesis_at_the_noise_competes_with_look_alikes_of_fewer_genes() -> None:
+    """They may explain as much at a lower cost, such as a stall without a vortex what a stall with one explains."""
+    mass, cubic = trial("point_mass", confused_with=("cubic",)), trial("cubic")
+    assert len(mass.suspect.genes) > len(cubic.suspect.genes)
+    found = _look_alikes(state(mass, cubic), cast("Any", refit(mass, excess=0.05)))
+    assert names(found) == [("cubic",)]
+    assert _look_alikes(state(mass, cubic), cast("Any", refit(cubic, excess=0.05))) == []
+
+
 def test_fits_from_the_estimates_ignore_the_given_start() -> None:
     rig = PendulumRig()
     context = FitContext(rig, WhitenedData.of(recorded({})), InProcessEvaluator())
