@@ -2,25 +2,26 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
-# What running needs, and with it the tools of development.
+# What running needs, with it the tools of development, and the compiled simulator.
 RUNS := $(VENV)/runs
 INSTALLED := $(VENV)/installed
+COMPILED := $(VENV)/compiled
 
 .PHONY: demo docs proof test test-service test-pages test-programs test-rest check check-wheel serve format lock install pin-image check-image clean
 
-demo: $(RUNS)  ## start the service, calibrate the example campaign, print what came out
+demo: $(COMPILED)  ## start the service, calibrate the example campaign, print what came out
 	@$(BIN)/python -m examples.demo
 
-proof: $(RUNS)  ## play three stories on concealed data, each ending with a report; under 15 minutes
+proof: $(COMPILED)  ## play three stories on concealed data, each ending with a report; under 15 minutes
 	@$(BIN)/python -m benchmarks.proof --json
 
 docs: $(INSTALLED)  ## build the manual, with a search that needs no server: build/manual/index.html
 	@$(BIN)/python -m docs.manual
 
-serve: $(RUNS)  ## start the service and stay
+serve: $(COMPILED)  ## start the service and stay
 	@$(BIN)/wingfit serve
 
-test: $(INSTALLED)  ## every check and every test, four at a time: programs, servers and browsers wait more than they compute
+test: install  ## every check and every test, four at a time: programs, servers and browsers wait more than they compute
 	@$(MAKE) --no-print-directory -k -j4 test-service test-rest test-programs test-pages check
 
 # Taken out of two of the four parts, so that all take about as long.
@@ -59,7 +60,8 @@ format: $(INSTALLED)  ## rewrite the code in the house format
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
-install: $(INSTALLED)  ## only install, with the tools of development
+install: $(RUNS)  ## only install, with the tools of development; the simulator is compiled meanwhile
+	@$(MAKE) --no-print-directory -j2 $(INSTALLED) $(COMPILED)
 
 # Stamps are written last, so an installation that was interrupted is done again. The package itself needs no index: its
 # build tool is in the lock file, which as a list of constraints also gives the versions of what running needs.
@@ -67,7 +69,10 @@ PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 $(RUNS): pyproject.toml requirements.lock | $(BIN)/python
 	$(PIP) --constraint requirements.lock setuptools
 	$(PIP) --constraint requirements.lock --no-build-isolation -e .
-	@if [ -f sim/warm.py ]; then echo "compiling the simulator once ..." && $(BIN)/python -m wingfit.sim.warm; fi
+	@touch $@
+
+$(COMPILED): $(RUNS)
+	@echo "compiling the simulator once ..." && $(BIN)/python -m wingfit.sim.warm
 	@touch $@
 
 $(INSTALLED): $(RUNS)

@@ -14,8 +14,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import brentq
-from scipy.stats import chi2, ncx2, norm
+import scipy
 
 from wingfit.records.array_types import Array, Float, Index, Int
 
@@ -152,12 +151,12 @@ def detection_probability(distance: float, freedom: int, false_alarm: float) -> 
 
     ``false_alarm``: probability that the test rejects the nominal model although it is right.
     """
-    return float(ncx2.sf(chi2.isf(false_alarm, freedom), freedom, max(distance, 1e-12)))
+    return float(scipy.stats.ncx2.sf(scipy.stats.chi2.isf(false_alarm, freedom), freedom, max(distance, 1e-12)))
 
 
 def detectable_distance(freedom: int, false_alarm: float, power: float) -> float:
     """Return the squared distance at which :func:`detection_probability` is ``power``."""
-    return float(brentq(lambda d: detection_probability(d, freedom, false_alarm) - power, 1e-9, 1e4))
+    return float(scipy.optimize.brentq(lambda d: detection_probability(d, freedom, false_alarm) - power, 1e-9, 1e4))
 
 
 def odds_probability(distance: float, odds: float) -> float:
@@ -167,12 +166,12 @@ def odds_probability(distance: float, odds: float) -> float:
     """
     if distance <= 0.0:
         return 0.0
-    return float(norm.sf((np.log(odds) - 0.5 * distance) / np.sqrt(distance)))
+    return float(scipy.stats.norm.sf((np.log(odds) - 0.5 * distance) / np.sqrt(distance)))
 
 
 def separable_distance(odds: float, power: float) -> float:
     """Return the squared distance at which :func:`odds_probability` is ``power``."""
-    quantile = norm.isf(1.0 - power)
+    quantile = scipy.stats.norm.isf(1.0 - power)
     return float((quantile + np.sqrt(quantile**2 + 2.0 * np.log(odds))) ** 2)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.stats import chi2
+import scipy
 
 from wingfit.calibration.forces.result import LocalEstimate
 
@@ -25,7 +25,8 @@ def disagreements(estimates: Sequence[LocalEstimate]) -> dict[str, float]:
         if len(values) < 2:
             continue
         mean = np.average(values, weights=errors**-2.0)
-        if chi2.sf(np.sum(((values - mean) / errors) ** 2), len(values) - 1) < BY_CHANCE:
+        spread = float(np.sum(((values - mean) / errors) ** 2))
+        if scipy.stats.chi2.sf(spread, len(values) - 1) < BY_CHANCE:
             found[name] = float(np.std(values, ddof=1))
     return found
 

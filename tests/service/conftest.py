@@ -171,11 +171,19 @@ def toy_service(folder: Path, **settings: Any) -> Iterator[tuple[Service, Api]]:
         yield app.state.service, Api(client)
 
 
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    """One for the tests of a module; they are skipped where there is none."""
+@pytest.fixture(scope="package")
+def one_browser() -> Iterator[Browser]:
+    """One for all tests, since it takes a second to start; they are skipped where there is none."""
     with chromium() as started:
         yield started
+
+
+@pytest.fixture(scope="module")
+def browser(one_browser: Browser) -> Iterator[Browser]:
+    """The browser, in which no page is left after the tests of a module."""
+    yield one_browser
+    for context in one_browser.contexts:
+        context.close()
 
 
 @pytest.fixture

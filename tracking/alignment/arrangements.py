@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.stats import norm
+import scipy
 
 from wingfit.records.array_types import Array, Index, Mask
 from wingfit.tracking.alignment.candidates import Candidate, Layout, candidates, gate_of, start_of, with_all
@@ -184,4 +184,4 @@ def sure_of(less: Costs, more: Costs, memory: float) -> float:
     lags = min(math.ceil(2 * memory), len(e) - 1)
     shared = sum((1 - k / (lags + 1)) * float(e[:-k] @ e[k:]) for k in range(1, lags + 1))
     error = math.sqrt(max(float(e @ e), float(e @ e) + 2 * shared))
-    return min(total, -2 * float(norm.logsf(total / max(error, 1e-300))))
+    return min(total, -2 * float(scipy.stats.norm.logsf(total / max(error, 1e-300))))
