@@ -132,12 +132,13 @@ def every_pair(state: SearchState) -> Iterator[tuple[float, str]]:
 def smaller_refits(state: SearchState) -> Iterator[str]:
     """Refit the best of three effects or more without each of them: one that was added early may be needed no longer.
 
-    Of series only: the trials of wings, which never needed it, were done without it.
+    Of forces, also where these were fitted from other genes: a minimum without an effect that is nearly zero cannot be
+    worse than with it. Not of tracks: the trials of wings, which never needed it, were done without it.
     """
     best = state.by_excess[0] if state.refits else None
-    if state.data.kind != "series" or best is None or len(best.trials) < 3:
+    if state.data.kind == "tracks" or best is None or len(best.trials) < 3:
         return
-    tried = {frozenset(one.names) for one in state.refits}
+    tried = {frozenset(one.names) for one in state.refits} if state.data.kind == "series" else set()
     for part in best.trials:
         names = [name for name in best.names if name != part.suspect.name]
         if frozenset(names) not in tried:

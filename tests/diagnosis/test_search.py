@@ -86,6 +86,8 @@ def test_a_series_is_refitted_without_each_of_three_effects(monkeypatch: pytest.
     assert list(smaller_refits(searched)) == []
     searched.data.kind, searched.by_excess = "tracks", [three, two]
     assert list(smaller_refits(searched)) == []
+    searched.data.kind = "forces"
+    assert len(list(smaller_refits(searched))) == 3, "of forces, what was fitted from other genes is fitted again"
 
 
 def test_indistinguishable_single_effects_compete() -> None:
