@@ -8,6 +8,7 @@ series have units of their own, so there the unit is "noise": misfits are divide
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -20,8 +21,14 @@ Verdict = Literal["adequate", "named", "partly named", "ambiguous", "unnamed", "
 VERDICTS: tuple[Verdict, ...] = ("adequate", "named", "partly named", "ambiguous", "unnamed", "measurement fault")
 NAMING: tuple[Verdict, ...] = ("named", "partly named", "measurement fault")  # those with certain effects
 CONFIDENT = 0.75  # probability from which a text calls a model adequate; below, it says that it may not be
+UNCERTAIN = 0.25  # probability of the effects, too low for a name, from which a text does not say that none explains it
 Numbers = tuple[float, ...]
 Table = tuple[tuple[float, ...], ...]
+
+
+def of_the_library(probabilities: Mapping[str, float]) -> float:
+    """Return the probability that effects of the library are what is missing, from those of all verdicts."""
+    return max(1.0 - probabilities.get("adequate", 0.0) - probabilities.get("unnamed", 1.0), 0.0)
 
 
 @dataclass(frozen=True)

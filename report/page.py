@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from wingfit.diagnosis.finding import CONFIDENT, VERDICTS, Finding
+from wingfit.diagnosis.finding import CONFIDENT, UNCERTAIN, VERDICTS, Finding, of_the_library
 from wingfit.report import beat_maps, location, misfits, number_format, ranking, svg, tables, wing_map
 from wingfit.report.layout import figure, panels, render
 from wingfit.report.markup import Markup, tag
@@ -50,6 +50,8 @@ def headline(finding: Finding) -> str:
         return f"Missing physics: {listed(named, 'or')}; these recordings cannot distinguish them"
     if finding.verdict == "adequate" and finding.probabilities.get("adequate", 1.0) < CONFIDENT:
         return "The model may be adequate: these recordings show no missing physics, and cannot exclude it"
+    if finding.verdict == "unnamed" and of_the_library(finding.probabilities) >= UNCERTAIN:
+        return "Missing physics; whether an effect of the library explains it is not certain"
     return {
         "adequate": "The model is adequate: these recordings show no missing physics",
         "named": f"Missing physics: {together or 'a known effect'}",

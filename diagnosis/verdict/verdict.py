@@ -11,7 +11,7 @@ from wingfit.diagnosis.evidence.intervals import gene_values
 from wingfit.diagnosis.evidence.refit import Refit
 from wingfit.diagnosis.evidence.screen import Trial
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
-from wingfit.diagnosis.finding import CONFIDENT, NAMING, VERDICTS, Hypothesis, Verdict
+from wingfit.diagnosis.finding import CONFIDENT, NAMING, UNCERTAIN, VERDICTS, Hypothesis, Verdict, of_the_library
 from wingfit.diagnosis.verdict.weigh_hypotheses import HypothesisWeights
 from wingfit.rigs.suspect import Suspect
 
@@ -170,8 +170,15 @@ def summary(decision: Decision, suspects: Mapping[str, Suspect], texts: Mapping[
             )
         return f"The model is adequate: these recordings show no missing physics. {start}"
     if decision.verdict == "unnamed":
-        return f"Physics is missing that no effect of the library explains: {texts['where']}. {start} " + (
-            f"The best effect, {nearest}, reduces the misfit to {texts['after']}."
+        found = of_the_library(decision.probabilities)
+        what, doubt = "Physics is missing that no effect of the library explains", ""
+        if found >= UNCERTAIN:
+            what = "Physics is missing, and whether an effect of the library explains it is not certain"
+            doubt = (
+                f" That effects of the library are the cause has a probability of {found:.2f}, too little for a name."
+            )
+        return f"{what}: {texts['where']}. {start} " + (
+            f"The best effect, {nearest}, reduces the misfit to {texts['after']}.{doubt}"
             if nearest
             else "No effect explains enough to be worth its genes, and none was added."
         )

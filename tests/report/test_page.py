@@ -127,6 +127,12 @@ def test_a_doubtful_adequate_model_is_not_headed_as_adequate() -> None:
     assert "<h1>The model may be adequate: these recordings show no missing physics, and cannot" in html(doubtful)
 
 
+def test_what_an_effect_may_explain_is_not_headed_as_unexplained() -> None:
+    finding = with_verdict(wing_finding(), "unnamed")
+    doubtful = replace(finding, probabilities=dict.fromkeys(VERDICTS, 0.0) | {"named": 0.7, "unnamed": 0.3})
+    assert "<h1>Missing physics; whether an effect of the library explains it is not certain</h1>" in html(doubtful)
+
+
 def test_the_numbers_shown_are_those_given() -> None:
     text = page(wing_finding()).text
     for said in (

@@ -38,6 +38,23 @@ def test_a_summary_calls_a_model_adequate_only_if_it_is_likely() -> None:
     assert found[1].startswith("The model may be adequate (probability 0.60): ")
 
 
+def test_a_summary_does_not_say_that_nothing_explains_what_an_effect_may_explain() -> None:
+    suspects = cast("Any", {"a": SimpleNamespace(title="The a")})
+    texts = dict.fromkeys(("before", "after", "noise", "where", "held_out"), "")
+    refits, found = (refit(5.0), refit(1.5, ("a",))), []
+    for known in (0.7, 0.1):
+        shares = np.array([0.0, known])
+        decision = decide(HypothesisWeights(refits, np.array([0.0, 9.0]), shares, 1.0 - known, np.array([24.0, 1.5])))
+        assert decision.verdict == "unnamed"
+        found.append(summary(decision, suspects, texts))
+    assert found[0].startswith("Physics is missing, and whether an effect of the library explains it is not certain: ")
+    assert found[0].endswith(
+        " That effects of the library are the cause has a probability of 0.70, too little for a name."
+    )
+    assert found[1].startswith("Physics is missing that no effect of the library explains: ")
+    assert "probability" not in found[1]
+
+
 def test_the_location_of_a_cause_has_an_interval() -> None:
     span, phase = Interval(0.85, 0.37, 0.9), Interval(1.25, 1.2, 1.3)
     assert cause_location(span, Interval(0.5, None, None), phase) == (
