@@ -98,7 +98,10 @@ def _final_fits(state: SearchState, floor: float, suspects: int) -> Iterator[str
         return weigh(state.data, state.fitted_nominal.refit, state.refits, floor, suspects)
 
     known = weighed()
-    yield from _compete(state, _indistinguishable(known) or _look_alikes(state, decide(known).best))
+    starts = _indistinguishable(known)
+    if not starts or state.data.kind == "forces":  # a fit to tracks takes seconds
+        starts += _look_alikes(state, decide(known).best)
+    yield from _compete(state, starts)
     yield "fitting the best hypothesis until it converges"
     state.weights = weighed()
     for _ in range(MAX_CONTINUED):

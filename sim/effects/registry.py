@@ -21,7 +21,10 @@ FILES = (
     ("stream", "residual_air airspeed_error body_pitch_convention body_pitch_error body_drag tail_lift"),
     ("aerodynamics", "added_mass"),
     ("terms", "added_mass_error effective_chord translation viscous"),
-    ("aerodynamics", "zero_lift_angle leading_edge_vortex viscous_drag plate_drag dynamic_stall stall_vortex"),
+    (
+        "aerodynamics",
+        "zero_lift_angle lift_curve leading_edge_vortex viscous_drag plate_drag dynamic_stall stall_vortex",
+    ),
     ("aerodynamics", "rotational_circulation circulation_lag clap_and_peel varying_coefficients"),
     ("wake", "tip_loss wake_tip_loss induced_inflow wake_capture downwash"),
     # along the path of the signal: wing, image, tracker, frame

@@ -82,6 +82,17 @@ def cambered(flow: Flow, lift: float, angle: float) -> Array:
     return np.asarray(-0.5 * flow.chord * flow.speed * angle * slope)
 
 
+def by_suction(flow: Flow, lift: float, strength: float) -> Array:
+    """Change of circulation [n, E] (m^2/s) if potential lift and vortex lift have another ratio.
+
+    Polhamus (1966): C_L = K_p sin alpha cos^2 alpha + K_v cos alpha sin^2 alpha. K_p grows by 4 ``lift`` ``strength``,
+    and K_v falls by as much.
+    """
+    alpha = np.radians(_attack(flow))
+    more = 2.0 * strength * (np.cos(alpha) - np.sin(alpha)) * np.sin(2.0 * alpha) * lift
+    return np.asarray(-0.5 * flow.chord * flow.speed * more * np.sign(flow.met.real * flow.met.imag))
+
+
 def varied(coefficients: Mapping[str, float], condition: Condition, p: Parameters) -> dict[str, float]:
     """Copy of ``coefficients`` with C_l times (f / f_0)^-s exp(s b (a - a_0)), and C_F by its inverse to the power g.
 
@@ -204,6 +215,12 @@ LOADING = (
         source="Munk (1922); slope of the measured lift curve (Dickinson, Lehmann and Sane 1999)",
         both_signs=True,
         values=lambda p: {"zero_lift_angle.angle": p["strength"]},
+    ),
+    _listed(
+        "lift_curve",
+        typical=0.15,
+        source="Polhamus (1966), NASA TN D-3767: potential lift and vortex lift, in another ratio",
+        both_signs=True,
     ),
     _listed(
         "varying_coefficients",

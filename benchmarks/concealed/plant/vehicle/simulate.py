@@ -16,6 +16,7 @@ from benchmarks.concealed.plant.vehicle.flow import Flow, mass_per_length
 from benchmarks.concealed.plant.vehicle.flow import density as density
 from benchmarks.concealed.plant.vehicle.laws import AFTERWARDS, CIRCULATION, GUSTS, LAWS
 from benchmarks.concealed.plant.vehicle.laws_circulation import (
+    by_suction,
     cambered,
     fling,
     revolving_drag,
@@ -310,6 +311,8 @@ def _translation(flow: Flow, coefficients: Mapping[str, float], hidden: Conceale
         gamma -= coefficients["C_l"] * flow.chord * flow.met.real * flow.met.imag / flow.speed
         if strength(hidden, "zero_lift_angle"):
             gamma += cambered(flow, coefficients["C_l"], strength(hidden, "zero_lift_angle"))
+        if strength(hidden, "lift_curve"):
+            gamma += by_suction(flow, coefficients["C_l"], strength(hidden, "lift_curve"))
     if strength(hidden, "translation"):
         gamma += revolving_lift(flow, strength(hidden, "translation"))
     return gamma
