@@ -97,8 +97,8 @@ def weigh(
         probabilities[0], unknown = probabilities[0] - doubted, unknown + doubted
     if data.kind != "series":
         partial = [leaves_a_rest(data, nominal, one, floor) for one in refits]
-        doubted = policy.partial_doubt * np.array([0.0, *(probabilities[1:] * partial)])
-        probabilities, unknown = probabilities - doubted, unknown + float(doubted.sum())
+        imitated = policy.partial_doubt * np.array([0.0, *(probabilities[1:] * partial)])
+        probabilities, unknown = probabilities - imitated, unknown + float(imitated.sum())
     return HypothesisWeights(hypotheses, evidence - evidence[0], probabilities, unknown, excess, data.policy)
 
 

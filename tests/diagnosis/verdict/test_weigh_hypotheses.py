@@ -150,9 +150,9 @@ def test_sharing_with_parts_beside_an_unknown_law_loses_no_probability() -> None
     other = weigh_hypotheses._with_unknown_rest([each[k] for k in ordered], weight[ordered], partial(at, moved))
     np.testing.assert_allclose(other, found[ordered])
     several = [refit(1.82, ("a",)), refit(1.62, ("a", "b")), refit(1.12, ("a", "b", "c"))]
-    found = weigh(data(), refit(4.07), several, 0.0, 40)
-    assert found.probabilities[1] > 10.0 * found.probabilities[2:].sum()
-    assert decide(found).verdict == "unnamed", "the effect alone leaves a fifth, and may imitate the unknown law"
+    weights = weigh(data(), refit(4.07), several, 0.0, 40)
+    assert weights.probabilities[1] > 10.0 * weights.probabilities[2:].sum()
+    assert decide(weights).verdict == "unnamed", "the effect alone leaves a fifth, and may imitate the unknown law"
 
 
 def test_a_small_second_effect_that_leaves_nothing_is_named_beside_a_large_first() -> None:
