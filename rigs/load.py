@@ -8,9 +8,10 @@ import importlib.util
 import sys
 from collections.abc import Mapping
 from dataclasses import replace
+from importlib.machinery import SourceFileLoader
 from importlib.metadata import entry_points
 from pathlib import Path
-from types import ModuleType
+from types import CodeType, ModuleType
 from typing import Any
 
 from wingfit.rigs.rig import Rig
@@ -69,7 +70,7 @@ def _module_of(path: Path) -> ModuleType:
     name = f"wingfit_rig_{path.stem}_{hashlib.sha256(str(path.resolve()).encode() + text).hexdigest()[:12]}"
     if name in sys.modules:
         return sys.modules[name]
-    spec = importlib.util.spec_from_file_location(name, path)
+    spec = importlib.util.spec_from_file_location(name, path, loader=_FromSource(name, str(path)))
     if spec is None or spec.loader is None:
         raise RigError(f"{path} cannot be read as a Python file")
     module = importlib.util.module_from_spec(spec)
@@ -80,6 +81,15 @@ def _module_of(path: Path) -> ModuleType:
         del sys.modules[name]
         raise RigError(f"{path} fails when it is run: {type(error).__name__}: {error}") from error
     return module
+
+
+class _FromSource(SourceFileLoader):
+    """Compiles a file at every load: Python would take the compiled copy of one that was changed in the same second."""
+
+    def get_code(self, fullname: str) -> CodeType:
+        """Return the code of the file as it is now."""
+        path = self.get_filename(fullname)
+        return self.source_to_code(self.get_data(path), path)
 
 
 def _imported(name: str) -> ModuleType:
