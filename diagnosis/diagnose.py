@@ -11,6 +11,7 @@ from importlib.metadata import PackageNotFoundError, version
 from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.preparation import prepare, prepare_rig
 from wingfit.calibration.problem import base_genome
+from wingfit.calibration.spec import CalibrationSpec
 from wingfit.diagnosis.evidence.context import FitContext
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.finding import Finding
@@ -28,6 +29,7 @@ from wingfit.records import AnyRecording, Dataset, FrameError, Series, SeriesDat
 from wingfit.records.blas_threads import one_blas_thread
 from wingfit.rigs.rig import Rig
 from wingfit.rigs.rig_model import RigModel
+from wingfit.sim.vehicle.terms import DRAG
 
 MOST_IN_PAIRS = 20  # suspects of which every pair can be fitted
 SEARCH_FRACTION = 0.7  # of the work; the rest locates the missing physics and validates the hypothesis
@@ -179,7 +181,20 @@ def _prepare(
     calibration = replace(spec.calibration, mode="joint", axes=axes, search_division=None)  # there is no search
     ready = prepare(calibration, dataset)
     (stage,) = ready.stages
-    return subject_of(dataset, calibration), stage.recordings, ready.held_out, stage.free
+    subject = subject_of(dataset, calibration)
+    return subject, stage.recordings, ready.held_out, _with_drag(stage.free, subject, calibration)
+
+
+def _with_drag(free: tuple[str, ...], subject: Subject, spec: CalibrationSpec) -> tuple[str, ...]:
+    """Return the ``free`` genes, with the drag coefficients of a vehicle even if forces along one axis are fitted.
+
+    A calibration of such forces keeps their defaults, which do not describe every wing: then the drag would look like
+    missing physics.
+    """
+    if spec.genes:
+        return free
+    known = [gene.name for gene in subject.model.genes]
+    return tuple(name for name in known if name in free or (name in DRAG and name not in spec.fixed))
 
 
 def _prepare_rig(

@@ -41,6 +41,11 @@ class Policy:
         "slow change of the beat, or excess",
         "a hypothesis that leaves more does not explain a drift of the rig, nor, if hardly worth its genes, a misfit",
     )
+    drift_rivals: float = _threshold(
+        0.33,
+        "nominal residual RMS",
+        "a slow change of the beat this large may be the cause: it moves the mean beat by as much as it changes it",
+    )
     shared: float = _threshold(
         0.12,
         "power of the noise",

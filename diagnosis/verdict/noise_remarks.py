@@ -15,6 +15,9 @@ from wingfit.inference.noise.harmonic import still_markers
 from wingfit.inference.noise.stated import Stated
 from wingfit.records import FrameError
 from wingfit.records.array_types import Array, Float
+from wingfit.sim.filtering import sampling_rate
+
+FINE = 12.0  # samples in a beat: then only the ninth harmonic and higher ones fold to three and below
 
 
 def noise_remarks(data: WhitenedData, unit: str) -> tuple[str, ...]:
@@ -32,7 +35,22 @@ def noise_remarks(data: WhitenedData, unit: str) -> tuple[str, ...]:
             "from the residual of the beat's harmonics, and slow noise may look like misfit: record longer"
         )
     on_changes = (*_drift_remarks(data, unit), *_shared_remarks(data))
+    remarks.extend(_coarse_remarks(data))
     return (*remarks, *_stated_remarks(data), *on_changes, *_uneven_noise_remarks(data, unit), *_faint_remarks(data))
+
+
+def _coarse_remarks(data: WhitenedData) -> tuple[str, ...]:
+    """Return a remark on forces with so few samples in a beat that higher harmonics may fold into the passed ones."""
+    if data.kind != "forces":
+        return ()
+    each = ((one, sampling_rate(one) / one.condition.flap_frequency) for one in data.beat_recordings if one.low_pass)
+    found = [f"{one.name} ({samples:.3g})" for one, samples in each if samples < FINE]
+    remark = (
+        f"there are few samples in a beat of {', '.join(found)}: what the forces contain beyond half the sampling "
+        "rate appears at lower harmonics, unless it was filtered out before sampling, and then looks like missing "
+        f"physics; record at least {FINE:g} samples in a beat, or use an anti-aliasing filter"
+    )
+    return (remark,) if found else ()
 
 
 def _stated_remarks(data: WhitenedData) -> tuple[str, ...]:

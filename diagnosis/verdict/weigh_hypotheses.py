@@ -103,13 +103,22 @@ def weigh(
 
 
 def leaves_a_rest(data: WhitenedData, nominal: Refit, refit: Refit, floor: float) -> bool:
-    """Return whether ``refit`` leaves more than noise, discretisation and the form of a law explain.
+    """Return whether ``refit`` leaves more than noise, discretisation and the form of a law explain, or a drift.
 
     Then something else is missing too, the law is another one, or the effects imitate what is missing. ``floor`` (m or
     N): discretisation error.
     """
     enough = tolerated_excess(data, nominal.excess, floor)
-    return refit.excess > enough and nominal_refuted(data, refit.excess, floor)
+    beyond = refit.excess > enough and nominal_refuted(data, refit.excess, floor)
+    return beyond or _drift_may_cause(data, nominal, refit)
+
+
+def _drift_may_cause(data: WhitenedData, nominal: Refit, refit: Refit) -> bool:
+    """Return whether the beat changes slowly by so much that this may cause the misfit, and ``refit`` explains none."""
+    if not drifts(data) or explains_drift(data, nominal, refit):
+        return False
+    change = float(np.mean((data.drift * data.noise_of_recordings) ** 2))
+    return change > data.policy.drift_rivals**2 * nominal.excess
 
 
 @dataclass(frozen=True)

@@ -133,6 +133,16 @@ def test_an_effect_that_leaves_a_rest_is_never_certain() -> None:
         assert within.probabilities[1] > 0.9, "the error of the noise explains it"
 
 
+def test_effects_that_do_not_explain_a_large_drift_are_never_certain() -> None:
+    """A slow change of the beat moves the mean beat too; a small one, or one that they explain, casts no doubt."""
+    small = 5.0 * POLICY.drift_rivals / 1.1
+    for change, left, most in ((2.0, 1.0, 1.0 - POLICY.partial_doubt), (2.0, 0.1, 1.0), (small, 1.0, 1.0)):
+        named = refit(0.2, ("a",), drift=left)
+        found = weigh(data(drift=change, mean=25.0), refit(5.0), [named], 0.0, 40)
+        assert most - 0.05 < found.probabilities[1] <= most
+        assert found.unknown + found.probabilities.sum() == pytest.approx(1.0)
+
+
 def test_sharing_with_parts_beside_an_unknown_law_loses_no_probability() -> None:
     names = ((), ("a",), ("b",), ("a", "b"), ("a", "b", "c"))
     each = [refit(1.0, one) for one in names]
