@@ -23,7 +23,8 @@ FILES = (
     ("terms", "added_mass_error effective_chord translation viscous"),
     (
         "aerodynamics",
-        "zero_lift_angle lift_curve leading_edge_vortex viscous_drag plate_drag dynamic_stall stall_vortex",
+        "zero_lift_angle lift_curve leading_edge_vortex viscous_drag plate_drag dynamic_stall stall_vortex "
+        "leading_edge_suction",
     ),
     ("aerodynamics", "rotational_circulation circulation_lag clap_and_peel varying_coefficients"),
     ("wake", "tip_loss wake_tip_loss induced_inflow wake_capture downwash"),

@@ -222,6 +222,14 @@ class VehicleScene:
             self.added[:, 0] += self.wings.alike * x
             self.added[:, 1] += self.wings.alike * side.sign * rows[:, PROJECTION] * z
 
+    def push_along_chord(self, force: Array) -> None:
+        """Add a ``force`` [sides, B, n, 8] (N/m) towards the leading edge of every wing to the vehicle."""
+        cosine, sine = self.wings.turns
+        weight, alike = self.stations.weight, self.wings.alike
+        for (rows, side), along in zip(self.wings.sides, force, strict=True):
+            self.added[:, 0] += alike * self.over_span(along * sine, weight)
+            self.added[:, 1] += alike * side.sign * rows[:, PROJECTION] * self.over_span(along * cosine, weight)
+
     # -- for the model -----------------------------------------------------------------------------------------
 
     def rows(self, half_step: float) -> Array:

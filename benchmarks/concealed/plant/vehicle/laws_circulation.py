@@ -58,6 +58,17 @@ def revolving_lift(flow: Flow, strength: float) -> Array:
     return np.asarray(-0.5 * strength * flow.chord * flow.speed * lift * np.sign(flow.met.real * flow.met.imag))
 
 
+def suction(flow: Flow, lift: float, strength: float) -> Array:
+    """Change of the force per length [n, E] (N/m) towards the leading edge if its suction changes by ``strength``.
+
+    Polhamus (1966): potential flow has the thrust K_p sin^2 alpha. Here K_p is 2 ``lift``, and a part
+    sin^2 alpha of the thrust is lost to separation.
+    """
+    alpha = np.radians(_attack(flow))
+    thrust = 2.0 * lift * (np.sin(alpha) * np.cos(alpha)) ** 2
+    return np.asarray(0.5 * flow.rho * flow.chord * flow.speed**2 * strength * thrust * np.sign(flow.met.real))
+
+
 def revolving_drag(flow: Flow, strength: float) -> Array:
     """``strength`` times the drag coefficient [n, E] measured on a revolving wing.
 
@@ -220,6 +231,12 @@ LOADING = (
         "lift_curve",
         typical=0.15,
         source="Polhamus (1966), NASA TN D-3767: potential lift and vortex lift, in another ratio",
+        both_signs=True,
+    ),
+    _listed(
+        "leading_edge_suction",
+        typical=-0.3,
+        source="Polhamus (1966), NASA TN D-3767: suction of potential flow, of which separation takes sin^2 alpha",
         both_signs=True,
     ),
     _listed(

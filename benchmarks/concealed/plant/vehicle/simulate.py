@@ -21,6 +21,7 @@ from benchmarks.concealed.plant.vehicle.laws_circulation import (
     fling,
     revolving_drag,
     revolving_lift,
+    suction,
     tip,
     varied,
     wake_tip,
@@ -266,6 +267,8 @@ def _element_forces(
         flow = replace(flow, met=deflected(flow, bound, vehicle, slope, strength(hidden, "downwash")))
     gamma = _circulation(flow, vehicle, coefficients, air, hidden, terms)
     force = 1j * rho * gamma * flow.met
+    if strength(hidden, "leading_edge_suction"):
+        force += suction(flow, coefficients.get("C_l", 0.0), strength(hidden, "leading_edge_suction"))
     if "viscous" in terms:
         drag = coefficients["C_D0"] * flow.met.real**2 + coefficients["C_Dpi2"] * flow.met.imag**2
         force -= 0.5 * rho * chord * drag / flow.speed * flow.met

@@ -1,4 +1,4 @@
-"""Forces of a balance that hold less than usual: one axis, or few samples in a beat."""
+"""Forces that hold less than usual: one axis, or few samples in a beat."""
 
 from __future__ import annotations
 
