@@ -24,6 +24,12 @@ serve: $(COMPILED)  ## start the service and stay
 test: install  ## every check and every test, four at a time: programs, servers and browsers wait more than they compute
 	@$(MAKE) --no-print-directory -k -j4 test-service test-rest test-programs test-pages check
 
+# The four parts import the same files at the same time: on a fresh clone, each would compile all of them.
+.PHONY: collect
+collect: $(INSTALLED)
+	@$(BIN)/python -m pytest --collect-only -q > $(VENV)/collected || { tail -n 50 $(VENV)/collected; exit 1; }
+test-service test-pages test-programs test-rest: | collect
+
 # Taken out of two of the four parts, so that all take about as long.
 BESIDE := tests/service/jobs tests/service/pages tests/contract tests/export tests/planning
 test-service:

@@ -25,6 +25,8 @@ _running: list[subprocess.Popen[str]] = []
 
 def pytest_collection_finish(session: pytest.Session) -> None:
     """Start the computation if its test is to run."""
+    if session.config.option.collectonly:
+        return
     if any("other_lanes" in getattr(item, "fixturenames", ()) for item in session.items):
         repository = Path(__file__).parents[2]
         environment = {**os.environ, VARIABLE: str(OTHER)}
