@@ -59,6 +59,7 @@ class Parameter:
             the wing (kg).
         place: whether the parameter is a position on the wing where the effect acts.
         wing_only: whether a vehicle does not have the parameter.
+        vehicle_only: whether a wing does not have the parameter.
         positions: of a size that is a choice rather than an amount: the values that it can have besides zero. A fit may
             pass between them, and a diagnosis rejects what ends there. Empty: any value.
         scale: how a search spreads over the bounds, "linear" or "log".
@@ -74,6 +75,7 @@ class Parameter:
     of: Measure | None = None
     place: bool = False
     wing_only: bool = False
+    vehicle_only: bool = False
     positions: tuple[float, ...] = ()
     scale: Scale = "linear"
     assumed: bool = False
@@ -189,7 +191,7 @@ class Effect:
 
     def parameters_of(self, rig: Wing | Vehicle, cameras: Cameras = ()) -> tuple[Parameter, ...]:
         """Return the parameters that the effect has on ``rig``, which the stated ``cameras`` filmed."""
-        here = (p for p in self.parameters if isinstance(rig, Wing) or not p.wing_only)
+        here = (p for p in self.parameters if not (p.vehicle_only if isinstance(rig, Wing) else p.wing_only))
         return tuple(p for p in here if not (p.assumed and cameras))
 
     def genes(self, rig: Wing | Vehicle, cameras: Cameras = ()) -> tuple[Gene, ...]:

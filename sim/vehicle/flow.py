@@ -92,6 +92,13 @@ class StationedWings:
             stations.station_gust(*self.turns, moved, flow.along[k], flow.normal[k])
         self._circulate(flow)
 
+    def blow(self, flow: Flow, air: Array) -> None:
+        """Update ``flow``, in place, for an additional stream of ``air`` [B, n, 8] (m/s) along body x."""
+        cosine, sine = self.turns
+        flow.along += air * sine
+        flow.normal += air * cosine
+        self._circulate(flow)
+
     def forces(self, flow: Flow) -> Array:
         """Circulatory (fling included) and viscous forces [B, 2, n] (N) of all wings in ``flow`` along body x and z."""
         out = np.zeros((len(self.turning), 2, self.turning.shape[1]))

@@ -15,6 +15,7 @@ from wingfit.sim.kernels.laws import BEFORE, strip_port
 from wingfit.sim.vehicle.states import settled_inflow
 
 _STILL = 1e-12  # m^2/s^2, keeps the mass flow differentiable in still air
+_TRIANGLE = 1.5  # inflow at the tip over its mean over the disc, where it is proportional to the radius
 _SCALE = 0.1  # motion of the wing over the motion of the air that causes it
 
 
@@ -29,13 +30,13 @@ def swept_area(span: float, stroke: Array, wings: int) -> Array:
 
 
 def _induce(scene: VehicleScene, values: Values) -> None:
-    """Add the periodic inflow v along body x, through the disc that the vehicle's wings sweep, to the scene.
+    """Add the periodic inflow along body x, through the disc that the vehicle's wings sweep, to the scene.
 
-    It solves m v' + 2 rho A V_T v = share T(v), V_T^2 = (U_x + mean v)^2 + U_z^2, with the air's apparent mass m and
-    density rho, the disc's area A, the stream (U_x, U_z) the thrust T of the wings, and the effect's size share. T is
-    taken as linear in v between zero and the inflow of hover, then once more about the solution. v is computed at every
-    second instant, because it is smooth. The force of added mass in the model does not include the rate of change of
-    the inflow.
+    Its mean v over the disc solves m v' + 2 rho A V_T v = share T(v), V_T^2 = (U_x + mean v)^2 + U_z^2, with the air's
+    apparent mass m and density rho, the disc's area A, the stream (U_x, U_z), the thrust T of the wings, and the
+    effect's size share. T is taken as linear in v between zero and the inflow of hover, then once more about the
+    solution. v is computed at every second instant, because it is smooth. The force of added mass in the model includes
+    neither the rate of change of the inflow nor the part that grows with the radius.
     """
     vehicle, wings = scene.setting.vehicle, scene.wings.every(2)
     flap, share = scene.angles.flap[:, 0], values["share"][:, None]
@@ -44,10 +45,15 @@ def _induce(scene: VehicleScene, values: Values) -> None:
     stream = scene.airspeed[:, None] * np.stack([np.cos(scene.incidence), np.sin(scene.incidence)], axis=1)
     met = scene.forward(scene.inflow)[:, ::2]
 
-    def thrust(inflow: Array | float) -> Array:
-        return share * wings.forces(wings.flow(met + inflow))[:, 0]
+    same, outward = 1.0 - values["outward"][:, None], values["outward"][:, None] * _TRIANGLE
+    x = wings.places.r / vehicle.span
 
-    still = thrust(0.0)
+    def thrust(inflow: Array) -> Array:
+        flow = wings.flow(met + same * inflow)
+        wings.blow(flow, (outward * inflow)[:, :, None] * x)
+        return share * wings.forces(flow)[:, 0]
+
+    still = thrust(np.zeros((len(scene), 1)))
     mean = still.mean(axis=1)
     # never zero: the slope is a difference over it
     hover = np.copysign(np.sqrt(np.abs(mean) / np.maximum(flux, 1e-12)) + 1e-3, mean)[:, None]
@@ -55,7 +61,9 @@ def _induce(scene: VehicleScene, values: Values) -> None:
     settled_inflow(still, slope, flux, mass, stream, 2.0 * scene.step, inflow)
     settled_inflow(thrust(inflow) + slope * inflow, slope, flux, mass, stream, 2.0 * scene.step, inflow)
     between = 0.5 * (inflow + np.roll(inflow, -1, axis=1))
-    scene.inflow = scene.inflow + np.stack([inflow, between], axis=2).reshape(scene.inflow.shape)
+    v = np.stack([inflow, between], axis=2).reshape(scene.inflow.shape)
+    scene.inflow = scene.inflow + same * v
+    scene.after("wake", lambda: scene.wings.blow(scene.flow, (outward * v)[:, :, None] * x))
 
 
 def slices(edges: Array) -> Array:
@@ -113,18 +121,29 @@ EFFECT = effect_of_air(
     title="Induced inflow",
     size=(
         Parameter(
-            "share", "1", 0.0, 2.0, 0.5, "fraction of the thrust (vehicle) or lift (wing) that drives the inflow"
+            "share", "1", 0.0, 4.0, 0.5, "thrust (vehicle) or lift (wing) that drives the inflow, over all of it"
         ),
     ),
     shape=(
         Parameter(
             "inertia", "1", 0.1, 3.0, 1.0, "mass of the accelerated air over the apparent mass of a disc", scale="log"
         ),
+        Parameter(
+            "outward",
+            "1",
+            0.0,
+            1.0,
+            0.5,
+            "how far the inflow grows with the radius; 0: uniform, 1: in proportion to it",
+            vehicle_only=True,
+        ),
     ),
     memory="on a vehicle the mean inflow through the swept disc; on a wing in a tunnel the inflow of each strip",
     law="m v' + 2 rho A V_T v = share T(v)             vehicle\n"
+    "v(r) = v (1 - outward + outward 3 r / (2 R))  vehicle\n"
     "m v' = -share L - 2 rho A |U + v| v           each strip of a wing",
-    source="Glauert (1926): momentum theory; Pitt and Peters (1981), Vertica 5, 21: apparent mass of the air",
+    source="Glauert (1926): momentum theory; Pitt and Peters (1981), Vertica 5, 21: apparent mass of the air; Leishman "
+    "(2006), section 3.3: inflow over the radius",
     signature="the mean force is smaller, most in hover and least in fast flight",
     confused_with=("tip_loss", "airspeed_error", "residual_air"),
     wing=_wing,
