@@ -66,6 +66,8 @@ def main() -> None:
     trials = plan(arguments.seed, quick=arguments.quick, only=arguments.only, lattice=lattice)
     trials = tuple(one for one in trials if arguments.rig in (None, one.build.rig))[: arguments.first]
     before = results.read(arguments.results, arguments.seed) if arguments.results else None
+    if before:
+        results.check_plan(before, trials)
     known = {mark.trial for mark in before.marks} if before else set[str]()
     new = tuple(trial for trial in trials if trial.name not in known)
     with tempfile.TemporaryDirectory() as scratch:

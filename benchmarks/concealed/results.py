@@ -15,6 +15,7 @@ from benchmarks.common.machine import commit, cpu
 from benchmarks.concealed.exhaustive import Compared
 from benchmarks.concealed.score import Mark
 from benchmarks.concealed.table import Advised, Table
+from benchmarks.concealed.trials import Trial
 
 LISTS = ("truth", "named", "top", "best", "default")  # fields that JSON turns into lists
 
@@ -42,6 +43,28 @@ def read(path: Path, seed: int) -> Table | None:
     if len(set(names)) < len(names):
         raise ValueError(f"{path} holds a trial twice; remove one of its lines")
     return joined(tables)
+
+
+def check_plan(table: Table, trials: Sequence[Trial]) -> None:
+    """Raise ValueError if ``table`` has scores of trials that another plan than ``trials`` has under the same names.
+
+    With and without a vortex lattice, the trials of a seed have other names.
+    """
+    planned = {trial.name: trial for trial in trials}
+    for mark in table.marks:
+        trial = planned.get(mark.trial)
+        if trial and not _is_of(mark, trial):
+            raise ValueError(
+                f"the results have {mark.trial} as one of {mark.group!r} with {', '.join(mark.truth) or 'nothing'} "
+                f"hidden, the plan as one of {trial.group!r} with {', '.join(trial.hidden) or 'nothing'}: they are of "
+                "a run with another --quick, or with a vortex lattice where this one has none, or the reverse; give "
+                "another file, or run as then"
+            )
+
+
+def _is_of(mark: Mark, trial: Trial) -> bool:
+    """Return whether ``mark`` may be of ``trial``; a plant may hide more than what its trial hides."""
+    return (mark.group, mark.rig) == (trial.group, trial.build.rig) and set(trial.hidden) <= set(mark.truth)
 
 
 def joined(tables: Sequence[Table]) -> Table:

@@ -23,6 +23,7 @@ from benchmarks.concealed.trials import (
     EQUAL,
     VEHICLE,
     Trial,
+    plan,
 )
 from wingfit.diagnosis.finding import Finding, Floors, GeneValue, Hypothesis, Interval, RecordingMisfit, Verdict, Where
 from wingfit.records import Condition, load_dataset, wing_or_vehicle
@@ -240,6 +241,18 @@ def test_scores_of_parts_are_added_up(tmp_path: Path) -> None:
     results.append(path, 8, second)
     with pytest.raises(ValueError, match="twice"):
         results.read(path, 8)
+
+
+def test_scores_of_another_plan_are_refused() -> None:
+    """The names of the trials depend on whether a seed has trials in a vortex lattice."""
+    trials, others = plan(8), plan(8, lattice=True)
+    marks = tuple(
+        replace(trial_mark(0, one.group, 1.0), trial=one.name, rig=one.build.rig, truth=one.hidden) for one in trials
+    )
+    results.check_plan(Table(marks, (), 0, 1.0), trials)
+    results.check_plan(Table(marks, (), 0, 1.0), trials[::2])
+    with pytest.raises(ValueError, match="vortex lattice"):
+        results.check_plan(Table(marks, (), 0, 1.0), others)
 
 
 def test_a_failed_diagnosis_gets_the_worst_score() -> None:
