@@ -158,20 +158,25 @@ def test_streams_of_one_job_share_a_read_and_get_every_change(tmp_path: Path) ->
         looks.append(after)
         return job(states[min(database.version - first, 2)]), []
 
-    async def watch() -> list[bytes]:
-        return [part async for part in events._stream(Watched("run_1", "generation", look), 0)]
+    told: list[list[bytes]] = [[] for _ in range(20)]
 
-    async def all_of_them() -> list[list[bytes]]:
-        watching = [asyncio.create_task(watch()) for _ in range(20)]
-        for _ in range(2):
-            await asyncio.sleep(0.05)
-            with database.write():
-                pass
-            changes.publish("run_1")
-        return await asyncio.gather(*watching)
+    async def watch(own: list[bytes]) -> None:
+        async for part in events._stream(Watched("run_1", "generation", look), 0):
+            own.append(part)  # noqa: PERF401 - each part is seen as it comes
+
+    async def all_of_them() -> None:
+        watching = [asyncio.create_task(watch(own)) for own in told]
+        async with asyncio.timeout(60.0):
+            for number in (1, 2):
+                while any(len(own) < number for own in told):
+                    await asyncio.sleep(0.01)
+                with database.write():
+                    pass
+                changes.publish("run_1")
+            await asyncio.gather(*watching)
 
     first = database.version
-    told = asyncio.run(all_of_them())
+    asyncio.run(all_of_them())
     assert [[state for state in states if state.encode() in part] for part in told[0]] == [[state] for state in states]
     assert told == [told[0]] * 20
     assert len(looks) == 3
