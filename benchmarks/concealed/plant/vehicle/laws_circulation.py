@@ -235,7 +235,7 @@ LOADING = (
     ),
     _listed(
         "leading_edge_suction",
-        typical=-0.3,
+        typical=0.3,
         source="Polhamus (1966), NASA TN D-3767: suction of potential flow, of which separation takes sin^2 alpha",
         both_signs=True,
     ),
