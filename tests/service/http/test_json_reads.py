@@ -158,17 +158,17 @@ def test_streams_of_one_job_share_a_read_and_get_every_change(tmp_path: Path) ->
         looks.append(after)
         return job(states[min(database.version - first, 2)]), []
 
-    told: list[list[bytes]] = [[] for _ in range(20)]
+    sent: list[list[bytes]] = [[] for _ in range(20)]
 
     async def watch(own: list[bytes]) -> None:
         async for part in events._stream(Watched("run_1", "generation", look), 0):
             own.append(part)  # noqa: PERF401 - each part is seen as it comes
 
     async def all_of_them() -> None:
-        watching = [asyncio.create_task(watch(own)) for own in told]
+        watching = [asyncio.create_task(watch(own)) for own in sent]
         async with asyncio.timeout(60.0):
             for number in (1, 2):
-                while any(len(own) < number for own in told):
+                while any(len(own) < number for own in sent):
                     await asyncio.sleep(0.01)
                 with database.write():
                     pass
@@ -177,8 +177,8 @@ def test_streams_of_one_job_share_a_read_and_get_every_change(tmp_path: Path) ->
 
     first = database.version
     asyncio.run(all_of_them())
-    assert [[state for state in states if state.encode() in part] for part in told[0]] == [[state] for state in states]
-    assert told == [told[0]] * 20
+    assert [[state for state in states if state.encode() in part] for part in sent[0]] == [[state] for state in states]
+    assert sent == [sent[0]] * 20
     assert len(looks) == 3
     assert not events._reads, "nothing is kept of what was sent"
     database.close()
