@@ -102,29 +102,29 @@ def _substituted_refits(state: SearchState) -> Iterator[str]:
             yield from _refit_untried(state, tried, [*others, trial])
 
 
-def every_pair(state: SearchState) -> Iterator[tuple[float, str]]:
+def every_pair(state: SearchState, bases: int | None = None) -> Iterator[tuple[float, str]]:
     """Fit each suspect alone and each pair of them that was not fitted yet; yields the fraction done and the stage.
 
     A pair starts from the better of its two single fits, at which the other effect is score-tested, or from the nominal
-    fit where neither has one.
+    fit where neither has one. ``bases``: only pairs with one of so many of the best single fits.
     """
     tried = {frozenset(one.names) for one in state.refits}
     found = [trials[0] for trials in state.trials if trials]
-    whole = max(len(found) * (len(found) - 1) // 2, 1)
+    whole = max(len(found) * (len(found) - 1) // 2, 1) if bases is None else max(bases * (len(found) - 1), 1)
 
     def done(stage: str) -> tuple[float, str]:
         return min(sum(len(names) == 2 for names in tried) / whole, 1.0), stage
 
     for trial in found:
         yield from map(done, _refit_untried(state, tried, [trial]))
-    singles = [fit_to_convergence(state.context, one) for one in state.by_excess if len(one.trials) == 1]
-    for base in singles:
+    singles = [one for one in state.by_excess if len(one.trials) == 1][:bases]
+    for base in [fit_to_convergence(state.context, one) for one in singles]:
         state.add(base)
         others = [one for one in state.suspects if frozenset((*base.names, one.name)) not in tried]
         for _, trials in score_tests(state.context, base.fit, others, base.names):
             if trials:
                 yield from map(done, _refit_untried(state, tried, [*base.trials, trials[0]], base.fit))
-    for k, one in enumerate(found):
+    for k, one in enumerate(found if bases is None else []):
         for other in found[:k]:
             yield from map(done, _refit_untried(state, tried, [one, other]))
 

@@ -35,6 +35,7 @@ Steps = Iterator[tuple[float, str]]  # fraction of the work done, and the next s
 FAULTS = ("measurement", "input")  # families of suspects that do not act within the simulation
 MAX_INNER = 12  # suspects that are fitted from a large size
 MAX_RESTARTED = 3  # suspects that are also fitted from the estimates
+MAX_BASES = 2  # single effects that are fitted with each other one where nothing explains forces
 MAX_OVERTAKING = 3  # hypotheses that have not converged and are looked at
 
 
@@ -54,19 +55,21 @@ def run_search(state: SearchState, free: tuple[str, ...]) -> Steps:
         fit = state.fitted_again(fit)
     yield 0.25, "comparing with a finer discretisation"
     suspects = state.suspects
+    tested, again = (0.55, 0.6) if spec.exhaustive or state.data.kind == "forces" else (0.85, 0.92)
     for fraction, stage in _search_coarse_first(state, fit, suspects):
-        yield 0.3 + 0.55 * fraction, stage
-    yield 0.85, "fitting the nominal model again"
+        yield 0.3 + (tested - 0.3) * fraction, stage
+    yield tested, "fitting the nominal model again"
     better = _nominal_from_best(state)
     if better is not None:
         state.restart_from(replace(state.fitted_nominal, refit=better))
         for fraction, stage in _try_suspects(state, suspects):
-            yield 0.85 + 0.07 * fraction, stage
-    yield 0.92, "comparing with a finer discretisation"
-    yield from ((0.93, stage) for stage in _refine_and_extend(state))
-    yield from ((0.93, stage) for stage in smaller_refits(state))
-    if spec.exhaustive and state.refits:
-        yield from ((0.93 + 0.01 * part, stage) for part, stage in every_pair(state))
+            yield tested + (again - tested) * fraction, stage
+    yield again, "comparing with a finer discretisation"
+    yield from ((again + 0.01, stage) for stage in _refine_and_extend(state))
+    yield from ((again + 0.01, stage) for stage in smaller_refits(state))
+    if state.refits and (spec.exhaustive or (state.data.kind == "forces" and not state.one_effect_explains)):
+        pairs = every_pair(state, None if spec.exhaustive else MAX_BASES)
+        yield from ((again + 0.01 + (0.93 - again) * part, stage) for part, stage in pairs)
     yield 0.94, "continuing the best refits"
     if state.refits:
         _continue_best(state)

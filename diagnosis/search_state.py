@@ -151,6 +151,11 @@ class SearchState:
         return not self.refits or self.by_excess[0].excess <= self.partner_threshold
 
     @property
+    def one_effect_explains(self) -> bool:
+        """Whether a refit with a single effect needs no second one."""
+        return any(one.excess <= self.partner_threshold for one in self.refits if len(one.trials) == 1)
+
+    @property
     def beats_unknown_law(self) -> bool:
         """Whether the best refit explains as much as a law outside the library would (`Policy.unknown_residual`)."""
         least = min((one.excess for one in self.refits), default=np.inf)

@@ -24,6 +24,7 @@ class DiagnosisSpec:
         suspects: names of the effects to consider; empty means the whole library.
         refine: whether the diagnosis may change to a finer discretisation where the present one limits the fit.
         refits: largest number of suspects that are added to the model and fitted, one at a time, after the score tests.
+            Where none of them explains forces, all suspects are.
         exhaustive: whether every suspect and every pair of suspects is fitted where the nominal model does not suffice,
             not only those that score tests propose; for at most 20 suspects.
         axes: force axes to fit ("x", "z"); empty means all that every recording has. Ignored for tracks.
