@@ -23,7 +23,16 @@ from benchmarks.concealed.plant.law import Concealed
 from benchmarks.concealed.seal import read, seal
 from benchmarks.concealed.strength import Refit, rms, stacked, strength_for
 from benchmarks.concealed.trials import ENTIRE, REST, Trial, conditions, name_of
-from wingfit.records import Condition, Dataset, Recording, Vehicle, load_dataset, save_dataset, wing_or_vehicle
+from wingfit.records import (
+    Condition,
+    Dataset,
+    DatasetError,
+    Recording,
+    Vehicle,
+    load_dataset,
+    save_dataset,
+    wing_or_vehicle,
+)
 
 Array = npt.NDArray[np.float64]
 
@@ -136,8 +145,11 @@ def make(order: Order) -> str:
     raise RuntimeError(f"{order.trial} cannot be recorded: {'; '.join(reasons)}")
 
 
-def add(order: Addition) -> None:
-    """Record one more condition of a trial's rig, and save the dataset extended by it."""
+def add(order: Addition) -> bool:
+    """Record one more condition of a trial's rig, and save the dataset extended by it.
+
+    Returns False where the dataset refuses the recording, such as forces that no balance for this vehicle measures.
+    """
     dataset, answer = wing_or_vehicle(load_dataset(order.dataset)), read(order.sealed / f"{order.trial.name}.json")
     secrets = [secret for secret in answer.secrets if secret.name not in order.trial.build.by_nature]
     hidden = {secret.name: dict(secret.parameters) for secret in secrets}
@@ -146,7 +158,11 @@ def add(order: Addition) -> None:
     more = specimen.made(len(dataset.recordings), order.condition).recording
     taken = {one.name for one in dataset.recordings}
     name = more.name if more.name not in taken else f"{more.name}-again"
-    save_dataset(replace(dataset, recordings=(*dataset.recordings, replace(more, name=name))), order.longer)
+    try:
+        save_dataset(replace(dataset, recordings=(*dataset.recordings, replace(more, name=name))), order.longer)
+    except DatasetError:
+        return False
+    return True
 
 
 def _made(trial: Trial, attempt: int) -> tuple[Dataset, Answer]:

@@ -145,7 +145,7 @@ def follow_up(
     """Record each rig once more, under the advised and under a random condition, and diagnose again.
 
     ``first``: outcomes of the first diagnoses by trial. Returns the new outcomes by label, ``TRIAL-advised`` and
-    ``TRIAL-random``.
+    ``TRIAL-random``; none where the dataset refuses the new recording.
     """
     wanted = [
         (trial, label, condition)
@@ -161,8 +161,9 @@ def follow_up(
             record_trial.Addition(trial, condition, folders.dataset(trial.name), folders.dataset(label), folders.sealed)
             for trial, label, condition in wanted
         ]
-        each(executor, record_trial.add, orders, "recording the advised conditions")
-    again = diagnosed(tool, [task(trial, label, folders) for trial, label, _ in wanted], folders, "diagnosing again")
+        made = each(executor, record_trial.add, orders, "recording the advised conditions")
+    longer = [task(trial, label, folders) for (trial, label, _), kept in zip(wanted, made, strict=True) if kept]
+    again = diagnosed(tool, longer, folders, "diagnosing again")
     return {outcome.trial: outcome for outcome in again}
 
 

@@ -34,8 +34,21 @@ NEARLY_CERTAIN = 0.9  # probability from which fewer conditions are compared
 MAX_CONDITIONS_IF_CERTAIN = 8  # conditions
 MOST_ADAPTED = 12  # conditions in which genes may adapt
 LONGER = 4.0  # times as many beats
+OVERLOAD = 4.0  # times the largest recorded force (root mean square): a balance is chosen for what it is to measure
 
 Step = tuple[float, list[Proposal]]
+
+
+def overloads(predicted: Recording, recorded: Sequence[Recording]) -> bool:
+    """Return whether a force of ``predicted`` is OVERLOAD times the largest of those ``recorded``, or more.
+
+    More wind at once with another angle of attack may multiply the force by ten. Never of tracks.
+    """
+
+    def largest(one: Recording) -> float:
+        return float(np.sqrt(np.nanmean(one.values**2, axis=0)).max())
+
+    return bool(predicted.forces) and largest(predicted) >= OVERLOAD * max(map(largest, recorded))
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +105,7 @@ class InBeat:
         screened = list[tuple[float, Recording]]()
         for k, condition in enumerate(conditions):
             recording = first_prediction(self.context, self.rivals, condition)
-            if recording is not None:
+            if recording is not None and not overloads(recording, self._recordings):
                 most = fixed_separation(self.context, self.rivals, recording)
                 screened += [] if most is None else [(most, recording)]
             yield 0.5 * (k + 1) / len(conditions), []

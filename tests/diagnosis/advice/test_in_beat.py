@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -11,7 +12,7 @@ import pytest
 from tests.diagnosis.pendulum_rig import SUSPECTS, Pendulum, PendulumRig, at, recorded
 from wingfit.calibration.estimates.linearised import free_genes, unit_at
 from wingfit.calibration.problem import Problem, base_genome
-from wingfit.diagnosis.advice.in_beat import LONGER, InBeat, cost_of
+from wingfit.diagnosis.advice.in_beat import LONGER, OVERLOAD, InBeat, cost_of, overloads
 from wingfit.diagnosis.advice.predictions import first_prediction, fixed_separation
 from wingfit.diagnosis.advice.proposal import Proposal
 from wingfit.diagnosis.advice.rivals import Rivals
@@ -21,6 +22,7 @@ from wingfit.diagnosis.evidence.fit import Fit, gauss_newton_fit
 from wingfit.diagnosis.evidence.refit import Refit
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.verdict.weigh_hypotheses import HypothesisWeights
+from wingfit.sim.virtual_rigs.balance import TRIALS, blank_recording
 from wingfit.workers.in_process import InProcessEvaluator
 
 RIG, EVALUATOR = PendulumRig(), InProcessEvaluator()
@@ -52,6 +54,19 @@ def search(frequencies: tuple[float, ...], **missing: float) -> InBeat:
     rivals = Rivals.among(data, weights)
     assert rivals.numbers == (0, 1)
     return InBeat(FitContext(RIG, data, EVALUATOR), rivals, Settling(data, weights, (0, 1), 0.0))
+
+
+def test_a_balance_is_not_overloaded() -> None:
+    """The largest axis of all recordings counts; samples that are missing do not. Tracks have no load."""
+    light = blank_recording(TRIALS[0].condition, "light", 4)
+    light = replace(light, values=np.array([[0.1, 0.2], [np.nan, -0.2], [0.1, 0.2], [0.1, -0.2]]))
+    heavy = replace(light, values=2.0 * light.values)
+    allowed, refused = (replace(light, values=part * OVERLOAD * heavy.values) for part in (0.99, 1.01))
+    assert not overloads(allowed, [light, heavy])
+    assert overloads(refused, [light, heavy])
+    assert overloads(replace(refused, values=refused.values[:, ::-1].copy()), [light, heavy])
+    tracks = recorded(TRUTH)[0]
+    assert not overloads(replace(tracks, values=100.0 * tracks.values), [tracks])
 
 
 def apart(found: InBeat, then: float) -> tuple[Proposal, float]:
