@@ -35,9 +35,9 @@ export function hidePlan() {
 
 export async function showPlan(next) {
   dataset = next;
-  $("plan-part").hidden = false;
   if (isSeries(next)) {
     showCommand(next);
+    $("plan-part").hidden = false;
     return;
   }
   try {
@@ -48,6 +48,7 @@ export async function showPlan(next) {
     return;
   }
   if (dataset !== next) return;
+  $("plan-part").hidden = false; // not before: its name is its title
   const counted = next.recordings.filter((one) => !one.held_out).length;
   $("plan-about").textContent = `What recordings like these will show: how well each gene will be known, which effects will be distinguished, what to record next. The ${plural(counted, "recording")} to fit ${counted === 1 ? "is" : "are"} counted, with the noise seen in ${counted === 1 ? "it" : "them"}: after more data, plan again. Nothing is stored.`;
   show();
