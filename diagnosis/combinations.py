@@ -1,4 +1,4 @@
-"""Refits with several effects together: partners, further effects, substitutes, and all pairs where requested."""
+"""Refits with several effects together: partners, further effects, substitutes, and pairs where requested or needed."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ def _substituted_refits(state: SearchState) -> Iterator[str]:
             yield from _refit_untried(state, tried, [*others, trial])
 
 
-def every_pair(state: SearchState, bases: int | None = None) -> Iterator[tuple[float, str]]:
+def singles_and_pairs(state: SearchState, bases: int | None = None) -> Iterator[tuple[float, str]]:
     """Fit each suspect alone and each pair of them that was not fitted yet; yields the fraction done and the stage.
 
     A pair starts from the better of its two single fits, at which the other effect is score-tested, or from the nominal

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from wingfit.diagnosis.combinations import combined_refits, every_pair, further_effects, smaller_refits
+from wingfit.diagnosis.combinations import combined_refits, further_effects, singles_and_pairs, smaller_refits
 from wingfit.diagnosis.evidence.competing_fits import StartPoint, fit_from_estimates, large_start, start_points
 from wingfit.diagnosis.evidence.fit import FIT_ERRORS, Fit
 from wingfit.diagnosis.evidence.nominal import choose_discretisation, fit_nominal, improves
@@ -68,7 +68,7 @@ def run_search(state: SearchState, free: tuple[str, ...]) -> Steps:
     yield from ((again + 0.01, stage) for stage in _refine_and_extend(state))
     yield from ((again + 0.01, stage) for stage in smaller_refits(state))
     if state.refits and (spec.exhaustive or (state.data.kind == "forces" and not state.one_effect_explains)):
-        pairs = every_pair(state, None if spec.exhaustive else MAX_BASES)
+        pairs = singles_and_pairs(state, None if spec.exhaustive else MAX_BASES)
         yield from ((again + 0.01 + (0.93 - again) * part, stage) for part, stage in pairs)
     yield 0.94, "continuing the best refits"
     if state.refits:

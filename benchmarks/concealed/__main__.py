@@ -12,6 +12,7 @@ import json
 import os
 import sys
 import tempfile
+from collections.abc import Mapping
 from pathlib import Path
 
 from benchmarks.concealed import results
@@ -19,7 +20,7 @@ from benchmarks.concealed.answer import GROUPS
 from benchmarks.concealed.plant.vortex_lattice.simulate import VARIABLE
 from benchmarks.concealed.running import Folders
 from benchmarks.concealed.suite import conduct, make
-from benchmarks.concealed.table import side_by_side
+from benchmarks.concealed.table import Table, side_by_side
 from benchmarks.concealed.trials import plan
 
 DEVELOPMENT = 500_000
@@ -49,6 +50,13 @@ def main() -> None:
         help="add the scores to this file, leave out the trials that it has, and report on all; for a run in parts",
     )
     parser.add_argument(
+        "--stored",
+        type=Path,
+        nargs="+",
+        metavar="FILE",
+        help="run nothing: report on the scores in these files of --results together, of any seeds",
+    )
+    parser.add_argument(
         "--peers", action="store_true", help="also run the two comparison methods; needs the extra [peers]"
     )
     parser.add_argument("--make", type=Path, help="only write datasets for development into this folder")
@@ -59,6 +67,9 @@ def main() -> None:
     if arguments.make:
         trials = plan(DEVELOPMENT + arguments.seed, only=arguments.only)[: arguments.n]
         make(trials, Folders(arguments.make), arguments.jobs)
+        return
+    if arguments.stored:
+        _report({"wingfit": results.of_all_seeds(arguments.stored, arguments.rig, arguments.only)}, arguments.json)
         return
     lattice = bool(os.environ.get(VARIABLE))
     if not lattice:
@@ -76,8 +87,13 @@ def main() -> None:
         results.append(arguments.results, arguments.seed, tables["wingfit"])
     if before:
         tables["wingfit"] = results.joined([before, tables["wingfit"]])
+    _report(tables, arguments.json)
+
+
+def _report(tables: Mapping[str, Table], as_json: bool) -> None:
+    """Print the scores by method, wingfit first."""
     print(side_by_side(tables))
-    if arguments.json:
+    if as_json:
         own, *others = ({"method": name, **table.as_json()} for name, table in tables.items())
         print(json.dumps({**own, "peers": [{**one, "failures": len(one["failures"])} for one in others]}))
 

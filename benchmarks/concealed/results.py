@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -43,6 +43,16 @@ def read(path: Path, seed: int) -> Table | None:
     if len(set(names)) < len(names):
         raise ValueError(f"{path} holds a trial twice; remove one of its lines")
     return joined(tables)
+
+
+def of_all_seeds(paths: Sequence[Path], rig: str | None, only: Sequence[str]) -> Table:
+    """The scores in the files ``paths`` of trials with this ``rig`` and a group in ``only``; None or empty: with any.
+
+    Trials of different seeds have the same names; what is followed up or compared is of all rigs and groups.
+    """
+    table = joined([_table(json.loads(line)) for path in paths for line in path.read_text("utf-8").splitlines()])
+    marks = [one for one in table.marks if rig in (None, one.rig) and (not only or one.group in only)]
+    return replace(table, marks=tuple(marks))
 
 
 def check_plan(table: Table, trials: Sequence[Trial]) -> None:

@@ -235,6 +235,11 @@ def test_scores_of_parts_are_added_up(tmp_path: Path) -> None:
     results.append(path, 8, first)
     results.append(path, 8, second)
     assert results.read(path, 8) == Table((*first.marks, *second.marks), advised, 1, 5.0, compared)
+    both = results.of_all_seeds([path, path], None, ())
+    assert both.marks == 2 * (*first.marks, *second.marks)
+    rig, group = first.marks[0].rig, first.marks[0].group
+    assert all((one.rig, one.group) == (rig, group) for one in results.of_all_seeds([path], rig, [group]).marks)
+    assert results.of_all_seeds([path], rig, ["drift"]).marks == ()
     assert results.joined([first, second]).compared_by_rig == {"wing": 1}
     with pytest.raises(ValueError, match="seed 8, not 9"):
         results.read(path, 9)
@@ -308,7 +313,10 @@ def test_a_later_recording_is_of_the_same_rig(tmp_path: Path) -> None:
     make(Order(trial, tmp_path / "a.nc", tmp_path))
     first = wing_or_vehicle(load_dataset(tmp_path / "a.nc"))
     again = first.recordings[0].condition
-    add(Addition(trial, again, tmp_path / "a.nc", tmp_path / "b.nc", tmp_path))
+    assert add(Addition(trial, again, tmp_path / "a.nc", tmp_path / "b.nc", tmp_path))
+    gale = replace(again, airspeed=40.0)  # a force of far more than ten times the weight
+    assert not add(Addition(trial, gale, tmp_path / "a.nc", tmp_path / "c.nc", tmp_path))
+    assert not (tmp_path / "c.nc").exists()
     longer = wing_or_vehicle(load_dataset(tmp_path / "b.nc"))
     assert longer.held_out == first.held_out
     assert len(longer.recordings) == len(first.recordings) + 1

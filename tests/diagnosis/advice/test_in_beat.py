@@ -119,3 +119,11 @@ def test_what_was_recorded_is_compared_as_a_new_recording_would_be(hardening: In
     proposal, _ = apart(hardening, 2.0)
     assert np.sqrt(again[0, 1]) == pytest.approx(proposal.separation, rel=0.1)
     assert data.beat_recordings[number].condition.flap_frequency == 2.0
+
+
+def test_a_recording_that_overloads_the_balance_is_not_proposed(
+    hardening: InBeat, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert any(found for _, found in hardening._conditions())
+    monkeypatch.setattr("wingfit.diagnosis.advice.in_beat.overloads", lambda *_: True)
+    assert not any(found for _, found in hardening._conditions())
