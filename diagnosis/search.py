@@ -73,7 +73,8 @@ def run_search(state: SearchState, free: tuple[str, ...]) -> Steps:
     yield 0.94, "continuing the best refits"
     if state.refits:
         _continue_best(state)
-    floor = state.floor(0.0 if spec.refine else state.fitted_nominal.discretisation_error or 0.0)
+    nominal = state.fitted_nominal
+    floor = state.floor(nominal.irreducible_error if spec.refine else nominal.discretisation_error or 0.0)
     yield from ((0.95, stage) for stage in _final_fits(state, floor, len(suspects)))
 
 

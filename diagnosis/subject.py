@@ -58,7 +58,7 @@ class Subject(Protocol):
         ...
 
     def finer_subjects(self) -> Sequence[Subject]:
-        """Return the rig with finer discretisations, cheapest first; empty if none exists or all are too costly."""
+        """Return the rig with finer discretisations, as they are tried; empty if none exists or all are too costly."""
         ...
 
 

@@ -36,6 +36,8 @@ class Nominal:
         discretisation_error: root mean square change (m or N) of the simulation by a finer discretisation, as far as
             the genes cannot compensate it; None where there is no finer one.
         finer: description of that finer discretisation; "" where there is none.
+        limited: whether the refinements ended while each still improved the fit; ``discretisation_error`` is the change
+            by the last of them then, which remains where the error halves with every doubling.
         remarks: for the user, on discretisations that were replaced.
         tried_finer: description of a finer discretisation that was fitted with little gain; it shows that
             discretisation is not the cause of the residual. "" where none was fitted.
@@ -47,6 +49,17 @@ class Nominal:
     finer: str
     remarks: tuple[str, ...]
     tried_finer: str = ""
+    limited: bool = False
+
+    @property
+    def irreducible_error(self) -> float:
+        """The discretisation error (m or N) where refinements ended while they improved the fit; otherwise 0."""
+        return self.discretisation_error or 0.0 if self.limited else 0.0
+
+    @property
+    def possible_error(self) -> float:
+        """The discretisation error (m or N), except where a finer discretisation hardly fits better; there 0."""
+        return self.irreducible_error if self.tried_finer else self.discretisation_error or 0.0
 
 
 def fit_nominal(context: FitContext, free: tuple[str, ...], values: Mapping[str, float]) -> Iterator[Fit]:
@@ -100,27 +113,31 @@ def choose_discretisation(context: FitContext, fit: Fit, *, refine: bool) -> Nom
     ``fit``: of the nominal model of ``context``; without ``refine``, finer ones only serve to estimate the error.
     """
     data, current, remarks = context.data, make_refit(context.data, fit), list[str]()
+    last_change: float | None = None
     for _ in range(MAX_REFINEMENTS):
         error, finest, ineffective, better = 0.0, "", "", None
         for finer in context.finer():
             changes, gain = finer_change(finer, current)
-            if changes <= error:
-                continue
-            error, finest, ineffective = changes, finer.subject.description, ""
+            if changes > error:
+                error, finest, ineffective = changes, finer.subject.description, ""
             if refine and finer_is_promising(data, changes, gain, current):
                 found = refit_at(finer, current)
-                ineffective = finest if found else ""
                 if found and improves(data, found, current):
-                    better = fit_to_convergence(finer, found)
+                    better, last_change = fit_to_convergence(finer, found), changes
                     break
+                ineffective = finest if found and changes == error else ineffective
+        if better is None and finest:
+            return Nominal(context.subject, current, error, finest, tuple(remarks), ineffective)
         if better is None:
-            return Nominal(context.subject, current, error if finest else None, finest, tuple(remarks), ineffective)
+            break
         remarks.append(
-            f"the discretisation limits the model: {finest} replaces {context.subject.description} and reduces the "
-            f"excess misfit to {100 * max(better.excess, 0.0) / current.excess:.0f} %"
+            f"the discretisation limits the model: {finer.subject.description} replaces {context.subject.description} "
+            f"and reduces the excess misfit to {100 * max(better.excess, 0.0) / current.excess:.0f} %"
         )
         context, current = finer, better
-    return Nominal(context.subject, current, None, "", tuple(remarks))
+    limited = last_change is not None
+    compared = context.subject.description if limited else ""
+    return Nominal(context.subject, current, last_change, compared, tuple(remarks), limited=limited)
 
 
 def finer_is_promising(data: WhitenedData, changes: float, gain: float, current: Refit) -> bool:

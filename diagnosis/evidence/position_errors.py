@@ -222,8 +222,10 @@ def _standard_deviation(
     shared = _polynomial(rest, degree)
     own = np.stack([_beyond(shared, one) for one in errors.T], axis=1)
     spread = NORMAL_MAD * float(np.median(np.abs(own))) * np.sqrt(len(rest) / (len(rest) - shared.shape[1]))
-    usual[shown] = (own**2).sum(axis=1) < scipy.special.chdtri(3, BY_CHANCE / len(rest)) * spread**2
-    return float(np.sqrt(max(spread**2 - float(np.mean(variance)), 0.0))), usual
+    near = (own**2).sum(axis=1) < scipy.special.chdtri(3, BY_CHANCE / len(rest)) * spread**2
+    usual[shown] = near
+    mean_square = float(np.mean(own[near] ** 2)) * len(rest) / (len(rest) - shared.shape[1])
+    return float(np.sqrt(max(mean_square - float(np.mean(variance)), 0.0))), usual
 
 
 def _polynomial(rest: Float[Array, "M 2"], degree: int) -> Float[Array, "M Q"]:

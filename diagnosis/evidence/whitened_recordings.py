@@ -333,12 +333,13 @@ class WhitenedData:
 
     @cached_property
     def excess_standard_error(self) -> float:
-        """Standard error of :meth:`excess` (m^2 or N^2) by noise alone.
+        """Standard error of :meth:`excess` (m^2 or N^2) by noise, and by errors of rest positions that markers share.
 
         The noise of means and trends lies at lower frequencies than where noise is measured, between the harmonics, so
         its variance is known up to a factor only: half of it counts as error. The noise of different markers is
         independent. That of different harmonics is not, since beats differ in size or timing as a whole; so each
-        marker, and a recording of forces as a whole, counts as one sample of its noise.
+        marker, and a recording of forces as a whole, counts as one sample of its noise. What errors of rest positions
+        share as a rigid motion has nine normal components, so its mean square varies too.
         The coefficients of a series have independent noise, whose variance is known up to a relative error.
         """
         every = self.weight * self.variance
@@ -351,7 +352,19 @@ class WhitenedData:
             for recording, fit in zip(self.recordings, self.beat_fits, strict=True)
         )
         slow = np.concatenate([np.tile((v.order == 0) | v.trend, int(v.used.sum())) for v in self.beat_fits])
-        return float(every[slow].sum() / 2.0 + np.sqrt(2.0 / independent) * every.sum())
+        noise = every[slow].sum() / 2.0 + np.sqrt(2.0 / independent) * every.sum()
+        return float(np.hypot(noise, self._standard_error_by_rigid_errors))
+
+    @cached_property
+    def _standard_error_by_rigid_errors(self) -> float:
+        """Standard error (m^2) of :meth:`excess` by ``rigid_errors``, whose squares have a weighted sum of chi-squares.
+
+        Its variance is twice the sum of the squares of the quadratic form's entries.
+        """
+        if self.rigid_errors is None:
+            return 0.0
+        form = self.rigid_errors.T @ (self.weight[:, None] * self.rigid_errors)
+        return float(np.sqrt(2.0 * np.sum(form**2)))
 
     @cached_property
     def excess_standard_error_of_samples(self) -> float:

@@ -199,11 +199,8 @@ def _noise_remarks(data: WhitenedData, nominal: Refit, unit: str, decision: Deci
 
 def _discretisation_error(state: SearchState) -> float:
     """Return the misfit (m or N) by the discretisation: at most the best residual, 0 if a finer one fits no better."""
-    nominal = state.fitted_nominal
-    if nominal.discretisation_error is None or nominal.tried_finer:
-        return 0.0
     least = min(one.excess for one in state.final_weights.refits)
-    return min(nominal.discretisation_error, float(np.sqrt(max(least, 0.0))))
+    return min(state.fitted_nominal.possible_error, float(np.sqrt(max(least, 0.0))))
 
 
 def _floors(state: SearchState) -> Floors:

@@ -67,7 +67,7 @@ def locate_in_beat(
 def _only_drifts(state: SearchState, decision: Decision) -> bool:
     """Return whether only a drift speaks against the nominal model: then its misfit shows no place on the wing."""
     nominal = state.fitted_nominal
-    floor = state.floor(0.0 if nominal.tried_finer else nominal.discretisation_error or 0.0)
+    floor = state.floor(nominal.possible_error)
     return decision.verdict in ("unnamed", "ambiguous") and only_drifts(state.data, nominal.refit, floor)
 
 

@@ -13,7 +13,7 @@ from wingfit.calibration.spec import CalibrationSpec
 from wingfit.diagnosis import DiagnosisSpec, Finding, diagnose
 from wingfit.diagnosis.evidence.context import FitContext
 from wingfit.diagnosis.evidence.fit import gauss_newton_fit
-from wingfit.diagnosis.evidence.position_errors import _own, axes_at_markers, find_position_errors
+from wingfit.diagnosis.evidence.position_errors import PositionErrors, _own, axes_at_markers, find_position_errors
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.rigs import subject_of
 from wingfit.records import Dataset, Recording, Wing
@@ -84,18 +84,32 @@ def test_the_axes_turn_with_the_wing() -> None:
         assert error < 0.1, k
 
 
-def measured(dataset: Dataset) -> float | None:
+def measured(dataset: Dataset) -> tuple[PositionErrors, WhitenedData] | None:
     subject, fitted = subject_of(dataset, SPEC), dataset.recordings[:-1]
     context = FitContext(subject, WhitenedData.of(fitted), InProcessEvaluator())
     problem = context.problem(subject.model, tuple(subject.model.searched), base_genome(subject.model, {}))
     *_, nominal = gauss_newton_fit(context, problem, np.full(len(problem.free), 0.5), 4)
-    found = find_position_errors(subject, context.data, nominal)
-    return found[0].sd if found else None
+    return find_position_errors(subject, context.data, nominal)
 
 
 def test_their_size_is_measured_and_exact_positions_have_none() -> None:
     assert measured(described(0.0)) is None
-    assert measured(described(HAND)) == pytest.approx(HAND, rel=0.2)
+    found = measured(described(HAND))
+    assert found is not None
+    assert found[0].sd == pytest.approx(HAND, rel=0.12)
+
+
+def test_the_standard_error_of_the_excess_contains_what_they_share_by_chance() -> None:
+    """Against many draws of the nine rigid motions of the errors."""
+    found = measured(described(HAND))
+    assert found is not None
+    data = found[1]
+    assert data.rigid_errors is not None
+    draws = np.random.default_rng(5).standard_normal((4000, data.rigid_errors.shape[1])) @ data.rigid_errors.T
+    scatter = float(np.std((data.weight * draws**2).sum(axis=1)))
+    by_noise = replace(data, rigid_errors=None).excess_standard_error
+    assert data.excess_standard_error**2 - by_noise**2 == pytest.approx(scatter**2, rel=0.1)
+    assert scatter > 0.2 * by_noise
 
 
 def test_what_a_rigid_wing_does_is_not_taken_for_errors_beside_markers_that_slipped() -> None:

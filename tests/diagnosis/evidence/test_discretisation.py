@@ -1,0 +1,100 @@
+"""The choice of a discretisation: how far it goes on, and which part of its error remains."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from wingfit.calibration.problem import base_genome
+from wingfit.calibration.spec import CalibrationSpec
+from wingfit.diagnosis import DiagnosisSpec, diagnose
+from wingfit.diagnosis.evidence import nominal
+from wingfit.diagnosis.evidence.nominal import MAX_REFINEMENTS, Nominal, choose_discretisation
+from wingfit.diagnosis.policy import POLICY
+from wingfit.records import Dataset
+from wingfit.sim.virtual_rigs.campaign import REFERENCE, Tracking, record, robird_wing, tunnel, vacuum
+from wingfit.sim.wing.flexible_wing import FlexibleWing
+from wingfit.workers.in_process import InProcessEvaluator
+
+
+@dataclass(frozen=True)
+class Ladder:
+    """A wing whose error halves with each doubling of its ``strips``, as far as ``most``; more do not fit better."""
+
+    strips: int
+    most: int
+    last: int = 1000
+
+    @property
+    def data(self) -> Any:
+        return SimpleNamespace(policy=POLICY, noise=0.1)
+
+    @property
+    def subject(self) -> Any:
+        return SimpleNamespace(description=f"{self.strips} strips")
+
+    def finer(self) -> list[Ladder]:
+        return [Ladder(2 * self.strips, self.most, self.last)] if 2 * self.strips <= self.last else []
+
+    @property
+    def error(self) -> float:
+        return 10.0 / min(self.strips, self.most)
+
+
+def chosen(monkeypatch: pytest.MonkeyPatch, ladder: Ladder) -> Nominal:
+    def fitted(one: Ladder, *_: Any) -> Any:
+        return SimpleNamespace(excess=one.error**2)
+
+    def change(finer: Ladder, current: Any) -> tuple[float, float]:
+        return max(float(np.sqrt(current.excess)) - 10.0 / finer.strips, 0.2), 0.5
+
+    monkeypatch.setattr(nominal, "make_refit", lambda *_: fitted(ladder))
+    monkeypatch.setattr(nominal, "refit_at", fitted)
+    monkeypatch.setattr(nominal, "fit_to_convergence", fitted)
+    monkeypatch.setattr(nominal, "finer_change", change)
+    return choose_discretisation(cast("Any", ladder), cast("Any", None), refine=True)
+
+
+def test_where_the_refinements_end_the_error_of_the_last_remains(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = chosen(monkeypatch, Ladder(4, most=1000))
+    assert found.subject.description == f"{4 * 2**MAX_REFINEMENTS} strips"
+    exact = 10.0 / (4 * 2**MAX_REFINEMENTS)  # the error halves, so it is as large as the last change
+    assert found.discretisation_error == pytest.approx(exact)
+    assert found.irreducible_error == found.possible_error == found.discretisation_error
+
+
+def test_so_it_does_where_a_finer_wing_would_be_too_large(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = chosen(monkeypatch, Ladder(4, most=1000, last=8))
+    assert found.subject.description == "8 strips"
+    assert found.irreducible_error == pytest.approx(10.0 / 8)
+
+
+def test_without_any_finer_wing_nothing_is_known(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = chosen(monkeypatch, Ladder(4, most=1000, last=4))
+    assert found.discretisation_error is None
+    assert found.irreducible_error == found.possible_error == 0.0
+
+
+def test_where_a_finer_wing_fits_no_better_no_error_remains(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = chosen(monkeypatch, Ladder(4, most=8))
+    assert (found.subject.description, found.tried_finer) == ("8 strips", "16 strips")
+    assert found.irreducible_error == found.possible_error == 0.0
+
+
+def test_a_wing_that_bends_at_nine_joints_is_found_by_a_strip_more() -> None:
+    """Twice as many strips as the eight of the model fit no better."""
+    plant = FlexibleWing(robird_wing(), "9x1", numerics=REFERENCE)
+    conditions = (vacuum(10.0, 0.05, 3.0), vacuum(1000.0, 0.12, 2.5), tunnel(0.05, 3.5, 6.0))
+    quiet = Tracking(noise=(5e-5, 5e-5, 5e-5))
+    found = tuple(
+        record(plant, base_genome(plant), one, quiet, np.random.default_rng(k)) for k, one in enumerate(conditions)
+    )
+    spec = DiagnosisSpec(CalibrationSpec(division="8x1"), suspects=("hinge_offset", "damage"))
+    *_, last = diagnose(Dataset("wing", plant.wing, found), spec, InProcessEvaluator())
+    assert last.finding is not None
+    assert last.finding.verdict == "adequate"
+    assert any("9 strips (1 each) replaces flexible wing of 8 bodies" in one for one in last.finding.remarks)
