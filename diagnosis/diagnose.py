@@ -12,6 +12,7 @@ from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.preparation import prepare, prepare_rig
 from wingfit.calibration.problem import base_genome
 from wingfit.calibration.spec import CalibrationSpec
+from wingfit.checks import examine
 from wingfit.diagnosis.evidence.context import FitContext
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.finding import Finding
@@ -25,7 +26,7 @@ from wingfit.diagnosis.subject import Subject, select_suspects
 from wingfit.diagnosis.verdict.build_finding import build_finding
 from wingfit.diagnosis.verdict.frame import frame_refuted
 from wingfit.inference.noise.series_fit import SeriesReduction
-from wingfit.records import AnyRecording, Dataset, FrameError, Series, SeriesDataset
+from wingfit.records import AnyDataset, AnyRecording, Dataset, FrameError, Series, SeriesDataset
 from wingfit.records.blas_threads import one_blas_thread
 from wingfit.rigs.rig import Rig
 from wingfit.rigs.rig_model import RigModel
@@ -64,9 +65,10 @@ def diagnose(dataset: Dataset, spec: DiagnosisSpec, evaluator: Evaluator) -> Ite
     subject, fitted, held_out, free = _prepare(dataset, spec)
     _check_search(subject, spec)
     axes, frame = _axes(dataset, spec), dataset.frame_error
-    yield from diagnose_subject(
+    for report in diagnose_subject(
         subject, dataset.name, fitted, held_out, spec, evaluator, free=free, axes=axes, frame=frame
-    )
+    ):
+        yield _with_mistakes(report, dataset)
 
 
 @one_blas_thread
@@ -79,7 +81,8 @@ def diagnose_rig(rig: Rig, dataset: SeriesDataset, spec: DiagnosisSpec, evaluato
     subject, fitted, held_out, free = _prepare_rig(rig, dataset, spec)
     _check_search(subject, spec)
     series = SeriesReduction.of(dataset.recordings, fitted)
-    yield from diagnose_subject(subject, dataset.name, fitted, held_out, spec, evaluator, free=free, series=series)
+    for report in diagnose_subject(subject, dataset.name, fitted, held_out, spec, evaluator, free=free, series=series):
+        yield _with_mistakes(report, dataset)
 
 
 @one_blas_thread
@@ -138,6 +141,20 @@ def diagnose_subject(
     remarks = (*refuted, *finding.remarks, *copies, *_repeated(fitted, held_out))
     finding = replace(finding, remarks=remarks, seconds=spent, evaluations=evaluations, versions=_versions())
     yield Progress(1.0, "done", evaluations, finding)
+
+
+def _with_mistakes(report: Progress, dataset: AnyDataset) -> Progress:
+    """Return ``report`` whose finding, if it has one, states likely mistakes in ``dataset``: effects imitate them."""
+    mistakes = examine(dataset) if report.finding else ()
+    if report.finding is None or not mistakes:
+        return report
+    kinds = ", ".join(dict.fromkeys(one.kind for one in mistakes))
+    sentence = (
+        f" The dataset has likely mistakes ({kinds}), which may be the cause: see the remarks, and correct them first."
+    )
+    remarks = (*(f"likely mistake in the dataset: {one}" for one in mistakes), *report.finding.remarks)
+    summary = report.finding.summary + (sentence if report.finding.verdict != "adequate" else "")
+    return replace(report, finding=replace(report.finding, summary=summary, remarks=remarks))
 
 
 def _without_copies(
