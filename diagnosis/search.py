@@ -9,7 +9,13 @@ from dataclasses import replace
 import numpy as np
 
 from wingfit.diagnosis.combinations import combined_refits, further_effects, singles_and_pairs, smaller_refits
-from wingfit.diagnosis.evidence.competing_fits import StartPoint, fit_from_estimates, large_start, start_points
+from wingfit.diagnosis.evidence.competing_fits import (
+    FIRST_STEPS,
+    StartPoint,
+    fit_from_estimates,
+    large_start,
+    start_points,
+)
 from wingfit.diagnosis.evidence.fit import FIT_ERRORS, Fit
 from wingfit.diagnosis.evidence.nominal import choose_discretisation, fit_nominal, improves
 from wingfit.diagnosis.evidence.refit import (
@@ -36,6 +42,7 @@ FAULTS = ("measurement", "input")  # families of suspects that do not act within
 MAX_INNER = 12  # suspects that are fitted from a large size
 MAX_RESTARTED = 3  # suspects that are also fitted from the estimates
 MAX_BASES = 2  # single effects that are fitted with each other one where nothing explains forces
+COMBINED = 12  # refits with several effects, as a rule
 MAX_OVERTAKING = 3  # hypotheses that have not converged and are looked at
 
 
@@ -65,7 +72,7 @@ def run_search(state: SearchState, free: tuple[str, ...]) -> Steps:
         for fraction, stage in _try_suspects(state, suspects):
             yield tested + (again - tested) * fraction, stage
     yield again, "comparing with a finer discretisation"
-    yield from ((again + 0.01, stage) for stage in _refine_and_extend(state))
+    yield from _towards(again + 0.01, _refine_and_extend(state), again, 2 * len(suspects))
     yield from ((again + 0.01, stage) for stage in smaller_refits(state))
     if state.refits and (spec.exhaustive or (state.data.kind == "forces" and not state.one_effect_explains)):
         pairs = singles_and_pairs(state, None if spec.exhaustive else MAX_BASES)
@@ -75,7 +82,13 @@ def run_search(state: SearchState, free: tuple[str, ...]) -> Steps:
         _continue_best(state)
     nominal = state.fitted_nominal
     floor = state.floor(nominal.irreducible_error if spec.refine else nominal.discretisation_error or 0.0)
-    yield from ((0.95, stage) for stage in _final_fits(state, floor, len(suspects)))
+    yield from _towards(1.0, _final_fits(state, floor, len(suspects)), 0.95, FINAL_STEPS)
+
+
+def _towards(end: float, stages: Iterator[str], start: float, expected: int) -> Steps:
+    """Yield ``stages`` with fractions from ``start`` towards ``end``: two thirds of the way after the ``expected`` number."""
+    for k, stage in enumerate(stages):
+        yield start + (end - start) * (1.0 - float(np.exp(-(k + 1) / expected))), stage
 
 
 def _search_coarse_first(state: SearchState, fit: Fit, suspects: Sequence[Suspect]) -> Steps:
@@ -173,7 +186,7 @@ def _try_suspects(state: SearchState, suspects: Sequence[Suspect], at_least: Ref
     tests = score_tests(state.context, nominal.fit, suspects)
     for k, (suspect, trials) in enumerate(tests):
         state.trials.append(trials)
-        yield 0.6 * (k + 1) / len(suspects), f"score test of {suspect.name}"
+        yield 0.3 * (k + 1) / len(suspects), f"score test of {suspect.name}"
     if nominal_suffices(state.data, nominal, len(suspects)):
         return
     least = min((trial.remaining_chi_squared for trials in state.trials for trial in trials), default=np.inf)
@@ -200,7 +213,7 @@ def _refits(state: SearchState, at_least: Refit | None) -> Steps:
     If ``at_least`` is given and no single refit is clearly better than it, there are no further refits.
     """
     yield from _single_refits(state)
-    yield 0.72, "continuing the best refits"
+    yield 0.4, "continuing the best refits"
     if _continue_best(state):
         return
     if at_least is not None and not any(improves(state.data, one, at_least) for one in state.refits):
@@ -208,7 +221,7 @@ def _refits(state: SearchState, at_least: Refit | None) -> Steps:
     if not state.beats_unknown_law:
         yield from _refits_from_estimates(state)
     if not state.beats_unknown_law:
-        yield from ((0.82, stage) for stage in combined_refits(state))
+        yield from _towards(0.97, combined_refits(state), 0.85, COMBINED)
         yield 0.97, "continuing the best refits"
         _continue_best(state)
 
@@ -219,7 +232,7 @@ def _single_refits(state: SearchState) -> Steps:
     for k, trial in enumerate(chosen):
         if _is_outperformed(state, trial, chosen[0]):
             continue
-        yield 0.6 + 0.12 * k / len(chosen), f"refit with {trial.suspect.name}"
+        yield 0.3 + 0.1 * k / len(chosen), f"refit with {trial.suspect.name}"
         state.add(refit_with(state.context, state.fitted_nominal.refit.fit, [trial]))
 
 
@@ -233,10 +246,10 @@ def _refits_from_estimates(state: SearchState) -> Steps:
     if state.initial_fit is None:
         raise ValueError("the nominal model has not been fitted")
     context, initial = state.initial_fit
-    found = []
-    for suspect, trials in score_tests(context, initial, select_suspects(context.subject, state.spec.suspects)):
+    found, suspects = [], select_suspects(context.subject, state.spec.suspects)
+    for k, (suspect, trials) in enumerate(score_tests(context, initial, suspects)):
         found.append(trials)
-        yield 0.74, f"score test of {suspect.name} at the estimates"
+        yield 0.4 + 0.05 * (k + 1) / len(suspects), f"score test of {suspect.name} at the estimates"
     starts = [entry for trial in _restart_trials(state.data, found) for entry in start_points(trial)]
     starts += _choices(state.data, initial, found)
     if state.data.kind == "series":
@@ -244,7 +257,7 @@ def _refits_from_estimates(state: SearchState) -> Steps:
     else:
         local = [trials[0] for trials in found if trials and _has_location(trials[0].suspect)]
         starts += [large_start(trial, typical_shape=True) for trial in local]
-    yield from ((0.77, stage) for stage in _compete(state, starts))
+    yield from _towards(0.85, _compete(state, starts), 0.45, max(FIRST_STEPS * len(starts), 1))
 
 
 def _restart_trials(data: WhitenedData, found: Sequence[list[Trial]]) -> list[Trial]:

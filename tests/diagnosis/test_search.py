@@ -20,7 +20,7 @@ from wingfit.diagnosis.evidence.context import FitContext
 from wingfit.diagnosis.evidence.screen import Trial
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.policy import POLICY
-from wingfit.diagnosis.search import _indistinguishable, _look_alikes, run_search
+from wingfit.diagnosis.search import _indistinguishable, _look_alikes, _towards, run_search
 from wingfit.diagnosis.search_state import SearchState
 from wingfit.records import load_dataset, wing_or_vehicle
 from wingfit.workers.in_process import InProcessEvaluator
@@ -174,3 +174,11 @@ def test_an_exhaustive_search_of_the_whole_library_is_refused() -> None:
         check(delfly, spec)
     with pytest.raises(ValueError, match=why):
         next(diagnose(delfly, spec, InProcessEvaluator()))
+
+
+def test_stages_of_unknown_number_advance_the_progress() -> None:
+    fractions = [fraction for fraction, _ in _towards(0.85, iter("stage" * 20), 0.45, 5)]
+    assert fractions == sorted(set(fractions))
+    assert 0.45 < fractions[0] < 0.55
+    assert fractions[4] == pytest.approx(0.45 + 0.4 * 0.632, abs=1e-3)
+    assert fractions[-1] < 0.85
