@@ -72,7 +72,7 @@ def run_search(state: SearchState, free: tuple[str, ...]) -> Steps:
         for fraction, stage in _try_suspects(state, suspects):
             yield tested + (again - tested) * fraction, stage
     yield again, "comparing with a finer discretisation"
-    yield from _towards(again + 0.01, _refine_and_extend(state), again, 2 * len(suspects))
+    yield from _towards(_refine_and_extend(state), again, again + 0.01, 2 * len(suspects))
     yield from ((again + 0.01, stage) for stage in smaller_refits(state))
     if state.refits and (spec.exhaustive or (state.data.kind == "forces" and not state.one_effect_explains)):
         pairs = singles_and_pairs(state, None if spec.exhaustive else MAX_BASES)
@@ -82,11 +82,11 @@ def run_search(state: SearchState, free: tuple[str, ...]) -> Steps:
         _continue_best(state)
     nominal = state.fitted_nominal
     floor = state.floor(nominal.irreducible_error if spec.refine else nominal.discretisation_error or 0.0)
-    yield from _towards(1.0, _final_fits(state, floor, len(suspects)), 0.95, FINAL_STEPS)
+    yield from _towards(_final_fits(state, floor, len(suspects)), 0.95, 1.0, FINAL_STEPS)
 
 
-def _towards(end: float, stages: Iterator[str], start: float, expected: int) -> Steps:
-    """Yield ``stages`` with fractions from ``start`` towards ``end``: two thirds of the way after the ``expected`` number."""
+def _towards(stages: Iterator[str], start: float, end: float, expected: int) -> Steps:
+    """Yield ``stages`` with fractions from ``start`` towards ``end``; the ``expected`` number goes two thirds of it."""
     for k, stage in enumerate(stages):
         yield start + (end - start) * (1.0 - float(np.exp(-(k + 1) / expected))), stage
 
@@ -221,7 +221,7 @@ def _refits(state: SearchState, at_least: Refit | None) -> Steps:
     if not state.beats_unknown_law:
         yield from _refits_from_estimates(state)
     if not state.beats_unknown_law:
-        yield from _towards(0.97, combined_refits(state), 0.85, COMBINED)
+        yield from _towards(combined_refits(state), 0.85, 0.97, COMBINED)
         yield 0.97, "continuing the best refits"
         _continue_best(state)
 
@@ -257,7 +257,7 @@ def _refits_from_estimates(state: SearchState) -> Steps:
     else:
         local = [trials[0] for trials in found if trials and _has_location(trials[0].suspect)]
         starts += [large_start(trial, typical_shape=True) for trial in local]
-    yield from _towards(0.85, _compete(state, starts), 0.45, max(FIRST_STEPS * len(starts), 1))
+    yield from _towards(_compete(state, starts), 0.45, 0.85, max(FIRST_STEPS * len(starts), 1))
 
 
 def _restart_trials(data: WhitenedData, found: Sequence[list[Trial]]) -> list[Trial]:

@@ -177,7 +177,7 @@ def test_an_exhaustive_search_of_the_whole_library_is_refused() -> None:
 
 
 def test_stages_of_unknown_number_advance_the_progress() -> None:
-    fractions = [fraction for fraction, _ in _towards(0.85, iter("stage" * 20), 0.45, 5)]
+    fractions = [fraction for fraction, _ in _towards(iter("stage" * 20), 0.45, 0.85, 5)]
     assert fractions == sorted(set(fractions))
     assert 0.45 < fractions[0] < 0.55
     assert fractions[4] == pytest.approx(0.45 + 0.4 * 0.632, abs=1e-3)
