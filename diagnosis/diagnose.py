@@ -13,6 +13,7 @@ from wingfit.calibration.preparation import prepare, prepare_rig
 from wingfit.calibration.problem import base_genome
 from wingfit.calibration.spec import CalibrationSpec
 from wingfit.checks import examine
+from wingfit.checks.guard import is_finding
 from wingfit.diagnosis.evidence.context import FitContext
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.finding import Finding
@@ -145,13 +146,12 @@ def diagnose_subject(
 
 def _with_mistakes(report: Progress, dataset: AnyDataset) -> Progress:
     """Return ``report`` whose finding, if it has one, states likely mistakes in ``dataset``: effects imitate them."""
-    mistakes = examine(dataset) if report.finding else ()
+    mistakes = tuple(one for one in examine(dataset) if is_finding(one)) if report.finding else ()
     if report.finding is None or not mistakes:
         return report
     kinds = ", ".join(dict.fromkeys(one.kind for one in mistakes))
-    sentence = (
-        f" The dataset has likely mistakes ({kinds}), which may be the cause: see the remarks, and correct them first."
-    )
+    cause = "One of them may be the cause: check them first (see the remarks)."
+    sentence = f" The dataset has likely mistakes ({kinds}). {cause}"
     remarks = (*(f"likely mistake in the dataset: {one}" for one in mistakes), *report.finding.remarks)
     summary = report.finding.summary + (sentence if report.finding.verdict != "adequate" else "")
     return replace(report, finding=replace(report.finding, summary=summary, remarks=remarks))

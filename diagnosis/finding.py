@@ -49,7 +49,8 @@ class Floors:
         lag1_autocorrelation: of the noise, between successive samples.
         discretisation: misfit caused by the model's discretisation, estimated with a finer one; at most the residual of
             the best hypothesis, 0 if the finer one fits no better; None where there is no finer one.
-        finer: description of the finer discretisation; "" where there is none.
+        finer: description of the finer discretisation; "" where there is none, and where ``discretisation`` is what the
+            last refinement leaves.
         simulation: misfit that any model is allowed, for the error of the simulation: a tenth of the noise.
         total: root of the sum of squares of noise, discretisation, simulation and marker positions: the expected misfit
             of a correct model.

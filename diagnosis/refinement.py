@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from wingfit.diagnosis.evidence.context import FitContext
-from wingfit.diagnosis.evidence.nominal import Nominal, finer_change, finer_is_promising, improves
+from wingfit.diagnosis.evidence.nominal import Nominal, error_after, finer_change, finer_is_promising, improves
 from wingfit.diagnosis.evidence.refit import Refit, continue_fit, fit_to_convergence, refit_at
 from wingfit.diagnosis.search_state import SearchState
 from wingfit.diagnosis.verdict.weigh_hypotheses import tolerated_excess
@@ -22,18 +22,20 @@ def refine_with_effects(state: SearchState) -> None:
     best = min((nominal.refit, *state.refits), key=lambda one: one.excess)
     if best is nominal.refit:
         return
-    tried_finer = nominal.tried_finer
+    tried_finer, largest = nominal.tried_finer, 0.0
     limit = data.policy.rivalry * best.excess + tolerated_excess(data, 0.0, 0.0)
     leading = [one for one in state.by_excess if one.excess <= limit][:MAX_CONTINUED]
     for finer in state.context.finer():
-        tried = [(one, _fit_at_finer(finer, one)) for one in leading]
+        changes = [finer_change(finer, one) for one in leading]
+        tried = [(one, _fit_at_finer(finer, one, *change)) for one, change in zip(leading, changes, strict=True)]
         known = [found for one, found in tried if found is not None and found is not one]
-        tried_finer = finer.subject.description if known else tried_finer
+        if changes[0][0] > largest:
+            largest, tried_finer = changes[0][0], finer.subject.description if known else nominal.tried_finer
         better = min(known, key=lambda one: one.excess, default=best)
         if improves(data, better, best):
             break
     else:
-        state.nominal = replace(nominal, tried_finer=tried_finer)
+        state.nominal = replace(nominal, tried_finer="" if nominal.limited else tried_finer)
         return
     first = refit_at(finer, nominal.refit)
     if first is None:
@@ -45,14 +47,18 @@ def refine_with_effects(state: SearchState) -> None:
     followed = [_follow(finer, one, better) for one in others]
     descriptions = f"{finer.subject.description} replaces {state.subject.description}"
     remark = f"with the effect added, the discretisation limits the model: {descriptions}"
-    remarks = (*nominal.remarks, remark)  # the error of the finer discretisation itself is not known
-    state.nominal = Nominal(finer.subject, first, None, "", remarks)
+    remarks = (*nominal.remarks, remark)
+    change = finer_change(finer, nominal.refit)[0] if nominal.limited else 0.0
+    remaining = error_after(change, nominal.refit, first) if change else None
+    state.nominal = Nominal(finer.subject, first, remaining, "", remarks, limited=remaining is not None)
     state.context, state.refits = finer, [one for one in (*known, *followed) if one is not None]
 
 
-def _fit_at_finer(finer: FitContext, refit: Refit) -> Refit | None:
-    """Return ``refit`` fitted at the ``finer`` discretisation, unchanged if not promising; None if that fails."""
-    changes, gain = finer_change(finer, refit)
+def _fit_at_finer(finer: FitContext, refit: Refit, changes: float, gain: float) -> Refit | None:
+    """Return ``refit`` fitted at the ``finer`` discretisation, unchanged if not promising; None if that fails.
+
+    ``changes``, ``gain``: of :func:`finer_change`.
+    """
     if not changes:
         return None
     if not finer_is_promising(finer.data, changes, gain, refit):

@@ -122,14 +122,15 @@ class WingSubject(_Rig):
         More strips alone do not show the chordwise bending that a discretisation omits, which is most of the error of a
         coarse one (Robird wing with 4 bodies: 4 to 6 mm, in 8 strips no less; with 24 bodies 1 mm), except where the
         chord does not bend. An even number, because an odd number is worse than one fewer: 18 bodies, 3 along the
-        chord, 3 to 5 mm. A chord that does not bend is also tried with a single strip more, in case the wing bends at
-        a few joints. Wings of more than MAX_BODIES are omitted. A rigid wing has no discretisation.
+        chord, 3 to 5 mm. Where twice the strips fit no better, a chord that does not bend is tried with a single strip
+        more, in case the wing bends at a few joints. Wings of more than MAX_BODIES are omitted. A rigid wing has no
+        discretisation.
         """
         if self.model.wing.structure == "rigid":
             return ()
         bodies = Division.parse(self.model.division).bodies
         chordwise, strips = max(bodies), len(bodies) + 2
-        flat = [(2 * len(bodies), 1), (len(bodies) + 1, 1)]
+        flat = [(2 * len(bodies), 1), (len(bodies) + 1, 1)] if 2 * len(bodies) <= MAX_BODIES else []
         finer = [*(flat if chordwise == 1 else [(strips, chordwise)]), (strips, chordwise // 2 * 2 + 2)]
         return tuple(
             replace(self, model=replace(self.model, division=f"{along}x{across}"))

@@ -17,7 +17,7 @@ from wingfit.diagnosis.evidence.competing_fits import (
     start_points,
 )
 from wingfit.diagnosis.evidence.fit import FIT_ERRORS, Fit
-from wingfit.diagnosis.evidence.nominal import choose_discretisation, fit_nominal, improves
+from wingfit.diagnosis.evidence.nominal import Nominal, choose_discretisation, fit_nominal, improves
 from wingfit.diagnosis.evidence.refit import (
     FINAL_STEPS,
     Refit,
@@ -81,20 +81,24 @@ def run_search(state: SearchState, free: tuple[str, ...]) -> Steps:
     if state.refits:
         _continue_best(state)
     nominal = state.fitted_nominal
-    floor = state.floor(nominal.irreducible_error if spec.refine else nominal.discretisation_error or 0.0)
+    floor = state.floor(nominal.remaining_error if spec.refine else nominal.discretisation_error or 0.0)
     yield from _towards(_final_fits(state, floor, len(suspects)), 0.95, 1.0, FINAL_STEPS)
 
 
 def _towards(stages: Iterator[str], start: float, end: float, expected: int) -> Steps:
     """Yield ``stages`` with fractions from ``start`` towards ``end``; the ``expected`` number goes two thirds of it."""
     for k, stage in enumerate(stages):
-        yield start + (end - start) * (1.0 - float(np.exp(-(k + 1) / expected))), stage
+        yield start + (end - start) * (1.0 - float(np.exp(-(k + 1) / max(expected, 1)))), stage
+
+
+def _suffices(state: SearchState, nominal: Nominal, suspects: int) -> bool:
+    return nominal_suffices(state.data, nominal.refit, suspects, nominal.remaining_error)
 
 
 def _search_coarse_first(state: SearchState, fit: Fit, suspects: Sequence[Suspect]) -> Steps:
     """Test suspects at the nominal ``fit``, or with a finer discretisation if that fits better than all suspects."""
     nominal = choose_discretisation(state.context, fit, refine=state.spec.refine)
-    if nominal.subject is not state.subject and not nominal_suffices(state.data, nominal.refit, len(suspects)):
+    if nominal.subject is not state.subject and not _suffices(state, nominal, len(suspects)):
         state.restart_from(choose_discretisation(state.context, fit, refine=False))
         for fraction, stage in _try_suspects(state, suspects, at_least=nominal.refit):
             yield 0.3 * fraction, stage
@@ -182,12 +186,11 @@ def _try_suspects(state: SearchState, suspects: Sequence[Suspect], at_least: Ref
     since an effect can imitate an error of the discretisation: without a suspect that is predicted to, nothing is
     refitted, and without a refit that does, combinations are not tried.
     """
-    nominal = state.fitted_nominal.refit
-    tests = score_tests(state.context, nominal.fit, suspects)
+    tests = score_tests(state.context, state.fitted_nominal.refit.fit, suspects)
     for k, (suspect, trials) in enumerate(tests):
         state.trials.append(trials)
         yield 0.3 * (k + 1) / len(suspects), f"score test of {suspect.name}"
-    if nominal_suffices(state.data, nominal, len(suspects)):
+    if _suffices(state, state.fitted_nominal, len(suspects)):
         return
     least = min((trial.remaining_chi_squared for trials in state.trials for trial in trials), default=np.inf)
     if at_least is None or least < state.data.chi_squared(at_least.fit.coefficients):
@@ -257,7 +260,7 @@ def _refits_from_estimates(state: SearchState) -> Steps:
     else:
         local = [trials[0] for trials in found if trials and _has_location(trials[0].suspect)]
         starts += [large_start(trial, typical_shape=True) for trial in local]
-    yield from _towards(_compete(state, starts), 0.45, 0.85, max(FIRST_STEPS * len(starts), 1))
+    yield from _towards(_compete(state, starts), 0.45, 0.85, FIRST_STEPS * len(starts))
 
 
 def _restart_trials(data: WhitenedData, found: Sequence[list[Trial]]) -> list[Trial]:

@@ -94,7 +94,8 @@ def _floors(finding: Finding) -> Markup:
         ("nominal model, refitted", finding.strength * floors.noise, "plain"),
     ]
     if floors.discretisation is not None:
-        rows.insert(1, ("discretisation error, from a finer model", floors.discretisation, "pale"))
+        source = "from a finer model" if floors.finer else "that the last refinement leaves"
+        rows.insert(1, (f"discretisation error, {source}", floors.discretisation, "pale"))
     if floors.marker_positions > 0.0:
         rows.insert(-2, ("rest positions of the markers, what all share", floors.marker_positions, "pale"))
     most = max(value for _, value, _ in rows) * scale.factor or 1.0
@@ -106,7 +107,7 @@ def _floors(finding: Finding) -> Markup:
         wide = along.at(value * scale.factor) - along.at(0)
         parts.append(text(12, y + 12, f"{name}: {number(value * scale.factor)}", class_="value"))
         parts.append(tag("rect", x=12.0, y=y + 17, width=max(wide, 0.5), height=9.0, class_=class_))
-    note = f"The finer model: {floors.finer}." if floors.discretisation is not None else None
+    note = f"The finer model: {floors.finer}." if floors.finer else None
     residual = scale.text(finding.strength * floors.noise)
     caption = (
         f"The expected misfit of a correct model is {scale.text(floors.total)}; the residual of the nominal model, "

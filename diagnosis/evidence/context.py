@@ -23,7 +23,7 @@ class FitContext:
     evaluator: Evaluator
 
     def finer(self) -> Iterator[FitContext]:
-        """Return this context with each finer discretisation of the rig, cheapest first."""
+        """Return this context with each finer discretisation of the rig, as they are tried."""
         return (replace(self, subject=finer) for finer in self.subject.finer_subjects())
 
     def problem(self, model: Model, free: tuple[str, ...], base: Genome) -> Problem:

@@ -36,8 +36,8 @@ class Nominal:
         discretisation_error: root mean square change (m or N) of the simulation by a finer discretisation, as far as
             the genes cannot compensate it; None where there is no finer one.
         finer: description of that finer discretisation; "" where there is none.
-        limited: whether the refinements ended while each still improved the fit; ``discretisation_error`` is the change
-            by the last of them then, which remains where the error halves with every doubling.
+        limited: whether the refinements ended while each still improved the fit; ``discretisation_error`` is then what
+            the last of them shows to remain (:func:`error_after`).
         remarks: for the user, on discretisations that were replaced.
         tried_finer: description of a finer discretisation that was fitted with little gain; it shows that
             discretisation is not the cause of the residual. "" where none was fitted.
@@ -52,14 +52,14 @@ class Nominal:
     limited: bool = False
 
     @property
-    def irreducible_error(self) -> float:
+    def remaining_error(self) -> float:
         """The discretisation error (m or N) where refinements ended while they improved the fit; otherwise 0."""
-        return self.discretisation_error or 0.0 if self.limited else 0.0
+        return (self.discretisation_error or 0.0) if self.limited else 0.0
 
     @property
     def possible_error(self) -> float:
         """The discretisation error (m or N), except where a finer discretisation hardly fits better; there 0."""
-        return self.irreducible_error if self.tried_finer else self.discretisation_error or 0.0
+        return self.remaining_error if self.tried_finer else self.discretisation_error or 0.0
 
 
 def fit_nominal(context: FitContext, free: tuple[str, ...], values: Mapping[str, float]) -> Iterator[Fit]:
@@ -113,7 +113,7 @@ def choose_discretisation(context: FitContext, fit: Fit, *, refine: bool) -> Nom
     ``fit``: of the nominal model of ``context``; without ``refine``, finer ones only serve to estimate the error.
     """
     data, current, remarks = context.data, make_refit(context.data, fit), list[str]()
-    last_change: float | None = None
+    remaining: float | None = None
     for _ in range(MAX_REFINEMENTS):
         error, finest, ineffective, better = 0.0, "", "", None
         for finer in context.finer():
@@ -123,7 +123,8 @@ def choose_discretisation(context: FitContext, fit: Fit, *, refine: bool) -> Nom
             if refine and finer_is_promising(data, changes, gain, current):
                 found = refit_at(finer, current)
                 if found and improves(data, found, current):
-                    better, last_change = fit_to_convergence(finer, found), changes
+                    better = fit_to_convergence(finer, found)
+                    remaining = error_after(changes, current, better)
                     break
                 ineffective = finest if found and changes == error else ineffective
         if better is None and finest:
@@ -135,9 +136,18 @@ def choose_discretisation(context: FitContext, fit: Fit, *, refine: bool) -> Nom
             f"and reduces the excess misfit to {100 * max(better.excess, 0.0) / current.excess:.0f} %"
         )
         context, current = finer, better
-    limited = last_change is not None
-    compared = context.subject.description if limited else ""
-    return Nominal(context.subject, current, last_change, compared, tuple(remarks), limited=limited)
+    return Nominal(context.subject, current, remaining, "", tuple(remarks), limited=remaining is not None)
+
+
+def error_after(change: float, coarse: Refit, fine: Refit) -> float:
+    """Return the discretisation error (m or N) that remains in ``fine``, the fit of a finer model than in ``coarse``.
+
+    ``change`` (m or N) is that of the simulation. Of errors a and b, proportional to one another, b - a is the change
+    and b^2 - a^2 the fall of the excess, in which missing physics cancels that is orthogonal to them. So a =
+    ((b^2 - a^2) / (b - a) - (b - a)) / 2, of whatever order the models converge; at most the residual.
+    """
+    fallen = coarse.excess - fine.excess
+    return float(np.clip(0.5 * (fallen / change - change), 0.0, np.sqrt(max(fine.excess, 0.0))))
 
 
 def finer_is_promising(data: WhitenedData, changes: float, gain: float, current: Refit) -> bool:

@@ -224,6 +224,8 @@ def _standard_deviation(
     spread = NORMAL_MAD * float(np.median(np.abs(own))) * np.sqrt(len(rest) / (len(rest) - shared.shape[1]))
     near = (own**2).sum(axis=1) < scipy.special.chdtri(3, BY_CHANCE / len(rest)) * spread**2
     usual[shown] = near
+    if not near.any():
+        return 0.0, usual
     mean_square = float(np.mean(own[near] ** 2)) * len(rest) / (len(rest) - shared.shape[1])
     return float(np.sqrt(max(mean_square - float(np.mean(variance)), 0.0))), usual
 

@@ -199,6 +199,8 @@ def _noise_remarks(data: WhitenedData, nominal: Refit, unit: str, decision: Deci
 
 def _discretisation_error(state: SearchState) -> float:
     """Return the misfit (m or N) by the discretisation: at most the best residual, 0 if a finer one fits no better."""
+    if state.fitted_nominal.limited:
+        return state.fitted_nominal.remaining_error
     least = min(one.excess for one in state.final_weights.refits)
     return min(state.fitted_nominal.possible_error, float(np.sqrt(max(least, 0.0))))
 

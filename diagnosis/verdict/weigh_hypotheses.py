@@ -273,11 +273,14 @@ def _unknown(data: WhitenedData, excess: float) -> float:
     return float(-0.5 * data.effective_samples * np.log(excess) - data.gene_cost * data.policy.unknown_genes)
 
 
-def nominal_suffices(data: WhitenedData, nominal: Refit, suspects: int) -> bool:
-    """Return whether the nominal excess is too small for any effect to be worth its genes, even a perfect one."""
-    if nominal_refuted(data, nominal.excess, 0.0) or drifts(data) or noise_may_hide(data, nominal.fit):
+def nominal_suffices(data: WhitenedData, nominal: Refit, suspects: int, floor: float = 0.0) -> bool:
+    """Return whether the nominal excess is too small for any effect to be worth its genes, even a perfect one.
+
+    ``floor`` (m or N): discretisation error.
+    """
+    if nominal_refuted(data, nominal.excess, floor) or drifts(data) or noise_may_hide(data, nominal.fit):
         return False
-    tau = tolerated_excess(data, nominal.excess, 0.0)
+    tau = tolerated_excess(data, nominal.excess, floor)
     excess = _misfit(data, nominal, tau)
     ends = _evidence(data, np.array([tau + excess, tau]) / data.noise**2, np.arange(2.0), np.arange(2.0), suspects)
     return bool(ends[1] < ends[0] - data.policy.least_evidence)

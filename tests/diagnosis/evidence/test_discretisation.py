@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -13,7 +13,7 @@ from wingfit.calibration.problem import base_genome
 from wingfit.calibration.spec import CalibrationSpec
 from wingfit.diagnosis import DiagnosisSpec, diagnose
 from wingfit.diagnosis.evidence import nominal
-from wingfit.diagnosis.evidence.nominal import MAX_REFINEMENTS, Nominal, choose_discretisation
+from wingfit.diagnosis.evidence.nominal import MAX_REFINEMENTS, Nominal, choose_discretisation, error_after
 from wingfit.diagnosis.policy import POLICY
 from wingfit.records import Dataset
 from wingfit.sim.virtual_rigs.campaign import REFERENCE, Tracking, record, robird_wing, tunnel, vacuum
@@ -23,11 +23,16 @@ from wingfit.workers.in_process import InProcessEvaluator
 
 @dataclass(frozen=True)
 class Ladder:
-    """A wing whose error halves with each doubling of its ``strips``, as far as ``most``; more do not fit better."""
+    """A wing whose error falls with its ``strips`` to the power ``order``, as far as ``most``; more do not fit better.
+
+    ``missing``: physics that is missing, orthogonal to that error; ``last``: most strips that can be simulated.
+    """
 
     strips: int
-    most: int
+    most: int = 1000
     last: int = 1000
+    order: float = 1.0
+    missing: float = 0.0
 
     @property
     def data(self) -> Any:
@@ -38,19 +43,19 @@ class Ladder:
         return SimpleNamespace(description=f"{self.strips} strips")
 
     def finer(self) -> list[Ladder]:
-        return [Ladder(2 * self.strips, self.most, self.last)] if 2 * self.strips <= self.last else []
+        return [replace(self, strips=k) for k in (2 * self.strips, self.strips + 1) if k <= self.last]
 
     @property
     def error(self) -> float:
-        return 10.0 / min(self.strips, self.most)
+        return float(40.0 / min(self.strips, self.most) ** self.order)
 
 
 def chosen(monkeypatch: pytest.MonkeyPatch, ladder: Ladder) -> Nominal:
     def fitted(one: Ladder, *_: Any) -> Any:
-        return SimpleNamespace(excess=one.error**2)
+        return SimpleNamespace(excess=one.error**2 + one.missing**2, error=one.error)
 
     def change(finer: Ladder, current: Any) -> tuple[float, float]:
-        return max(float(np.sqrt(current.excess)) - 10.0 / finer.strips, 0.2), 0.5
+        return float(current.error - 40.0 / finer.strips**finer.order), 0.5
 
     monkeypatch.setattr(nominal, "make_refit", lambda *_: fitted(ladder))
     monkeypatch.setattr(nominal, "refit_at", fitted)
@@ -59,30 +64,40 @@ def chosen(monkeypatch: pytest.MonkeyPatch, ladder: Ladder) -> Nominal:
     return choose_discretisation(cast("Any", ladder), cast("Any", None), refine=True)
 
 
-def test_where_the_refinements_end_the_error_of_the_last_remains(monkeypatch: pytest.MonkeyPatch) -> None:
-    found = chosen(monkeypatch, Ladder(4, most=1000))
-    assert found.subject.description == f"{4 * 2**MAX_REFINEMENTS} strips"
-    exact = 10.0 / (4 * 2**MAX_REFINEMENTS)  # the error halves, so it is as large as the last change
-    assert found.discretisation_error == pytest.approx(exact)
-    assert found.irreducible_error == found.possible_error == found.discretisation_error
+@pytest.mark.parametrize("order", [1.0, 1.5, 2.0])
+@pytest.mark.parametrize("missing", [0.0, 0.05])
+def test_where_the_refinements_end_the_error_of_the_last_remains(
+    monkeypatch: pytest.MonkeyPatch, order: float, missing: float
+) -> None:
+    """Of any order of convergence, and without the physics that is missing besides."""
+    found = chosen(monkeypatch, Ladder(4, order=order, missing=missing))
+    strips = 4 * 2**MAX_REFINEMENTS
+    assert found.subject.description == f"{strips} strips"
+    assert found.discretisation_error == pytest.approx(40.0 / strips**order)
+    assert found.remaining_error == found.possible_error == found.discretisation_error
 
 
 def test_so_it_does_where_a_finer_wing_would_be_too_large(monkeypatch: pytest.MonkeyPatch) -> None:
-    found = chosen(monkeypatch, Ladder(4, most=1000, last=8))
+    found = chosen(monkeypatch, Ladder(4, last=8))
     assert found.subject.description == "8 strips"
-    assert found.irreducible_error == pytest.approx(10.0 / 8)
+    assert found.remaining_error == pytest.approx(40.0 / 8)
+
+
+def test_no_error_remains_where_the_last_wing_is_right_and_physics_is_missing() -> None:
+    coarse, fine = (cast("Any", SimpleNamespace(excess=error**2 + 3.0**2)) for error in (5.0, 0.0))
+    assert error_after(5.0, coarse, fine) == 0.0
 
 
 def test_without_any_finer_wing_nothing_is_known(monkeypatch: pytest.MonkeyPatch) -> None:
-    found = chosen(monkeypatch, Ladder(4, most=1000, last=4))
+    found = chosen(monkeypatch, Ladder(4, last=4))
     assert found.discretisation_error is None
-    assert found.irreducible_error == found.possible_error == 0.0
+    assert found.remaining_error == found.possible_error == 0.0
 
 
 def test_where_a_finer_wing_fits_no_better_no_error_remains(monkeypatch: pytest.MonkeyPatch) -> None:
     found = chosen(monkeypatch, Ladder(4, most=8))
     assert (found.subject.description, found.tried_finer) == ("8 strips", "16 strips")
-    assert found.irreducible_error == found.possible_error == 0.0
+    assert found.remaining_error == found.possible_error == 0.0
 
 
 def test_a_wing_that_bends_at_nine_joints_is_found_by_a_strip_more() -> None:

@@ -223,7 +223,7 @@ def test_a_finer_discretisation_does_not_hide_an_effect(
     """Suspects are tested with the coarse one first, which stays if one of them fits better than the finer one."""
 
     def found(subject: str, excess: float) -> Any:
-        return SimpleNamespace(subject=subject, refit=SimpleNamespace(excess=excess))
+        return SimpleNamespace(subject=subject, refit=SimpleNamespace(excess=excess), remaining_error=0.0)
 
     def tried(state: Any, *_: Any, **__: Any) -> Iterator[Any]:
         searched.append(state.subject)
