@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
 from tests.diagnosis.pendulum_rig import FREQUENCIES, Pendulum, PendulumRig, at, blank, recorded
+from wingfit.checks import Mistake
+from wingfit.checks.guard import NOT_CARRIED_OUT
 from wingfit.diagnosis import DiagnosisSpec, Finding, diagnose_subject
+from wingfit.diagnosis.diagnose import _with_mistakes
+from wingfit.diagnosis.spec import Progress
 from wingfit.records import Recording
 from wingfit.report import finding_from_json, finding_json, html
 from wingfit.workers.in_process import InProcessEvaluator
@@ -76,6 +82,20 @@ def test_a_concealed_effect_is_named_and_validated(truth: dict[str, float], verd
     assert found.proof is not None
     assert found.proof.improved
     assert found.proof.after.value < 1.1 < 1.1 * found.proof.before.value
+
+
+def test_a_check_that_fails_is_no_mistake_of_the_dataset(monkeypatch: pytest.MonkeyPatch) -> None:
+    report = Progress(1.0, "done", 0, finding({"friction.torque": 2e-3}, validate=False))
+    failed = Mistake(NOT_CARRIED_OUT, "dataset", "no check", "a result", "an error", "nothing")
+    wrong = Mistake("frequency", "recording 'a'", "3 Hz", "4 Hz", "a typing error", "flap_frequency_hz")
+    module = importlib.import_module("wingfit.diagnosis.diagnose")  # whose name in the package is the function
+    monkeypatch.setattr(module, "examine", lambda _: (failed,))
+    assert _with_mistakes(report, cast("Any", None)) is report
+    monkeypatch.setattr(module, "examine", lambda _: (failed, wrong))
+    warned = _with_mistakes(report, cast("Any", None)).finding
+    assert warned is not None
+    assert "likely mistakes (frequency)." in warned.summary
+    assert warned.remarks[0].startswith("likely mistake in the dataset: recording 'a': 3 Hz")
 
 
 def test_progress_shows_where_the_nominal_model_misses_and_what_leads() -> None:

@@ -133,6 +133,13 @@ def test_what_an_effect_may_explain_is_not_headed_as_unexplained() -> None:
     assert "<h1>Missing physics; whether an effect of the library explains it is not certain</h1>" in html(doubtful)
 
 
+def test_an_error_that_the_last_refinement_leaves_has_no_finer_model() -> None:
+    finding = wing_finding()
+    text = page(replace(finding, floors=replace(finding.floors, finer=""))).text
+    assert "discretisation error, that the last refinement leaves: 0.21" in text
+    assert "finer model" not in text
+
+
 def test_the_numbers_shown_are_those_given() -> None:
     text = page(wing_finding()).text
     for said in (

@@ -11,7 +11,7 @@ import pytest
 
 from wingfit.calibration.problem import base_genome
 from wingfit.calibration.spec import CalibrationSpec
-from wingfit.diagnosis import DiagnosisSpec, diagnose
+from wingfit.diagnosis import DiagnosisSpec, diagnose, refinement
 from wingfit.diagnosis.evidence import nominal
 from wingfit.diagnosis.evidence.nominal import MAX_REFINEMENTS, Nominal, choose_discretisation, error_after
 from wingfit.diagnosis.policy import POLICY
@@ -98,6 +98,36 @@ def test_where_a_finer_wing_fits_no_better_no_error_remains(monkeypatch: pytest.
     found = chosen(monkeypatch, Ladder(4, most=8))
     assert (found.subject.description, found.tried_finer) == ("8 strips", "16 strips")
     assert found.remaining_error == found.possible_error == 0.0
+
+
+@pytest.mark.parametrize(("limited", "better", "remaining"), [(True, 0.5, 1.0), (False, 0.5, 0.0), (True, 0.95, 2.0)])
+def test_a_finer_wing_beside_an_effect_keeps_the_error_that_remains(
+    monkeypatch: pytest.MonkeyPatch, limited: bool, better: float, remaining: float
+) -> None:
+    """Errors of the coarse and the finer wing are 2 and 1; ``better``: the finer excess with the effect."""
+
+    def refit(excess: float, *names: str) -> Any:
+        return SimpleNamespace(excess=excess, names=names, fit=SimpleNamespace(converged=True))
+
+    def at(_: Any, one: Any) -> Any:
+        return refit(1.0) if one is coarse else refit(better * one.excess, *one.names)
+
+    monkeypatch.setattr(refinement, "finer_change", lambda *_: (1.0, 0.5))
+    monkeypatch.setattr(refinement, "refit_at", at)
+    monkeypatch.setattr(refinement, "continue_fit", lambda _, one: one)
+    monkeypatch.setattr(refinement, "fit_to_convergence", lambda _, one: one)
+    monkeypatch.setattr(refinement, "tolerated_excess", lambda *_: 0.1)
+    ladder, coarse = Ladder(8, last=16), refit(4.0)
+    known = Nominal(cast("Any", ladder.subject), coarse, 2.0, "", (), limited=limited)
+    effect = refit(2.0, "damage")
+    state: Any = SimpleNamespace(
+        data=ladder.data, nominal=known, fitted_nominal=known, refits=[effect], by_excess=[effect], context=ladder,
+        subject=ladder.subject,
+    )  # fmt: skip
+    refinement.refine_with_effects(state)
+    assert state.nominal.subject.description == ("16 strips" if better < 0.75 else "8 strips")
+    assert state.nominal.remaining_error == pytest.approx(remaining)
+    assert state.nominal.tried_finer == ""
 
 
 def test_a_wing_that_bends_at_nine_joints_is_found_by_a_strip_more() -> None:
