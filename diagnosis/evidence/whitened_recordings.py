@@ -333,13 +333,12 @@ class WhitenedData:
 
     @cached_property
     def excess_standard_error(self) -> float:
-        """Standard error of :meth:`excess` (m^2 or N^2) by noise, and by errors of rest positions that markers share.
+        """Standard error of :meth:`excess` (m^2 or N^2) by noise alone.
 
         The noise of means and trends lies at lower frequencies than where noise is measured, between the harmonics, so
         its variance is known up to a factor only: half of it counts as error. The noise of different markers is
         independent. That of different harmonics is not, since beats differ in size or timing as a whole; so each
-        marker, and a recording of forces as a whole, counts as one sample of its noise. What errors of rest positions
-        share as a rigid motion has nine normal components, so its mean square varies too.
+        marker, and a recording of forces as a whole, counts as one sample of its noise.
         The coefficients of a series have independent noise, whose variance is known up to a relative error.
         """
         every = self.weight * self.variance
@@ -352,19 +351,23 @@ class WhitenedData:
             for recording, fit in zip(self.recordings, self.beat_fits, strict=True)
         )
         slow = np.concatenate([np.tile((v.order == 0) | v.trend, int(v.used.sum())) for v in self.beat_fits])
-        noise = every[slow].sum() / 2.0 + np.sqrt(2.0 / independent) * every.sum()
-        return float(np.hypot(noise, self._standard_error_by_rigid_errors))
+        return float(every[slow].sum() / 2.0 + np.sqrt(2.0 / independent) * every.sum())
 
-    @cached_property
-    def _standard_error_by_rigid_errors(self) -> float:
-        """Standard error (m^2) of :meth:`excess` by ``rigid_errors``, whose squares have a weighted sum of chi-squares.
+    def excess_by_rigid_errors(self, coefficients: Float[Array, " D"]) -> float:
+        """Return the part (m^2) of a residual's :meth:`excess` that ``rigid_errors`` explain, as far as chance allows.
 
-        Its variance is twice the sum of the squares of the quadratic form's entries.
+        Their mean square is a weighted sum of chi-squares: its variance is twice the sum of squares of the quadratic
+        form. It may exceed its mean by `Policy.refuting_excess` standard deviations.
         """
         if self.rigid_errors is None:
             return 0.0
+        columns = self.whitened_slopes(self.rigid_errors)
+        precision = columns.T @ columns + np.eye(columns.shape[1])
+        amounts = np.linalg.solve(precision, columns.T @ self.whiten(coefficients))
+        explained = self.weight @ (coefficients**2 - (coefficients - self.rigid_errors @ amounts) ** 2)
         form = self.rigid_errors.T @ (self.weight[:, None] * self.rigid_errors)
-        return float(np.sqrt(2.0 * np.sum(form**2)))
+        most = np.trace(form) + self.policy.refuting_excess * np.sqrt(2.0 * np.sum(form**2))
+        return float(np.clip(explained, 0.0, most))
 
     @cached_property
     def excess_standard_error_of_samples(self) -> float:

@@ -15,6 +15,7 @@ from wingfit.diagnosis.evidence.context import FitContext
 from wingfit.diagnosis.evidence.fit import gauss_newton_fit
 from wingfit.diagnosis.evidence.position_errors import PositionErrors, _own, axes_at_markers, find_position_errors
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
+from wingfit.diagnosis.policy import POLICY
 from wingfit.diagnosis.rigs import subject_of
 from wingfit.records import Dataset, Recording, Wing
 from wingfit.records.array_types import Array
@@ -99,17 +100,23 @@ def test_their_size_is_measured_and_exact_positions_have_none() -> None:
     assert found[0].sd == pytest.approx(HAND, rel=0.12)
 
 
-def test_the_standard_error_of_the_excess_contains_what_they_share_by_chance() -> None:
-    """Against many draws of the nine rigid motions of the errors."""
+def test_what_they_share_by_chance_explains_itself_but_nothing_else_nor_more_than_chance_allows() -> None:
+    """Against draws of the nine rigid motions of the errors."""
     found = measured(described(HAND))
     assert found is not None
-    data = found[1]
+    errors, data = found
     assert data.rigid_errors is not None
-    draws = np.random.default_rng(5).standard_normal((4000, data.rigid_errors.shape[1])) @ data.rigid_errors.T
-    scatter = float(np.std((data.weight * draws**2).sum(axis=1)))
-    by_noise = replace(data, rigid_errors=None).excess_standard_error
-    assert data.excess_standard_error**2 - by_noise**2 == pytest.approx(scatter**2, rel=0.1)
-    assert scatter > 0.2 * by_noise
+    rng = np.random.default_rng(5)
+    draws = rng.standard_normal((2000, data.rigid_errors.shape[1])) @ data.rigid_errors.T
+    squares = (data.weight * draws**2).sum(axis=1)
+    explained = np.array([data.excess_by_rigid_errors(one) for one in draws[:200]])
+    np.testing.assert_allclose(explained, squares[:200], rtol=0.02)
+    assert np.sqrt(squares.mean()) == pytest.approx(errors.shared, rel=0.1)
+    most = squares.mean() + POLICY.refuting_excess * squares.std()
+    assert data.excess_by_rigid_errors(10.0 * draws[0]) == pytest.approx(most, rel=0.1)
+    other = data.scale * rng.standard_normal(len(data.scale))
+    other *= errors.shared / np.sqrt(data.weight @ other**2)
+    assert data.excess_by_rigid_errors(other) < 0.1 * errors.shared**2
 
 
 def test_what_a_rigid_wing_does_is_not_taken_for_errors_beside_markers_that_slipped() -> None:
