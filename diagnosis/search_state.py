@@ -98,15 +98,9 @@ class SearchState:
     def floor(self, discretisation: float) -> float:
         """Return the misfit (m or N) of a right model beyond noise; ``discretisation``: the part of its discretisation.
 
-        The other part is of what errors of the markers' rest positions share, which are otherwise integrated out.
+        The other part is what errors of the markers' rest positions are expected to share.
         """
-        shared = self.data.excess_by_rigid_errors(self.fitted_nominal.refit.fit.coefficients)
-        return float(np.hypot(discretisation, np.sqrt(shared)))
-
-    @property
-    def shared_position_error(self) -> float:
-        """Expected misfit (m) by what errors of the markers' rest positions share; 0 where they are negligible."""
-        return self.position_errors.shared if self.position_errors else 0.0
+        return float(np.hypot(discretisation, self.position_errors.shared if self.position_errors else 0.0))
 
     def allow_for_position_errors(self, nominal: Fit) -> bool:
         """Measure errors of rest positions at the fit ``nominal``; allow for these and those of the frame.

@@ -353,11 +353,11 @@ class WhitenedData:
         slow = np.concatenate([np.tile((v.order == 0) | v.trend, int(v.used.sum())) for v in self.beat_fits])
         return float(every[slow].sum() / 2.0 + np.sqrt(2.0 / independent) * every.sum())
 
-    def excess_by_rigid_errors(self, coefficients: Float[Array, " D"]) -> float:
-        """Return the part (m^2) of a residual's :meth:`excess` that ``rigid_errors`` explain, as far as chance allows.
+    def excess_by_chance(self, coefficients: Float[Array, " D"]) -> float:
+        """Return how much more (m^2) of a residual's :meth:`excess` ``rigid_errors`` explain than is expected of them.
 
-        Their mean square is a weighted sum of chi-squares: its variance is twice the sum of squares of the quadratic
-        form. It may exceed its mean by `Policy.refuting_excess` standard deviations.
+        At least 0. Their mean square is a weighted sum of chi-squares, whose variance is twice the sum of squares of
+        the quadratic form; chance is at most `Policy.refuting_excess` standard deviations.
         """
         if self.rigid_errors is None:
             return 0.0
@@ -366,8 +366,8 @@ class WhitenedData:
         amounts = np.linalg.solve(precision, columns.T @ self.whiten(coefficients))
         explained = self.weight @ (coefficients**2 - (coefficients - self.rigid_errors @ amounts) ** 2)
         form = self.rigid_errors.T @ (self.weight[:, None] * self.rigid_errors)
-        most = np.trace(form) + self.policy.refuting_excess * np.sqrt(2.0 * np.sum(form**2))
-        return float(np.clip(explained, 0.0, most))
+        most = self.policy.refuting_excess * np.sqrt(2.0 * np.sum(form**2))
+        return float(np.clip(explained - np.trace(form), 0.0, most))
 
     @cached_property
     def excess_standard_error_of_samples(self) -> float:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
@@ -208,10 +207,10 @@ def _discretisation_error(state: SearchState) -> float:
 
 def _floors(state: SearchState) -> Floors:
     data, nominal, discretisation = state.data, state.fitted_nominal, _discretisation_error(state)
-    lag1, shared = float(np.median([one.lag1 for one in data.reduced])), state.shared_position_error
-    total = math.hypot(data.noise, discretisation, shared, data.tolerance, data.accepted)
+    lag1, floor = float(np.median([one.lag1 for one in data.reduced])), state.floor(discretisation)
+    total = float(np.sqrt(data.noise**2 + floor**2 + data.tolerance**2 + data.accepted**2))
     error = None if nominal.discretisation_error is None else discretisation
-    return Floors(data.noise, lag1, error, nominal.finer, data.tolerance, total, shared)
+    return Floors(data.noise, lag1, error, nominal.finer, data.tolerance, total, state.floor(0.0))
 
 
 def _summary_texts(

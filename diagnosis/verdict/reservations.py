@@ -12,7 +12,7 @@ from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.finding import NAMING, Proof, Verdict, amount
 from wingfit.diagnosis.verdict.noise_doubt import noise_may_hide
 from wingfit.diagnosis.verdict.verdict import Decision
-from wingfit.diagnosis.verdict.weigh_hypotheses import HypothesisWeights, leaves_a_rest, nominal_refuted
+from wingfit.diagnosis.verdict.weigh_hypotheses import HypothesisWeights, beyond_chance, leaves_a_rest, nominal_refuted
 from wingfit.records import Series
 from wingfit.rigs.suspect import Suspect
 
@@ -45,7 +45,7 @@ def remaining_sentence(data: WhitenedData, decision: Decision, best: Refit, floo
     if decision.verdict == "adequate" and data.accepted:  # what accepted_sentence says
         return ""
     share = "" if data.unit == "noise" else f", {size / data.noise:.2g} times the noise"
-    if nominal_refuted(data, best.excess, floor):
+    if nominal_refuted(data, beyond_chance(data, best), floor):
         return (
             f" A misfit of {amount(size, data.unit)} beyond the noise remains{share}: the law has another form, or "
             "something else is missing too."

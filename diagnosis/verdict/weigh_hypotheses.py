@@ -71,7 +71,7 @@ def weigh(
     unknown = _unknown(data, tau + policy.unknown_residual**2 * excess[0])
     possible = np.ones(len(hypotheses), bool)
     drift_alone = only_drifts(data, nominal, floor)
-    if nominal_refuted(data, nominal.excess, floor, error) or (drifts(data) and not drift_alone):
+    if nominal_refuted(data, beyond_chance(data, nominal), floor, error) or (drifts(data) and not drift_alone):
         # A hypothesis that leaves the misfit as it was explains nothing; nor does the nominal model. With few
         # recordings, one that explains most of the misfit may have little evidence, if its size is not zero; with a
         # single experiment, nothing shows that it predicts.
@@ -109,7 +109,7 @@ def leaves_a_rest(data: WhitenedData, nominal: Refit, refit: Refit, floor: float
     N): discretisation error.
     """
     enough = tolerated_excess(data, nominal.excess, floor)
-    beyond = refit.excess > enough and nominal_refuted(data, refit.excess, floor)
+    beyond = refit.excess > enough and nominal_refuted(data, beyond_chance(data, refit), floor)
     return beyond or _drift_may_cause(data, nominal, refit)
 
 
@@ -216,6 +216,11 @@ def noise_error(data: WhitenedData, hypotheses: Sequence[Refit]) -> float:
     return error if single else min(error, sure_error(data) + least)
 
 
+def beyond_chance(data: WhitenedData, refit: Refit) -> float:
+    """Return the excess (m^2 or N^2) of ``refit`` without what errors of rest positions may share by chance."""
+    return refit.excess - data.excess_by_chance(refit.fit.coefficients)
+
+
 def nominal_refuted(data: WhitenedData, excess: float, floor: float, error: float | None = None) -> bool:
     """Return whether the nominal ``excess`` is too large for noise and discretisation error (``floor``, m or N) alone.
 
@@ -278,7 +283,7 @@ def nominal_suffices(data: WhitenedData, nominal: Refit, suspects: int, floor: f
 
     ``floor`` (m or N): discretisation error.
     """
-    if nominal_refuted(data, nominal.excess, floor) or drifts(data) or noise_may_hide(data, nominal.fit):
+    if nominal_refuted(data, beyond_chance(data, nominal), floor) or drifts(data) or noise_may_hide(data, nominal.fit):
         return False
     tau = tolerated_excess(data, nominal.excess, floor)
     excess = _misfit(data, nominal, tau)

@@ -53,6 +53,7 @@ def state(*tried: Trial) -> Any:
     data = SimpleNamespace(
         noise=1.0,
         excess_standard_error=0.0,
+        excess_by_chance=lambda _: 0.0,
         policy=POLICY,
         drift=0.0,
         accepted=0.0,

@@ -36,6 +36,7 @@ def data(noise: float = 0.0) -> Any:
         chi_squared=lambda c: c,
         noise=noise,
         excess_standard_error=0.0,
+        excess_by_chance=lambda _: 0.0,
         accepted=0.0,
         gene_cost=POLICY.gene_cost,
         kind="tracks",

@@ -41,6 +41,7 @@ def data(
             noise=1.0,
             effective_samples=6.0 * recordings,
             excess_standard_error=excess_standard_error,
+            excess_by_chance=lambda _: 0.0,
             accepted=0.0,
             gene_cost=POLICY.gene_cost,
             kind="tracks",

@@ -24,11 +24,15 @@ from wingfit.diagnosis.verdict.reservations import (
 from wingfit.diagnosis.verdict.verdict import Decision
 from wingfit.records import Channel, Series
 
+FIT = SimpleNamespace(coefficients=np.zeros(1))
+
 
 def decision(verdict: Verdict) -> Decision:
     probabilities: dict[str, float] = {**dict.fromkeys(map(str, VERDICTS), 0.0), verdict: 0.97, "unnamed": 0.03}
     names = ("drag",) if verdict in NAMING else ()
-    return Decision(verdict, probabilities, names, (), cast("Any", SimpleNamespace(names=("drag",), excess=25.0)))
+    return Decision(
+        verdict, probabilities, names, (), cast("Any", SimpleNamespace(names=("drag",), excess=25.0, fit=FIT))
+    )
 
 
 def proof(before: float, after: float, *, improved: bool) -> Proof:
@@ -47,6 +51,7 @@ def data(kind: str = "series", accepted: float = 0.0) -> Any:
         accepted=accepted,
         policy=POLICY,
         excess_standard_error=0.05,
+        excess_by_chance=lambda _: 0.0,
         drift=0.0,
         recordings=(Series("one", times, (channel,), times[:, None]),),
     )
@@ -129,7 +134,7 @@ def test_a_misfit_that_remains_is_stated() -> None:
 def test_what_would_remove_most_of_what_an_adequate_model_leaves_is_stated(
     left: float, verdict: Verdict, said: str
 ) -> None:
-    refits = [SimpleNamespace(names=names, excess=excess) for names, excess in (((), 0.3), (("play",), left))]
+    refits = [SimpleNamespace(names=names, excess=excess, fit=FIT) for names, excess in (((), 0.3), (("play",), left))]
     weights: Any = SimpleNamespace(refits=refits, evidence=np.array([0.0, -1.0]))
     suspects: Any = {"play": SimpleNamespace(title="Play")}
     assert candidate_sentence(data("tracks"), decision(verdict), weights, suspects) == said
@@ -138,7 +143,7 @@ def test_what_would_remove_most_of_what_an_adequate_model_leaves_is_stated(
 
 
 def replace_excess(found: Decision, excess: float) -> Decision:
-    best = cast("Any", SimpleNamespace(names=found.best.names, excess=excess))
+    best = cast("Any", SimpleNamespace(names=found.best.names, excess=excess, fit=FIT))
     return Decision(found.verdict, found.probabilities, found.named, found.alternatives, best)
 
 
@@ -191,7 +196,7 @@ def test_a_model_that_is_adequate_by_the_accepted_error_alone_says_so(
 @pytest.mark.parametrize("verdict", VERDICTS)
 def test_effects_that_leave_more_than_noise_and_form_are_a_part(verdict: Verdict) -> None:
     before = decision(verdict)  # leaves an excess of 25
-    nominal = cast("Any", SimpleNamespace(excess=400.0))
+    nominal = cast("Any", SimpleNamespace(excess=400.0, fit=FIT))
     after = partly(before, data("forces"), nominal, 0.0)
     if verdict not in NAMING:
         assert after is before
@@ -199,6 +204,6 @@ def test_effects_that_leave_more_than_noise_and_form_are_a_part(verdict: Verdict
     assert (after.verdict, after.named) == ("partly named", ("drag",))
     assert after.probabilities["partly named"] == before.probabilities[verdict]
     assert sum(after.probabilities.values()) == pytest.approx(1.0)
-    other_form = cast("Any", SimpleNamespace(excess=25.0 / POLICY.form**2))
+    other_form = cast("Any", SimpleNamespace(excess=25.0 / POLICY.form**2, fit=FIT))
     assert partly(before, data("forces"), other_form, 0.0).verdict == verdict, "laws of two forms differ by as much"
     assert partly(before, data("forces"), nominal, 5.0).verdict == verdict, "the discretisation explains it"

@@ -261,7 +261,9 @@ def test_the_best_effect_is_added_only_if_worth_its_genes(left: float, added: tu
 @pytest.mark.parametrize(("left", "ended", "expected"), [(0.5, False, "b"), (0.5, True, None), (2.9, False, None)])
 def test_an_unconverged_rival_is_continued_if_it_may_overtake(left: float, ended: bool, expected: str | None) -> None:
     def fitted(one: Refit, converged: bool) -> Refit:
-        return replace(one, fit=cast("Any", SimpleNamespace(converged=converged, jacobian_measured=True)))
+        return replace(
+            one, fit=cast("Any", SimpleNamespace(converged=converged, jacobian_measured=True, coefficients=0.0))
+        )
 
     others = [fitted(refit(0.3, ("a",)), converged=True), fitted(refit(left, ("b",), 2), converged=ended)]
     found = _unconverged(weigh(data(), refit(3.0), others, 0.0, 40))
@@ -328,6 +330,7 @@ def test_no_verdict_depends_on_the_unit_of_length(unit: float, nominal: float, e
                 noise=unit,
                 effective_samples=36.0,
                 excess_standard_error=excess_standard_error * unit**2,
+                excess_by_chance=lambda _: 0.0,
                 accepted=0.0,
                 gene_cost=POLICY.gene_cost,
                 kind="tracks",
