@@ -94,8 +94,8 @@ def _floors(finding: Finding) -> Markup:
         ("nominal model, refitted", finding.strength * floors.noise, "plain"),
     ]
     if floors.discretisation is not None:
-        source = "from a finer model" if floors.finer else "that the last refinement leaves"
-        rows.insert(1, (f"discretisation error, {source}", floors.discretisation, "pale"))
+        source = ", from a finer model" if floors.finer else " that the last refinement leaves"
+        rows.insert(1, (f"discretisation error{source}", floors.discretisation, "pale"))
     if floors.marker_positions > 0.0:
         rows.insert(-2, ("rest positions of the markers, what all share", floors.marker_positions, "pale"))
     most = max(value for _, value, _ in rows) * scale.factor or 1.0

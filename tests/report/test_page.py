@@ -136,7 +136,7 @@ def test_what_an_effect_may_explain_is_not_headed_as_unexplained() -> None:
 def test_an_error_that_the_last_refinement_leaves_has_no_finer_model() -> None:
     finding = wing_finding()
     text = page(replace(finding, floors=replace(finding.floors, finer=""))).text
-    assert "discretisation error, that the last refinement leaves: 0.21" in text
+    assert "discretisation error that the last refinement leaves: 0.21" in text
     assert "finer model" not in text
 
 
