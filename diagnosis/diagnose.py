@@ -14,6 +14,7 @@ from wingfit.calibration.problem import base_genome
 from wingfit.calibration.spec import CalibrationSpec
 from wingfit.checks import examine
 from wingfit.checks.guard import is_finding
+from wingfit.checks.mistake import Mistake
 from wingfit.diagnosis.evidence.context import FitContext
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.finding import Finding
@@ -66,10 +67,11 @@ def diagnose(dataset: Dataset, spec: DiagnosisSpec, evaluator: Evaluator) -> Ite
     subject, fitted, held_out, free = _prepare(dataset, spec)
     _check_search(subject, spec)
     axes, frame = _axes(dataset, spec), dataset.frame_error
-    for report in diagnose_subject(
-        subject, dataset.name, fitted, held_out, spec, evaluator, free=free, axes=axes, frame=frame
-    ):
-        yield _with_mistakes(report, dataset)
+    mistakes = _likely_mistakes(dataset)
+    yield from diagnose_subject(
+        subject, dataset.name, fitted, held_out, spec, evaluator,
+        free=free, axes=axes, frame=frame, mistakes=mistakes,
+    )  # fmt: skip
 
 
 @one_blas_thread
@@ -82,8 +84,10 @@ def diagnose_rig(rig: Rig, dataset: SeriesDataset, spec: DiagnosisSpec, evaluato
     subject, fitted, held_out, free = _prepare_rig(rig, dataset, spec)
     _check_search(subject, spec)
     series = SeriesReduction.of(dataset.recordings, fitted)
-    for report in diagnose_subject(subject, dataset.name, fitted, held_out, spec, evaluator, free=free, series=series):
-        yield _with_mistakes(report, dataset)
+    mistakes = _likely_mistakes(dataset)
+    yield from diagnose_subject(
+        subject, dataset.name, fitted, held_out, spec, evaluator, free=free, series=series, mistakes=mistakes
+    )
 
 
 @one_blas_thread
@@ -109,12 +113,14 @@ def diagnose_subject(
     axes: tuple[str, ...] = (),
     series: SeriesReduction | None = None,
     frame: FrameError | None = None,
+    mistakes: Sequence[Mistake] = (),
 ) -> Iterator[Progress]:
     """Diagnose any rig that implements :class:`Subject`; yields progress, the finding with the last report.
 
     ``name``: of the dataset; ``fitted``, ``held_out``: recordings to fit and to validate with; ``free``: nominal genes
     to fit (empty: all that a calibration searches); ``axes``: force axes to fit (empty: the default); ``series``: how
-    recordings without a beat are reduced; ``frame``: errors of the frame of tracks.
+    recordings without a beat are reduced; ``frame``: errors of the frame of tracks; ``mistakes``: likely ones in the
+    dataset.
     """
     began = time.monotonic()
     yield Progress(0.0, "reading the recordings", 0)
@@ -133,7 +139,7 @@ def diagnose_subject(
             break
         refuted = (beyond,)
     finding: Finding | None = None
-    for fraction, stage, found in build_finding(state, name, held_out):
+    for fraction, stage, found in build_finding(state, name, held_out, mistakes):
         finding = found
         yield Progress(SEARCH_FRACTION + (1.0 - SEARCH_FRACTION) * fraction, stage, counted.evaluations)
     if finding is None:
@@ -144,17 +150,9 @@ def diagnose_subject(
     yield Progress(1.0, "done", evaluations, finding)
 
 
-def _with_mistakes(report: Progress, dataset: AnyDataset) -> Progress:
-    """Return ``report`` whose finding, if it has one, states likely mistakes in ``dataset``: effects imitate them."""
-    mistakes = tuple(one for one in examine(dataset) if is_finding(one)) if report.finding else ()
-    if report.finding is None or not mistakes:
-        return report
-    kinds = ", ".join(dict.fromkeys(one.kind for one in mistakes))
-    cause = "One of them may be the cause: check them first (see the remarks)."
-    sentence = f" The dataset has likely mistakes ({kinds}). {cause}"
-    remarks = (*(f"likely mistake in the dataset: {one}" for one in mistakes), *report.finding.remarks)
-    summary = report.finding.summary + (sentence if report.finding.verdict != "adequate" else "")
-    return replace(report, finding=replace(report.finding, summary=summary, remarks=remarks))
+def _likely_mistakes(dataset: AnyDataset) -> tuple[Mistake, ...]:
+    """Return the likely mistakes in ``dataset``, without checks that could not be carried out."""
+    return tuple(one for one in examine(dataset) if is_finding(one))
 
 
 def _without_copies(

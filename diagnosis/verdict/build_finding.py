@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from wingfit.checks.mistake import Mistake
 from wingfit.diagnosis.advice.advise import advise
 from wingfit.diagnosis.advice.advised import Advice
 from wingfit.diagnosis.evidence.fit import with_measured_jacobian
@@ -24,6 +25,7 @@ from wingfit.diagnosis.subject import Subject
 from wingfit.diagnosis.verdict.fitted_models import fitted_models
 from wingfit.diagnosis.verdict.held_out import held_out_refutes
 from wingfit.diagnosis.verdict.locate_in_beat import locate_in_beat
+from wingfit.diagnosis.verdict.mistakes import doubted_by_mistakes, mistake_remarks, mistakes_sentence
 from wingfit.diagnosis.verdict.noise_remarks import drift_sentence, marker_remarks, noise_remarks
 from wingfit.diagnosis.verdict.proof import (
     ResidualPair,
@@ -53,10 +55,13 @@ Step = tuple[float, str, Finding | None]
 WORSE_FACTOR = 1.1  # times the misfit before: recordings that fit worse than that get a remark
 
 
-def build_finding(state: SearchState, name: str, held_out: Sequence[AnyRecording]) -> Iterator[Step]:
+def build_finding(
+    state: SearchState, name: str, held_out: Sequence[AnyRecording], mistakes: Sequence[Mistake] = ()
+) -> Iterator[Step]:
     """Build the finding of a finished search; yields the fraction of the work done, the stage, and the finding last.
 
-    ``name``: of the dataset; ``held_out``: recordings with which the result is validated.
+    ``name``: of the dataset; ``held_out``: recordings with which the result is validated; ``mistakes``: likely ones in
+    the dataset.
     """
     nominal, weights = state.fitted_nominal.refit, state.final_weights
     floor = state.floor(_discretisation_error(state))
@@ -85,7 +90,7 @@ def build_finding(state: SearchState, name: str, held_out: Sequence[AnyRecording
         for part, ranked in advise(state.context, state.final_weights, floor, rest=rest):
             advice = ranked
             yield 0.75 + 0.2 * part, "comparing what to record next", None
-    finding = _finding(state, name, decision, best, own, validation, advice, located, refuted=refuted)
+    finding = _finding(state, name, decision, best, own, validation, advice, located, mistakes, refuted=refuted)
     yield 1.0, "done", replace(finding, remarks=(*finding.remarks, *failed))
 
 
@@ -129,6 +134,7 @@ def _finding(
     validation: ResidualPair | None,
     advice: tuple[Advice, ...],
     located: Located,
+    mistakes: Sequence[Mistake],
     *,
     refuted: bool,
 ) -> Finding:
@@ -140,6 +146,7 @@ def _finding(
         rows += recording_misfits(validation, held_out=True, floor=floor)
         proved = proof(validation, floor, unit, effects_added=bool(best.names))
         decision = doubted_by_held_out(decision, proved, data, refuted=refuted)
+    before, decision = decision, doubted_by_mistakes(decision, mistakes)
     suspects, genes = {suspect.name: suspect for suspect in subject.suspects}, gene_values(data, best)
     weights = replace(weights, refits=tuple(best if one.names == best.names else one for one in weights.refits))
     return Finding(
@@ -155,7 +162,8 @@ def _finding(
         + accepted_error_sentence(decide(weights), first)
         + accepted_sentence(data, decision, nominal, floor)
         + noise_sentence(data, decision, nominal)
-        + held_out_sentence(first, proved, data, refuted=refuted),
+        + held_out_sentence(first, proved, data, refuted=refuted)
+        + mistakes_sentence(before, decision, mistakes),
         probabilities=decision.probabilities,
         named=decision.named,
         added_effects=best.names,
@@ -177,6 +185,7 @@ def _finding(
         channels=located.channels,
         fitted=fitted_models(data, weights, best),
         remarks=(
+            *mistake_remarks(mistakes),
             *state.fitted_nominal.remarks,
             *_refinement_remarks(state.fitted_nominal),
             *_noise_remarks(data, nominal, unit, decision),

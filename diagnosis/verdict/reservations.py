@@ -112,11 +112,14 @@ def judged_by_accepted_error(
     each = zip(weights.refits, weights.probabilities.tolist(), strict=True)
     listed = [(one.excess, probability) for one, probability in each if frozenset(one.names) in possible]
     enough = sum(probability for excess, probability in listed if not nominal_refuted(data, excess, floor))
-    return _without_names(decision, 1.0 - enough / sum(probability for _, probability in listed))
+    return without_names(decision, 1.0 - enough / sum(probability for _, probability in listed))
 
 
-def _without_names(decision: Decision, share: float = 1.0) -> Decision:
-    """Return ``decision`` with a ``share`` of the probability of all names given to an unnamed cause."""
+def without_names(decision: Decision, share: float = 1.0) -> Decision:
+    """Return ``decision`` with a ``share`` of the probability of all names given to an unnamed cause.
+
+    That is the verdict if it prevails.
+    """
     found = dict(decision.probabilities)
     given = {name: share * found[name] for name in CLAIMING}
     found.update({name: found[name] - given[name] for name in CLAIMING}, unnamed=found["unnamed"] + sum(given.values()))
@@ -148,7 +151,7 @@ def doubted_by_held_out(
         moved = max(found["adequate"] - data.policy.doubted_noise, 0.0)
         found["adequate"], found["unnamed"] = found["adequate"] - moved, found["unnamed"] + moved
         return replace(decision, probabilities=found)
-    return _without_names(decision) if _useless(decision, proved, data) else decision
+    return without_names(decision) if _useless(decision, proved, data) else decision
 
 
 def held_out_sentence(before: Decision, proved: Proof | None, data: WhitenedData, *, refuted: bool = False) -> str:

@@ -14,8 +14,7 @@ from tests.diagnosis.pendulum_rig import FREQUENCIES, Pendulum, PendulumRig, at,
 from wingfit.checks import Mistake
 from wingfit.checks.guard import NOT_CARRIED_OUT
 from wingfit.diagnosis import DiagnosisSpec, Finding, diagnose_subject
-from wingfit.diagnosis.diagnose import _with_mistakes
-from wingfit.diagnosis.spec import Progress
+from wingfit.diagnosis.diagnose import _likely_mistakes
 from wingfit.records import Recording
 from wingfit.report import finding_from_json, finding_json, html
 from wingfit.workers.in_process import InProcessEvaluator
@@ -33,11 +32,13 @@ def finding(
 
 
 def diagnosed(
-    fitted: tuple[Recording, ...], held_out: tuple[Recording, ...] = (), spec: DiagnosisSpec | None = None
+    fitted: tuple[Recording, ...],
+    held_out: tuple[Recording, ...] = (),
+    spec: DiagnosisSpec | None = None,
+    mistakes: tuple[Mistake, ...] = (),
 ) -> Finding:
-    steps = list(
-        diagnose_subject(PendulumRig(), "pendulum", fitted, held_out, spec or DiagnosisSpec(), InProcessEvaluator())
-    )
+    settings, evaluator = spec or DiagnosisSpec(), InProcessEvaluator()
+    steps = list(diagnose_subject(PendulumRig(), "pendulum", fitted, held_out, settings, evaluator, mistakes=mistakes))
     fractions = [step.fraction for step in steps]
     assert fractions == sorted(fractions)
     assert fractions[-1] == 1.0
@@ -84,18 +85,34 @@ def test_a_concealed_effect_is_named_and_validated(truth: dict[str, float], verd
     assert found.proof.after.value < 1.1 < 1.1 * found.proof.before.value
 
 
+def test_likely_mistakes_of_the_dataset_speak_against_a_name() -> None:
+    fitted = recorded({**NOMINAL, "friction.torque": 2e-3}, noise=5e-4, seed=1)
+    sure = diagnosed(fitted)
+    wrong = Mistake("vertical sign", "all recordings", "0.07 rad", "0.003 rad", "z points down", "the sign of z")
+    found = diagnosed(fitted, mistakes=(wrong,))
+    assert (sure.verdict, found.verdict, found.named) == ("named", "unnamed", ())
+    assert found.probabilities["named"] == pytest.approx(0.3 * sure.probabilities["named"])
+    assert "too little for a name." in found.summary
+    assert "likely mistakes (vertical sign). One of them may be the cause" in found.summary
+    assert found.summary.endswith("No effect is named until then.")
+    assert found.remarks[0].startswith("likely mistake in the dataset: all recordings: 0.07 rad")
+
+
+def test_likely_mistakes_that_no_effect_imitates_leave_the_name() -> None:
+    fitted = recorded({**NOMINAL, "friction.torque": 2e-3}, noise=5e-4, seed=1)
+    unusual = Mistake("mass", "dataset.yaml: wing.markers", "2 kg", "1 g", "grams for kilograms", "mass_kg")
+    found = diagnosed(fitted, mistakes=(unusual,))
+    assert (found.verdict, found.named) == ("named", ("friction",))
+    assert "likely mistakes (mass)." in found.summary
+    assert "until then" not in found.summary
+
+
 def test_a_check_that_fails_is_no_mistake_of_the_dataset(monkeypatch: pytest.MonkeyPatch) -> None:
-    report = Progress(1.0, "done", 0, finding({"friction.torque": 2e-3}, validate=False))
     failed = Mistake(NOT_CARRIED_OUT, "dataset", "no check", "a result", "an error", "nothing")
     wrong = Mistake("frequency", "recording 'a'", "3 Hz", "4 Hz", "a typing error", "flap_frequency_hz")
     module = importlib.import_module("wingfit.diagnosis.diagnose")  # whose name in the package is the function
-    monkeypatch.setattr(module, "examine", lambda _: (failed,))
-    assert _with_mistakes(report, cast("Any", None)) is report
     monkeypatch.setattr(module, "examine", lambda _: (failed, wrong))
-    warned = _with_mistakes(report, cast("Any", None)).finding
-    assert warned is not None
-    assert "likely mistakes (frequency)." in warned.summary
-    assert warned.remarks[0].startswith("likely mistake in the dataset: recording 'a': 3 Hz")
+    assert _likely_mistakes(cast("Any", None)) == (wrong,)
 
 
 def test_progress_shows_where_the_nominal_model_misses_and_what_leads() -> None:
