@@ -12,7 +12,7 @@ import numpy as np
 from wingfit.records import Condition, Vehicle, WingMotion
 from wingfit.records.array_types import Array, Complex
 from wingfit.sim.atmosphere import density
-from wingfit.sim.vehicle.elements import PROJECTION, Side
+from wingfit.sim.vehicle.elements import PEELED, PITCH_RATE, PROJECTION, Side
 from wingfit.sim.vehicle.flow import Flow, StationedWings
 from wingfit.sim.vehicle.motion import Angles, PitchError, angles_of, flap_series
 from wingfit.sim.vehicle.rows import mirrored, motion_rows, set_side, uppers
@@ -229,6 +229,26 @@ class VehicleScene:
         for (rows, side), along in zip(self.wings.sides, force, strict=True):
             self.added[:, 0] += alike * self.over_span(along * sine, weight)
             self.added[:, 1] += alike * side.sign * rows[:, PROJECTION] * self.over_span(along * cosine, weight)
+
+    def carry(self, air: Array) -> None:
+        """Add the forces on the added mass of every wing in air that moves at ``air`` [B, n, 8] (m/s) along body x.
+
+        Those of a stream of that speed in Eqs. 9 to 14 of Armanini et al. (2016), with mirrored velocities, except
+        along the chord, where the added mass is that of the wing's thickness. The wing's own mass does not move with
+        the air, and the rate of change of ``air`` is neglected.
+        """
+        (cosine, sine), places, (rows, _) = self.wings.turns, self.stations, self.wings.sides[0]
+        apart = self.together[:, None] * (rows[:, PEELED] - 1.0) + 1.0
+        factor = apart**2 * rows[:, PITCH_RATE] * (0.25 * np.pi * self.carried * self.density)[:, None]
+        force = factor[:, :, None] * air * places.chord**2 * places.twist
+        along, normal = self._share("inertial") * force * cosine, self._share("added_mass") * force * sine
+        x, z = along * sine + normal * cosine, along * cosine - normal * sine
+        self.push(self.over_span(x, places.weight), self.over_span(z, places.weight))
+
+    def _share(self, row: str) -> Array:
+        """Return the factor [B, 1, 1] on the forces of the elements called ``row``, which has no coefficient."""
+        own, more = float(row in self.setting.terms), self.included.get(row)
+        return np.asarray(own + (self.genes[more] if more else np.zeros(len(self))))[:, None, None]
 
     # -- for the model -----------------------------------------------------------------------------------------
 

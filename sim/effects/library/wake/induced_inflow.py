@@ -35,8 +35,8 @@ def _induce(scene: VehicleScene, values: Values) -> None:
     Its mean v over the disc solves m v' + 2 rho A V_T v = share T(v), V_T^2 = (U_x + mean v)^2 + U_z^2, with the air's
     apparent mass m and density rho, the disc's area A, the stream (U_x, U_z), the thrust T of the wings, and the
     effect's size share. T is taken as linear in v between zero and the inflow of hover, then once more about the
-    solution. v is computed at every second instant, because it is smooth. The force of added mass in the model includes
-    neither the rate of change of the inflow nor the part that grows with the radius.
+    solution. v is computed at every second instant, because it is smooth. Its rate of change is neglected in the force
+    of added mass.
     """
     vehicle, wings = scene.setting.vehicle, scene.wings.every(2)
     flap, share = scene.angles.flap[:, 0], values["share"][:, None]
@@ -63,7 +63,12 @@ def _induce(scene: VehicleScene, values: Values) -> None:
     between = 0.5 * (inflow + np.roll(inflow, -1, axis=1))
     v = np.stack([inflow, between], axis=2).reshape(scene.inflow.shape)
     scene.inflow = scene.inflow + same * v
-    scene.after("wake", lambda: scene.wings.blow(scene.flow, (outward * v)[:, :, None] * x))
+    scene.after("wake", lambda: _blow(scene, (outward * v)[:, :, None] * x))
+
+
+def _blow(scene: VehicleScene, air: Array) -> None:
+    scene.wings.blow(scene.flow, air)
+    scene.carry(air)
 
 
 def slices(edges: Array) -> Array:

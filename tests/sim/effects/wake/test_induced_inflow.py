@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import numpy.typing as npt
 import pytest
 
+from tests.sim.effects.flown import DELFLY, FOURIER, flown
 from tests.sim.effects.moved import Motion, Moved
 from tests.sim.kernels.marching import LENGTH
+from tests.sim.vehicle.vehicles import recording
 from wingfit.sim.effects.library.wake.induced_inflow import slices
+from wingfit.sim.effects.ports.vehicle import Setting, VehicleScene
 from wingfit.sim.kernels import LANES
 from wingfit.sim.kernels.arrays import CIRCULATION, NORMAL_X, STREAM_C, STREAM_N
 
@@ -100,3 +105,16 @@ def test_decay_is_the_states_own_derivative() -> None:
     moved = Moved("induced_inflow", {"share": 1e-9}, airspeed=AIRSPEED)
     described, found = moved.decay(Motion(pitch=0.1), moved.z + np.linspace(-2.0, 2.0, LANES))
     np.testing.assert_allclose(described, found, rtol=1e-5)
+
+
+@pytest.mark.parametrize("terms", [("inertial",), ("added_mass",), ("inertial", "added_mass", "effective_chord")])
+def test_the_added_mass_moves_with_the_air_that_a_wing_meets(terms: tuple[str, ...]) -> None:
+    """As in a faster stream along the body, whose forces the elements of a wing without mass have."""
+    vehicle = replace(DELFLY, velocities="mirrored", motion=FOURIER, wing_mass=0.0, dihedral=0.2)
+    slow, fast = recording(12.5, 1.0), recording(12.5, 1.7)
+    stream = flown(vehicle, fast, terms) - flown(vehicle, slow, terms)
+    r = (np.arange(40) + 0.5) / 40 * vehicle.span
+    scene = VehicleScene.of(Setting(vehicle, terms, FOURIER, slow.condition, len(stream), 0.0, r), {}, 1)
+    scene.carry(np.full((1, len(stream), 8), 0.7))
+    assert np.abs(stream).max() > 1e-4
+    np.testing.assert_allclose(scene.added[0].T, stream, atol=5e-3 * np.abs(stream).max())
