@@ -35,12 +35,12 @@ def trial(name: str, *, confused_with: tuple[str, ...] = ()) -> Trial:
     return Trial(suspect, np.full((1, count), 0.4), np.zeros((1, 1)), 0.0, np.ones(1), count, 0.0)
 
 
-def refit(*trials: Trial, excess: float = 1.0) -> Any:
-    """A refit with ``excess``, every gene at 0.8 of its box."""
+def refit(*trials: Trial, excess: float = 1.0, predicted: float | None = None) -> Any:
+    """A refit with ``excess``, fitted and ``predicted``, every gene at 0.8 of its box."""
     free = tuple(gene.name for one in trials for gene in one.suspect.genes)
     fit = SimpleNamespace(problem=SimpleNamespace(free=free), unit=np.full(len(free), 0.8))
     names = tuple(one.suspect.name for one in trials)
-    return SimpleNamespace(trials=trials, names=names, excess=excess, fit=fit)
+    return SimpleNamespace(trials=trials, names=names, excess=excess, predicted=predicted, fit=fit)
 
 
 def known(evidence: Sequence[float], *refits: Any) -> Any:
@@ -127,6 +127,9 @@ def test_a_hypothesis_at_the_noise_has_no_look_alikes() -> None:
     cubic, gain = trial("cubic", confused_with=("gain",)), trial("gain")
     assert names(_look_alikes(state(cubic, gain), cast("Any", refit(cubic, excess=1.0)))) == [("gain",)]
     assert _look_alikes(state(cubic, gain), cast("Any", refit(cubic, excess=0.05))) == []
+    assert _look_alikes(state(cubic, gain), cast("Any", refit(cubic, excess=0.05, predicted=0.05))) == []
+    unpredicted = refit(cubic, excess=0.05, predicted=0.5)
+    assert names(_look_alikes(state(cubic, gain), cast("Any", unpredicted))) == [("gain",)], "it may imitate the other"
 
 
 def test_a_hypothesis_at_the_noise_competes_with_look_alikes_of_fewer_genes() -> None:

@@ -97,7 +97,7 @@ EFFECT = effect_of_air(
     "proportional to ((1 + sqrt X) / 2)^2",
     signature="lift breaks down late in each stroke, at high angles of attack, and recovers late too, so that lift "
     "over angle forms a loop",
-    confused_with=("leading_edge_vortex", "circulation_lag", "tip_loss", "stall_vortex"),
+    confused_with=("leading_edge_vortex", "circulation_lag", "tip_loss", "stall_vortex", "varying_coefficients"),
     wing=_wing,
     vehicle=deferred("circulation", _stall),
 )

@@ -41,6 +41,6 @@ EFFECT = effect_of_air(
     source="Leishman and Beddoes (1989), Journal of the American Helicopter Society 34, 3: vortex lift is fed by the "
     "lift that separation takes, and decays; Leishman (2006), section 9.5; Goman and Khrabrov (1994): X",
     signature="lift first overshoots at high angles of attack and then breaks down late in each stroke",
-    confused_with=("dynamic_stall", "circulation_lag", "wake_capture"),
+    confused_with=("dynamic_stall", "circulation_lag", "wake_capture", "varying_coefficients"),
     vehicle=deferred("circulation", _shed),
 )
