@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from wingfit.checks.harmonics import fit
-from wingfit.checks.mistake import Edit, KeyEdit, Mistake, TableEdit, change_of
+from wingfit.checks.mistake import EVERY, Edit, KeyEdit, Mistake, TableEdit, change_of
 from wingfit.checks.tracked import HARMONICS, Tracked
 from wingfit.records import FourBarDrive, Wing
 from wingfit.records.array_types import Array
@@ -142,7 +142,7 @@ def _upside_down(tracks: Sequence[Tracked]) -> Mistake | None:
         edits = _scaled(tracks[0].wing, -1.0)
     return Mistake(
         "vertical sign",
-        "dataset.yaml: wing.drive" if by_drive else "all recordings",
+        "dataset.yaml: wing.drive" if by_drive else EVERY,
         f"the flap angle differs from the drive's by {np.median(given):.3g} rad in mean and second harmonic",
         f"{np.median(other):.3g} rad, as with the sign of {'the drive' if by_drive else 'z'} changed",
         "the drive's angle is positive downwards" if by_drive else "z points down in the tracks",

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.optimize import lsq_linear
 
 from wingfit.checks.harmonics import fit
-from wingfit.checks.mistake import Edit, KeyEdit, Kind, Mistake, TableEdit, change_of
+from wingfit.checks.mistake import EVERY, Edit, KeyEdit, Kind, Mistake, TableEdit, change_of
 from wingfit.checks.motion import HYPOTHESES as MOTIONS
 from wingfit.records import Dataset, Recording, Vehicle
 from wingfit.records.array_types import Array
@@ -231,7 +231,7 @@ def _exchanged(turn: Array) -> Callable[..., tuple[Array, Array]]:
 def _mistake(kind: Kind, given: float, left: float, cause: str, edits: tuple[Edit, ...]) -> Mistake:
     return Mistake(
         kind,
-        "all recordings",
+        EVERY,
         f"a quasi-steady model of the described wings explains {100 * max(0.0, 1 - given):.0f} % of the forces at most",
         f"{100 * (1 - left):.0f} %, as with the change",
         cause,
@@ -291,7 +291,7 @@ def _trim(dataset: Dataset) -> Iterator[Mistake]:
     lift = (means[:, 0] * np.sin(pitch) - means[:, 1] * np.cos(pitch)) / weights
     if np.median(lift) < -0.3:
         yield Mistake(
-            "weight", "all recordings", f"the mean force is {-np.median(lift):.2g} weights downwards",
+            "weight", EVERY, f"the mean force is {-np.median(lift):.2g} weights downwards",
             "a force upwards that carries the weight, if the vehicle flies",
             "the sign of the forces or of the body pitch: x to the nose, z down",
             "the sign of force_x_n or force_z_n, or body_pitch_deg",

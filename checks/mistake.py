@@ -22,6 +22,7 @@ Alter = Callable[[Float[Array, " T"], Float[Array, "T C"], tuple[str, ...]], tup
 """Returns changed copies of the times [T] and values [T, C] of a recording, whose channels have these names."""
 
 SHOWN = 3  # recordings that a message names
+EVERY = "all recordings"  # place of a mistake that all recordings together show
 
 
 @dataclass(frozen=True)

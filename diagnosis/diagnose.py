@@ -67,7 +67,7 @@ def diagnose(dataset: Dataset, spec: DiagnosisSpec, evaluator: Evaluator) -> Ite
     subject, fitted, held_out, free = _prepare(dataset, spec)
     _check_search(subject, spec)
     axes, frame = _axes(dataset, spec), dataset.frame_error
-    mistakes = _likely_mistakes(dataset)
+    mistakes = _likely_mistakes(dataset, fitted)
     yield from diagnose_subject(
         subject, dataset.name, fitted, held_out, spec, evaluator,
         free=free, axes=axes, frame=frame, mistakes=mistakes,
@@ -84,7 +84,7 @@ def diagnose_rig(rig: Rig, dataset: SeriesDataset, spec: DiagnosisSpec, evaluato
     subject, fitted, held_out, free = _prepare_rig(rig, dataset, spec)
     _check_search(subject, spec)
     series = SeriesReduction.of(dataset.recordings, fitted)
-    mistakes = _likely_mistakes(dataset)
+    mistakes = _likely_mistakes(dataset, fitted)
     yield from diagnose_subject(
         subject, dataset.name, fitted, held_out, spec, evaluator, free=free, series=series, mistakes=mistakes
     )
@@ -113,14 +113,14 @@ def diagnose_subject(
     axes: tuple[str, ...] = (),
     series: SeriesReduction | None = None,
     frame: FrameError | None = None,
-    mistakes: Sequence[Mistake] = (),
+    mistakes: tuple[Mistake, ...] = (),
 ) -> Iterator[Progress]:
     """Diagnose any rig that implements :class:`Subject`; yields progress, the finding with the last report.
 
     ``name``: of the dataset; ``fitted``, ``held_out``: recordings to fit and to validate with; ``free``: nominal genes
     to fit (empty: all that a calibration searches); ``axes``: force axes to fit (empty: the default); ``series``: how
     recordings without a beat are reduced; ``frame``: errors of the frame of tracks; ``mistakes``: likely ones in the
-    dataset.
+    fitted recordings.
     """
     began = time.monotonic()
     yield Progress(0.0, "reading the recordings", 0)
@@ -150,9 +150,19 @@ def diagnose_subject(
     yield Progress(1.0, "done", evaluations, finding)
 
 
-def _likely_mistakes(dataset: AnyDataset) -> tuple[Mistake, ...]:
-    """Return the likely mistakes in ``dataset``, without checks that could not be carried out."""
-    return tuple(one for one in examine(dataset) if is_finding(one))
+def _likely_mistakes(dataset: AnyDataset, fitted: Sequence[AnyRecording]) -> tuple[Mistake, ...]:
+    """Return the likely mistakes in ``dataset`` that the ``fitted`` recordings show by themselves."""
+
+    def found(examined: AnyDataset) -> tuple[Mistake, ...]:
+        return tuple(one for one in examine(examined) if is_finding(one))
+
+    names = {one.name for one in fitted}
+    mistakes, others = found(dataset), [one.name for one in dataset.recordings if one.name not in names]
+    if not (mistakes and others and isinstance(dataset, Dataset)):
+        return mistakes
+    alone = replace(dataset, recordings=tuple(one for one in dataset.recordings if one.name in names), held_out=())
+    kinds = {one.kind for one in found(alone)}
+    return tuple(one for one in mistakes if one.kind in kinds)
 
 
 def _without_copies(

@@ -149,10 +149,12 @@ def _look_alikes(state: SearchState, best: Refit) -> list[StartPoint]:
     """Return start points in which one effect of the hypothesis ``best`` is replaced by one known to look similar.
 
     A score test does not see what the nominal genes, or a similar effect fitted first, have already absorbed. Choices,
-    such as two signs, may explain the recordings equally, and exactly. Otherwise, where ``best`` leaves only noise, in
-    prediction too, an effect may be more probable only if it has fewer genes, such as a stall without a vortex.
+    such as two signs, may explain the recordings equally, and exactly. Otherwise, where ``best`` leaves only noise, of
+    forces in prediction too, an effect may be more probable only if it has fewer genes, such as a stall without a
+    vortex.
     """
-    exact = max(best.excess, best.predicted or 0.0) <= tolerated_excess(state.data, 0.0, 0.0)
+    left = max(best.excess, best.predicted or 0.0) if state.data.kind == "forces" else best.excess
+    exact = left <= tolerated_excess(state.data, 0.0, 0.0)
     choice = any(part.suspect.positions for part in best.trials)
     found = {trials[0].suspect.name: trials[0] for trials in state.trials if trials}
     starts = []

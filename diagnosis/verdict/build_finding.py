@@ -25,7 +25,7 @@ from wingfit.diagnosis.subject import Subject
 from wingfit.diagnosis.verdict.fitted_models import fitted_models
 from wingfit.diagnosis.verdict.held_out import held_out_refutes
 from wingfit.diagnosis.verdict.locate_in_beat import locate_in_beat
-from wingfit.diagnosis.verdict.mistakes import doubted_by_mistakes, mistake_remarks, mistakes_sentence
+from wingfit.diagnosis.verdict.mistakes import MistakeDoubt
 from wingfit.diagnosis.verdict.noise_remarks import drift_sentence, marker_remarks, noise_remarks
 from wingfit.diagnosis.verdict.proof import (
     ResidualPair,
@@ -56,17 +56,19 @@ WORSE_FACTOR = 1.1  # times the misfit before: recordings that fit worse than th
 
 
 def build_finding(
-    state: SearchState, name: str, held_out: Sequence[AnyRecording], mistakes: Sequence[Mistake] = ()
+    state: SearchState, name: str, held_out: Sequence[AnyRecording], mistakes: tuple[Mistake, ...] = ()
 ) -> Iterator[Step]:
     """Build the finding of a finished search; yields the fraction of the work done, the stage, and the finding last.
 
     ``name``: of the dataset; ``held_out``: recordings with which the result is validated; ``mistakes``: likely ones in
-    the dataset.
+    the fitted recordings.
     """
     nominal, weights = state.fitted_nominal.refit, state.final_weights
     floor = state.floor(_discretisation_error(state))
     decision = judged_by_accepted_error(decide(weights), state.data, weights, floor)
-    decision = partly(decision, state.data, nominal, floor)
+    decision = certain = partly(decision, state.data, nominal, floor)
+    doubt = MistakeDoubt(mistakes, [one.name for one in state.suspects], state.spec.calibration.effects)
+    decision = doubt.applied(certain)
     best = nominal if decision.verdict == "adequate" else decision.best
     yield 0.0, "computing the intervals of the genes", None
     best = replace(best, fit=with_measured_jacobian(state.context, best.fit))
@@ -85,13 +87,14 @@ def build_finding(
     if located is None:
         raise ValueError("the misfit was not located")
     advice: tuple[Advice, ...] = ()
-    if decision.verdict != "adequate" or decision.probabilities["adequate"] < CONFIDENT:
+    if decision is certain and (decision.verdict != "adequate" or decision.probabilities["adequate"] < CONFIDENT):
         rest = decision.verdict == "partly named"
         for part, ranked in advise(state.context, state.final_weights, floor, rest=rest):
             advice = ranked
             yield 0.75 + 0.2 * part, "comparing what to record next", None
-    finding = _finding(state, name, decision, best, own, validation, advice, located, mistakes, refuted=refuted)
-    yield 1.0, "done", replace(finding, remarks=(*finding.remarks, *failed))
+    finding = _finding(state, name, decision, best, own, validation, advice, located, refuted=refuted)
+    finding = replace(finding, remarks=(*finding.remarks, *failed))
+    yield 1.0, "done", doubt.stated(finding, certain, decision)
 
 
 def _locate(
@@ -134,19 +137,17 @@ def _finding(
     validation: ResidualPair | None,
     advice: tuple[Advice, ...],
     located: Located,
-    mistakes: Sequence[Mistake],
     *,
     refuted: bool,
 ) -> Finding:
     subject, data, weights = state.subject, state.data, state.final_weights
     nominal, floor, unit = state.fitted_nominal.refit, state.floor(_discretisation_error(state)), state.data.unit
     rows = recording_misfits(fitted, held_out=False, floor=floor)
-    first, proved = decision, None
+    decided, first, proved = decide(weights), decision, None
     if validation is not None:
         rows += recording_misfits(validation, held_out=True, floor=floor)
         proved = proof(validation, floor, unit, effects_added=bool(best.names))
         decision = doubted_by_held_out(decision, proved, data, refuted=refuted)
-    before, decision = decision, doubted_by_mistakes(decision, mistakes)
     suspects, genes = {suspect.name: suspect for suspect in subject.suspects}, gene_values(data, best)
     weights = replace(weights, refits=tuple(best if one.names == best.names else one for one in weights.refits))
     return Finding(
@@ -159,11 +160,10 @@ def _finding(
         + ("" if data.kind == "series" else _drift_sentence(data, nominal, best))
         + remaining_sentence(data, decision, best, floor)
         + candidate_sentence(data, decision, weights, suspects)
-        + accepted_error_sentence(decide(weights), first)
+        + accepted_error_sentence(decided, judged_by_accepted_error(decided, data, weights, floor))
         + accepted_sentence(data, decision, nominal, floor)
         + noise_sentence(data, decision, nominal)
-        + held_out_sentence(first, proved, data, refuted=refuted)
-        + mistakes_sentence(before, decision, mistakes),
+        + held_out_sentence(first, proved, data, refuted=refuted),
         probabilities=decision.probabilities,
         named=decision.named,
         added_effects=best.names,
@@ -185,7 +185,6 @@ def _finding(
         channels=located.channels,
         fitted=fitted_models(data, weights, best),
         remarks=(
-            *mistake_remarks(mistakes),
             *state.fitted_nominal.remarks,
             *_refinement_remarks(state.fitted_nominal),
             *_noise_remarks(data, nominal, unit, decision),

@@ -2,73 +2,114 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 
-from wingfit.checks.mistake import Kind, Mistake
+from wingfit.checks.mistake import EVERY, Kind, Mistake
+from wingfit.diagnosis.finding import Finding
 from wingfit.diagnosis.verdict.reservations import CLAIMING, without_names
 from wingfit.diagnosis.verdict.verdict import Decision
 
 DESCRIBED_BY: Mapping[Kind, tuple[str, ...]] = {
-    "amplitude": ("stroke_amplitude",),
+    "air pressure": (),
+    "airspeed": (),
+    "amplitude": (),
     "axes": (),
     "body pitch": ("body_pitch_convention", "axis_sign"),
     "force axes": ("axis_sign", "axis_swap", "body_pitch_convention"),
-    "force unit": ("unit_error", "scale_error"),
+    "force phase": ("phase_reference",),
+    "force unit": ("unit_error",),
     "frequency": (),
-    "frozen marker": (),
-    "length unit": ("scale_error",),
-    "mean angle": ("stroke_bias", "hinge_tilt", "camera_rotation"),
-    "motion": ("stroke_amplitude", "wing_pitch_amplitude", "wing_pitch_phase", "wing_pitch_zero"),
-    "origin": ("camera_shift", "hinge_offset"),
-    "phase lag": ("phase_lag_error",),
-    "scale": ("scale_error",),
+    "mean angle": (),
+    "motion": (),
+    "origin": ("hinge_offset",),
+    "phase lag": (),
+    "scale": (),
     "side": (),
     "swapped markers": ("marker_swap",),
-    "tilt": ("camera_rotation", "hinge_tilt"),
-    "time unit": (),
+    "tilt": (),
     "vertical sign": (),
 }
 """Mistakes that samples show when compared with the description of the rig, and the effects that describe them.
 
-Others are only remarks: improbable values, gaps or copies, which may be right or which no effect imitates, and another
-start of the beat of forces, which competes with the effects as one of them, whatever it is.
+Others are only remarks: improbable values, gaps, copies and unsteady flapping, which may be right, or which no effect
+imitates.
 """
-LIKELY = 0.7
-"""Probability of such a mistake where the checks find one: they found 10 in 1170 datasets of five simulators with all
-kinds of concealed effects, and all were mistakes (0.74 or more, with a confidence of 95 %)."""
+COMPETING: tuple[Kind, ...] = ("force phase",)
+"""Mistakes that an effect describes whatever their size, so that it competes with the others as one of them."""
+CONDITIONS: tuple[Kind, ...] = ("air pressure", "airspeed")
+"""Kinds that are improbable values as well, of single recordings; samples show them in all recordings together."""
+LIKELY = 0.5  # probability of a mistake, the least with which no effect is named
 
 
-def doubted_by_mistakes(decision: Decision, mistakes: Sequence[Mistake]) -> Decision:
-    """Return ``decision`` without names where ``mistakes`` may be the cause and the named effects do not describe one.
+@dataclass(frozen=True)
+class MistakeDoubt:
+    """Likely ``mistakes`` in a dataset, and what is known of their effect on the recordings.
 
-    The effects keep the probability that the dataset has no mistake.
+    ``suspects``: names of the effects that were considered; ``included``: of those in the nominal model.
     """
-    doubting = _doubting(mistakes)
-    if decision.verdict not in CLAIMING or not doubting:
-        return decision
-    described = {name for kind in doubting for name in DESCRIBED_BY[kind]}
-    return decision if described & set(decision.named) else without_names(decision, LIKELY)
+
+    mistakes: tuple[Mistake, ...] = ()
+    suspects: Collection[str] = ()
+    included: Collection[str] = ()
+
+    def applied(self, decision: Decision) -> Decision:
+        """Return ``decision`` with less certainty, and without names, where a mistake may be the cause instead.
+
+        The effects keep the probability that the dataset has no mistake.
+        """
+        if decision.verdict not in CLAIMING or not self._causes(decision.named):
+            return decision
+        return without_names(decision, LIKELY)
+
+    def sentence(self, before: Decision, after: Decision) -> str:
+        """Return a sentence on mistakes that may be the cause, or that a named effect describes; else empty.
+
+        ``before``, ``after``: the decision without and with :meth:`applied`.
+        """
+        causes = self._causes(before.named)
+        if causes and after.verdict != "adequate":
+            name = " No effect is named until then." if before.verdict != after.verdict else ""
+            return (
+                f" The dataset has likely mistakes ({_listed(causes)}), and one of them may be the cause: correct the "
+                f"dataset, or exclude the recordings that have them (see the remarks).{name}"
+            )
+        same = [kind for kind in self._shown() if set(DESCRIBED_BY[kind]) & set(after.named)]
+        found = f" The checks of the dataset find it, too ({_listed(same)}): correct the dataset (see the remarks)."
+        return found if same else ""
+
+    def stated(self, finding: Finding, before: Decision, after: Decision) -> Finding:
+        """Return ``finding`` with the mistakes in its summary and remarks; arguments as of :meth:`sentence`."""
+        remarks = tuple(f"likely mistake in the dataset: {one}" for one in self.mistakes)
+        hypotheses = finding.hypotheses
+        if before.verdict != after.verdict:
+            hypotheses = tuple(
+                replace(one, probability=(1.0 - LIKELY) * one.probability) if one.effects else one for one in hypotheses
+            )
+        return replace(
+            finding,
+            summary=finding.summary + self.sentence(before, after),
+            hypotheses=hypotheses,
+            remarks=(*remarks, *finding.remarks),
+        )
+
+    def _causes(self, named: Sequence[str]) -> list[Kind]:
+        """Return the kinds of mistakes that neither the model nor an effect in ``named`` describes."""
+        causes = []
+        for kind in self._shown():
+            by = set(DESCRIBED_BY[kind])
+            competes = kind in COMPETING and not by.isdisjoint(self.suspects)
+            if by.isdisjoint(self.included) and by.isdisjoint(named) and not competes:
+                causes.append(kind)
+        return causes
+
+    def _shown(self) -> list[Kind]:
+        return [
+            one.kind
+            for one in self.mistakes
+            if one.kind in DESCRIBED_BY and not (one.kind in CONDITIONS and one.where != EVERY)
+        ]
 
 
-def mistakes_sentence(before: Decision, after: Decision, mistakes: Sequence[Mistake]) -> str:
-    """Return a sentence on likely ``mistakes``, if the verdict is not "adequate"; else empty.
-
-    ``before``, ``after``: the decision without and with :func:`doubted_by_mistakes`.
-    """
-    if not mistakes or after.verdict == "adequate":
-        return ""
-    kinds = ", ".join(dict.fromkeys(one.kind for one in mistakes))
-    name = " No effect is named until then." if before.verdict != after.verdict else ""
-    return (
-        f" The dataset has likely mistakes ({kinds}). One of them may be the cause: correct or exclude them first (see "
-        f"the remarks).{name}"
-    )
-
-
-def mistake_remarks(mistakes: Sequence[Mistake]) -> tuple[str, ...]:
-    """Return a remark for each of the likely ``mistakes``: place, value, cause and remedy."""
-    return tuple(f"likely mistake in the dataset: {one}" for one in mistakes)
-
-
-def _doubting(mistakes: Sequence[Mistake]) -> tuple[Kind, ...]:
-    return tuple(one.kind for one in mistakes if one.kind in DESCRIBED_BY)
+def _listed(kinds: Sequence[Kind]) -> str:
+    return ", ".join(dict.fromkeys(kinds))

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, cast
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,12 +13,15 @@ import pytest
 from tests.diagnosis.pendulum_rig import FREQUENCIES, Pendulum, PendulumRig, at, blank, recorded
 from wingfit.checks import Mistake
 from wingfit.checks.guard import NOT_CARRIED_OUT
+from wingfit.checks.mistake import EVERY
 from wingfit.diagnosis import DiagnosisSpec, Finding, diagnose_subject
 from wingfit.diagnosis.diagnose import _likely_mistakes
-from wingfit.records import Recording
+from wingfit.records import AnyDataset, Recording, load_dataset
 from wingfit.report import finding_from_json, finding_json, html
+from wingfit.report.page import headline
 from wingfit.workers.in_process import InProcessEvaluator
 
+ROOT = Path(__file__).parents[2]
 HELD_OUT = (1.45, 2.3, 3.0)  # Hz
 NOMINAL = {"stiffness": 0.25, "damping": 3e-3, "inertia": 1.2e-3}  # not the estimates
 
@@ -91,10 +94,13 @@ def test_likely_mistakes_of_the_dataset_speak_against_a_name() -> None:
     wrong = Mistake("vertical sign", "all recordings", "0.07 rad", "0.003 rad", "z points down", "the sign of z")
     found = diagnosed(fitted, mistakes=(wrong,))
     assert (sure.verdict, found.verdict, found.named) == ("named", "unnamed", ())
-    assert found.probabilities["named"] == pytest.approx(0.3 * sure.probabilities["named"])
+    assert found.probabilities["named"] == pytest.approx(0.5 * sure.probabilities["named"])
     assert "too little for a name." in found.summary
-    assert "likely mistakes (vertical sign). One of them may be the cause" in found.summary
+    assert "likely mistakes (vertical sign), and one of them may be the cause" in found.summary
     assert found.summary.endswith("No effect is named until then.")
+    assert (found.advice, bool(sure.advice)) == ((), True)
+    assert found.hypotheses[0].probability == pytest.approx(0.5 * sure.hypotheses[0].probability)
+    assert headline(found) == "Missing physics; whether an effect of the library explains it is not certain"
     assert found.remarks[0].startswith("likely mistake in the dataset: all recordings: 0.07 rad")
 
 
@@ -103,16 +109,30 @@ def test_likely_mistakes_that_no_effect_imitates_leave_the_name() -> None:
     unusual = Mistake("mass", "dataset.yaml: wing.markers", "2 kg", "1 g", "grams for kilograms", "mass_kg")
     found = diagnosed(fitted, mistakes=(unusual,))
     assert (found.verdict, found.named) == ("named", ("friction",))
-    assert "likely mistakes (mass)." in found.summary
-    assert "until then" not in found.summary
+    assert found.summary == diagnosed(fitted).summary
+    assert found.remarks[0].startswith("likely mistake in the dataset: dataset.yaml")
 
 
 def test_a_check_that_fails_is_no_mistake_of_the_dataset(monkeypatch: pytest.MonkeyPatch) -> None:
     failed = Mistake(NOT_CARRIED_OUT, "dataset", "no check", "a result", "an error", "nothing")
     wrong = Mistake("frequency", "recording 'a'", "3 Hz", "4 Hz", "a typing error", "flap_frequency_hz")
+    examined_is(monkeypatch, lambda _: (failed, wrong))
+    dataset = load_dataset(ROOT / "examples" / "robird")
+    assert _likely_mistakes(dataset, dataset.recordings) == (wrong,)
+
+
+def test_mistakes_in_other_recordings_are_not_those_of_the_fitted(monkeypatch: pytest.MonkeyPatch) -> None:
+    dataset = load_dataset(ROOT / "examples" / "robird")
+    first, *others = dataset.recordings
+    found = [Mistake(kind, EVERY, "one", "another", "a slip", "the key") for kind in ("scale", "frequency")]
+    examined_is(monkeypatch, lambda given: found if first in given.recordings else found[1:])
+    assert _likely_mistakes(dataset, (first,)) == tuple(found)
+    assert _likely_mistakes(dataset, others) == tuple(found[1:])
+
+
+def examined_is(monkeypatch: pytest.MonkeyPatch, examine: Callable[[AnyDataset], Sequence[Mistake]]) -> None:
     module = importlib.import_module("wingfit.diagnosis.diagnose")  # whose name in the package is the function
-    monkeypatch.setattr(module, "examine", lambda _: (failed, wrong))
-    assert _likely_mistakes(cast("Any", None)) == (wrong,)
+    monkeypatch.setattr(module, "examine", examine)
 
 
 def test_progress_shows_where_the_nominal_model_misses_and_what_leads() -> None:

@@ -60,6 +60,6 @@ EFFECT = effect_of_air(
     "mean over the tests; the typical sizes are from Table 8",
     signature="the model fits each recording by itself but not all together, because lift is too small in some "
     "conditions and too large in others, with the same shape over the beat",
-    confused_with=("circulation_lag", "tip_loss", "mass_offset"),
+    confused_with=("circulation_lag", "tip_loss", "mass_offset", "dynamic_stall", "stall_vortex"),
     vehicle=_vary,
 )

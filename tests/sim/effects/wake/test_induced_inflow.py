@@ -14,6 +14,7 @@ from tests.sim.kernels.marching import LENGTH
 from tests.sim.vehicle.vehicles import recording
 from wingfit.sim.effects.library.wake.induced_inflow import slices
 from wingfit.sim.effects.ports.vehicle import Setting, VehicleScene
+from wingfit.sim.effects.registry import EFFECTS
 from wingfit.sim.kernels import LANES
 from wingfit.sim.kernels.arrays import CIRCULATION, NORMAL_X, STREAM_C, STREAM_N
 
@@ -118,3 +119,22 @@ def test_the_added_mass_moves_with_the_air_that_a_wing_meets(terms: tuple[str, .
     scene.carry(np.full((1, len(stream), 8), 0.7))
     assert np.abs(stream).max() > 1e-4
     np.testing.assert_allclose(scene.added[0].T, stream, atol=5e-3 * np.abs(stream).max())
+
+
+def test_an_inflow_that_grows_with_the_radius_acts_on_the_added_mass() -> None:
+    """The force of the effect is that of the changed flow and that of the added mass in the air it moves."""
+    vehicle, rec = replace(DELFLY, velocities="mirrored", motion=FOURIER), recording(12.5, 0.5, 1.0)
+    terms = ("translation", "inertial", "added_mass")
+    r = (np.arange(40) + 0.5) / 40 * vehicle.span
+    setting = Setting(vehicle, terms, FOURIER, rec.condition, 400, 0.0, r)
+    scene, other = (VehicleScene.of(setting, {"C_l": np.array([1.5])}, 1) for _ in range(2))
+    effect = EFFECTS["induced_inflow"]
+    assert effect.vehicle is not None
+    given = {"share": 1.0, "inertia": 1.0, "outward": 1.0}
+    effect.vehicle(scene, {name: np.array([value]) for name, value in given.items()})
+    scene.settle()
+    cosine, sine = scene.wings.turns
+    moved = (scene.flow.along - other.flow.along)[0] * sine + (scene.flow.normal - other.flow.normal)[0] * cosine
+    other.carry(moved)  # air along body x
+    assert np.abs(other.added).max() > 1e-3
+    np.testing.assert_allclose(scene.added, other.added, rtol=1e-9, atol=1e-12)
