@@ -23,7 +23,7 @@ def refine_with_effects(state: SearchState) -> None:
     if best is nominal.refit:
         return
     tried_finer, largest = nominal.tried_finer, 0.0
-    limit = data.policy.rivalry * best.excess + tolerated_excess(data, 0.0, 0.0)
+    limit = data.policy.rivalry * max(best.excess, 0.0) + tolerated_excess(data, 0.0, 0.0)
     leading = [one for one in state.by_excess if one.excess <= limit][:MAX_CONTINUED]
     for finer in state.context.finer():
         changes = [finer_change(finer, one) for one in leading]
@@ -41,7 +41,7 @@ def refine_with_effects(state: SearchState) -> None:
     if first is None:
         return
     first = fit_to_convergence(finer, first)
-    limit = data.policy.rivalry * better.excess + tolerated_excess(data, 0.0, 0.0)
+    limit = data.policy.rivalry * max(better.excess, 0.0) + tolerated_excess(data, 0.0, 0.0)
     near = [one for one in state.refits if one.excess <= limit or set(one.names) < set(better.names)]
     others = [one for one in near if one.names not in {found.names for found in known}]
     followed = [_follow(finer, one, better) for one in others]

@@ -130,6 +130,21 @@ def test_a_finer_wing_beside_an_effect_keeps_the_error_that_remains(
     assert state.nominal.tried_finer == ""
 
 
+def test_a_fit_far_below_the_noise_is_compared_with_a_finer_wing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its excess is negative, by more than a right hypothesis may have: it is still the leading hypothesis."""
+    monkeypatch.setattr(refinement, "finer_change", lambda *_: (0.01, 0.0))
+    monkeypatch.setattr(refinement, "tolerated_excess", lambda *_: 0.1)
+    monkeypatch.setattr(refinement, "_fit_at_finer", lambda _, one, *__: one)
+    ladder, effect = Ladder(8, last=16), SimpleNamespace(excess=-1.0, names=("damage",))
+    known = Nominal(cast("Any", ladder.subject), cast("Any", SimpleNamespace(excess=4.0, names=())), 2.0, "", ())
+    state: Any = SimpleNamespace(
+        data=ladder.data, nominal=known, fitted_nominal=known, refits=[effect], by_excess=[effect], context=ladder,
+        subject=ladder.subject,
+    )  # fmt: skip
+    refinement.refine_with_effects(state)
+    assert (state.nominal.subject.description, state.refits) == ("8 strips", [effect])
+
+
 def test_a_wing_that_bends_at_nine_joints_is_found_by_a_strip_more() -> None:
     """Twice as many strips as the eight of the model fit no better."""
     plant = FlexibleWing(robird_wing(), "9x1", numerics=REFERENCE)
