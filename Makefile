@@ -7,7 +7,7 @@ RUNS := $(VENV)/runs
 INSTALLED := $(VENV)/installed
 COMPILED := $(VENV)/compiled
 
-.PHONY: demo docs proof test test-service test-pages test-programs test-rest check check-wheel serve format lock install pin-image check-image clean
+.PHONY: demo docs proof test test-service test-pages test-programs test-shapes test-rest check check-wheel serve format lock install pin-image check-image clean
 
 demo: $(COMPILED)  ## start the service, calibrate the example campaign, print what came out
 	@$(BIN)/python -m examples.demo
@@ -21,16 +21,22 @@ docs: $(INSTALLED)  ## build the manual, with a search that needs no server: bui
 serve: $(COMPILED)  ## start the service and stay
 	@$(BIN)/wingfit serve
 
-test: install  ## every check and every test, four at a time: programs, servers and browsers wait more than they compute
-	@$(MAKE) --no-print-directory -k -j4 test-service test-rest test-programs test-pages check
+test: install  ## every check and every test, five at a time: programs, servers and browsers wait more than they compute
+	@$(MAKE) --no-print-directory -k -j5 test-service test-shapes test-rest test-programs test-pages check
 
-# The four parts import the same files at the same time: on a fresh clone, each would compile all of them.
+# The parts import the same files at the same time: on a fresh clone, each would compile all of them.
 .PHONY: collect
 collect: $(INSTALLED)
 	@$(BIN)/python -m pytest --collect-only -q > $(VENV)/collected || { tail -n 50 $(VENV)/collected; exit 1; }
-test-service test-pages test-programs test-rest: | collect
+test-service test-pages test-programs test-shapes test-rest: | collect
 
-# Taken out of two of the four parts, so that all take about as long.
+# Shapes of arrays are checked at every call in the tests of these; elsewhere that would take a fifth of the time.
+SHAPED := tests/records tests/inference tests/diagnosis
+test-shapes:
+	$(BIN)/python -m pytest $(SHAPED)
+test-service test-pages test-programs test-rest: export UNCHECKED_SHAPES := 1
+
+# Taken out of two of the parts, so that all take about as long.
 BESIDE := tests/service/jobs tests/service/pages tests/contract tests/export tests/planning
 test-service:
 	$(BIN)/python -m pytest tests/service $(BESIDE:%=--ignore %)
@@ -44,7 +50,7 @@ test-programs:
 	$(BIN)/python -m pytest $(PROGRAMS)
 
 test-rest:
-	$(BIN)/python -m pytest --ignore tests/service $(BESIDE:%=--ignore %) $(PROGRAMS:%=--ignore %)
+	$(BIN)/python -m pytest --ignore tests/service $(BESIDE:%=--ignore %) $(PROGRAMS:%=--ignore %) $(SHAPED:%=--ignore %)
 
 check: $(INSTALLED) check-image  ## every check, no test
 	$(BIN)/ruff check .
