@@ -32,6 +32,7 @@ CONTINUED_STEPS = 10  # of a refit that is continued
 FINAL_STEPS = 20  # of the best hypothesis, until it converges
 AT_BOUND = 1e-9  # from a bound, in genes scaled to 0..1: as far as rounding takes a gene that is at it
 NEAR_POSITION, NEAR_ZERO = 0.25, 0.002  # relative distance from a position of a choice, and from zero
+BESIDE_CHOSEN = 0.05  # the same, from zero, beside another choice of the same suspect that is at a position
 MAX_HALVINGS = 3  # of the suspects' initial sizes if the start cannot be simulated
 
 
@@ -72,14 +73,17 @@ def is_in_position(refit: Refit) -> bool:
 
     A suspect all of whose sizes are choices must have one that is not zero.
     """
-    for trial in refit.trials:
-        chosen = []
-        for name, positions in trial.suspect.positions.items():
-            value = refit.fit.values[name]
-            chosen.append(any(abs(value - one) <= NEAR_POSITION * abs(one) for one in positions))
-            if not chosen[-1] and abs(value) > NEAR_ZERO * min(map(abs, positions)):
-                return False
-        if chosen and not any(chosen) and len(chosen) == len(trial.suspect.size_genes):
+    for suspect in (trial.suspect for trial in refit.trials):
+        sizes = [(refit.fit.values[name], positions) for name, positions in suspect.positions.items()]
+        others = [
+            abs(value) / min(map(abs, positions))
+            for value, positions in sizes
+            if not any(abs(value - one) <= NEAR_POSITION * abs(one) for one in positions)
+        ]
+        chosen = len(others) < len(sizes)
+        if max(others, default=0.0) > (BESIDE_CHOSEN if chosen else NEAR_ZERO):
+            return False
+        if sizes and not chosen and len(sizes) == len(suspect.size_genes):
             return False
     return True
 

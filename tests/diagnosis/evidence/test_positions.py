@@ -38,6 +38,21 @@ def test_zero_will_do_beside_an_amount() -> None:
     assert is_in_position(refit)
 
 
+@pytest.mark.parametrize(
+    ("x", "z", "accepted"),
+    [(0.0, 1.0, True), (0.01, 0.99, True), (0.1, 1.0, False), (0.5, 1.0, False), (0.01, 0.0, False)],
+)
+def test_another_choice_need_not_be_exactly_zero(x: float, z: float, accepted: bool) -> None:
+    """A wrong sign along z leaves the one along x at a part that noise explains; such a part alone is no fault."""
+    names = ("axis.x", "axis.z")
+    axes = Suspect(
+        "axis", genes=tuple(Gene(name, "1", 0.0, 0.0, 1.0) for name in names), positions=dict.fromkeys(names, (1.0,))
+    )
+    trial = SimpleNamespace(suspect=axes)
+    refit: Any = SimpleNamespace(trials=(trial,), fit=SimpleNamespace(values=dict(zip(names, (x, z), strict=True))))
+    assert is_in_position(refit) == accepted
+
+
 def test_positions_are_of_genes_that_exist() -> None:
     with pytest.raises(ValueError, match=r"suspect 'sign' has no gene 'other'"):
         Suspect("sign", genes=SIGN.genes, positions={"other": (1.0,)})
