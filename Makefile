@@ -33,10 +33,11 @@ test-service test-pages test-programs test-shapes test-rest: | collect
 # Shapes of arrays are checked at every call in the tests of these; elsewhere that would take a fifth of the time.
 SHAPED := tests/records tests/inference tests/diagnosis
 test-shapes:
-	$(BIN)/python -m pytest $(SHAPED)
+	$(BIN)/python -m pytest $(SHAPED) $(WORK)
 test-service test-pages test-programs test-rest: export UNCHECKED_SHAPES := 1
 
-# Taken out of two of the parts, so that all take about as long.
+# Put beside others, so that all parts take about as long.
+WORK := tests/benchmarks tests/workers
 BESIDE := tests/service/jobs tests/service/pages tests/contract tests/export tests/planning
 test-service:
 	$(BIN)/python -m pytest tests/service $(BESIDE:%=--ignore %)
@@ -45,12 +46,12 @@ test-pages:
 	$(BIN)/python -m pytest $(BESIDE)
 
 # They start programs, and wait for them.
-PROGRAMS := tests/docs tests/benchmarks tests/workers
+PROGRAMS := tests/docs
 test-programs:
 	$(BIN)/python -m pytest $(PROGRAMS)
 
 test-rest:
-	$(BIN)/python -m pytest --ignore tests/service $(BESIDE:%=--ignore %) $(PROGRAMS:%=--ignore %) $(SHAPED:%=--ignore %)
+	$(BIN)/python -m pytest --ignore tests/service $(BESIDE:%=--ignore %) $(PROGRAMS:%=--ignore %) $(SHAPED:%=--ignore %) $(WORK:%=--ignore %)
 
 check: $(INSTALLED) check-image  ## every check, no test
 	$(BIN)/ruff check .
