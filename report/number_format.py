@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from wingfit.diagnosis.finding import Finding, Hypothesis, Interval, RecordingMisfit
+from wingfit.diagnosis.finding import UNCERTAIN, Finding, Hypothesis, Interval, RecordingMisfit, of_the_library
 
 _PREFIXED = {"m", "N", "Pa", "s", "Hz", "W", "J", "N m", "N/m", "m/s"}
 _PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
@@ -141,7 +141,10 @@ def stages(finding: Finding) -> dict[str, str]:
 
 def added_effects(finding: Finding) -> str:
     """Return what the "after" model adds: the named effects or, without any, the closest ones of the library."""
-    return "the named effects" if finding.named else "the closest effects of the library, which do not explain it"
+    if finding.named:
+        return "the named effects"
+    uncertain = of_the_library(finding.probabilities) >= UNCERTAIN
+    return f"the closest effects of the library, which {'may not be the cause' if uncertain else 'do not explain it'}"
 
 
 def change(finding: Finding, before: str, after: str) -> str:

@@ -131,6 +131,8 @@ def test_what_an_effect_may_explain_is_not_headed_as_unexplained() -> None:
     finding = with_verdict(wing_finding(), "unnamed")
     doubtful = replace(finding, probabilities={"named": 0.7, "unnamed": 0.3})
     assert "<h1>Missing physics; whether an effect of the library explains it is not certain</h1>" in html(doubtful)
+    assert "do not explain it" not in html(doubtful)
+    assert "which may not be the cause" in html(doubtful)
 
 
 def test_an_error_that_the_last_refinement_leaves_has_no_finer_model() -> None:
