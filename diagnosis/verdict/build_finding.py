@@ -163,7 +163,7 @@ def _finding(
         + accepted_error_sentence(decided, judged_by_accepted_error(decided, data, weights, floor))
         + accepted_sentence(data, decision, nominal, floor)
         + noise_sentence(data, decision, nominal)
-        + held_out_sentence(first, proved, data, refuted=refuted),
+        + held_out_sentence(first, proved, refuted=refuted),
         probabilities=decision.probabilities,
         named=decision.named,
         added_effects=best.names,

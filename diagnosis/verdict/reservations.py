@@ -138,7 +138,7 @@ def accepted_error_sentence(before: Decision, after: Decision) -> str:
 def doubted_by_held_out(
     decision: Decision, proved: Proof | None, data: WhitenedData, *, refuted: bool = False
 ) -> Decision:
-    """Return ``decision`` with less certainty where held-out series contradict it.
+    """Return ``decision`` with less certainty where held-out recordings contradict it.
 
     A model that they refute (``refuted``) is not adequate. One that does not predict them otherwise is adequate with a
     limited probability (`Policy.doubted_noise`). Effects with which they are predicted no better are not named.
@@ -147,15 +147,15 @@ def doubted_by_held_out(
     if refuted and decision.verdict == "adequate":
         found["adequate"], found["unnamed"] = 0.0, found["unnamed"] + found["adequate"]
         return replace(decision, verdict="unnamed", probabilities=found, named=(), alternatives=())
-    if _unpredicted(decision, proved, data):
+    if _unpredicted(decision, proved):
         moved = max(found["adequate"] - data.policy.doubted_noise, 0.0)
         found["adequate"], found["unnamed"] = found["adequate"] - moved, found["unnamed"] + moved
         return replace(decision, probabilities=found)
-    return without_names(decision) if _useless(decision, proved, data) else decision
+    return without_names(decision) if _useless(decision, proved) else decision
 
 
-def held_out_sentence(before: Decision, proved: Proof | None, data: WhitenedData, *, refuted: bool = False) -> str:
-    """Return a sentence on held-out series that contradict the decision ``before`` they were considered; else empty."""
+def held_out_sentence(before: Decision, proved: Proof | None, *, refuted: bool = False) -> str:
+    """Return a sentence on held-out recordings that contradict ``before``, the decision without them; else empty."""
     if proved is None:
         return ""
     if refuted and before.verdict == "adequate":
@@ -163,12 +163,12 @@ def held_out_sentence(before: Decision, proved: Proof | None, data: WhitenedData
             " The fitted recordings do not show it, but the held-out ones do: their misfit is "
             f"{proved.before.value:.3g} times the floor, more than noise and the errors of the genes explain."
         )
-    if _unpredicted(before, proved, data):
+    if _unpredicted(before, proved):
         return (
             f" But it does not predict the held-out recordings: their misfit is {proved.before.value:.3g} times the "
-            "floor. Something is missing there, or the fitted recordings do not determine the genes."
+            "floor. Something is missing or wrong there, or the fitted recordings do not determine the genes."
         )
-    if _useless(before, proved, data):
+    if _useless(before, proved):
         return (
             " It is not named, because with it the held-out recordings are predicted no better: their misfit is "
             f"{proved.before.value:.3g} times the floor before, and {proved.after.value:.3g} after."
@@ -176,15 +176,15 @@ def held_out_sentence(before: Decision, proved: Proof | None, data: WhitenedData
     return ""
 
 
-def _unpredicted(decision: Decision, proved: Proof | None, data: WhitenedData) -> bool:
-    if data.kind != "series" or decision.verdict != "adequate" or proved is None:
+def _unpredicted(decision: Decision, proved: Proof | None) -> bool:
+    if decision.verdict != "adequate" or proved is None:
         return False
     low = proved.before.low
     return (proved.before.value if low is None else low) > NOT_PREDICTED
 
 
-def _useless(decision: Decision, proved: Proof | None, data: WhitenedData) -> bool:
-    if data.kind != "series" or decision.verdict not in CLAIMING or proved is None:
+def _useless(decision: Decision, proved: Proof | None) -> bool:
+    if decision.verdict not in CLAIMING or proved is None:
         return False
     missed = proved.before.value > 1.0 + NO_GAIN  # else there is nothing to gain
     return missed and not proved.improved and proved.after.value > (1.0 - NO_GAIN) * proved.before.value
