@@ -63,13 +63,14 @@ def _constant(recording: AnyRecording) -> Iterator[Mistake]:
     ):
         return  # one axis of all markers: a camera that sees a plane; the shape of the wing says more
     more = f" and {len(names) - 3} more" if len(names) > 3 else ""
+    remedy = "empty or remove" if isinstance(recording, Recording) and recording.markers else "remove"
     yield Mistake(
         "constant channel",
         f"recording {recording.name!r}",
         f"{', '.join(names[:3])}{more} never change{'s' if len(names) == 1 else ''}",
         "values that change with the motion",
         "the channel was not connected, or the tracker held one position",
-        f"recordings/{recording.name}.csv: empty or remove {'this column' if len(names) == 1 else 'these columns'}",
+        f"recordings/{recording.name}.csv: {remedy} {'this column' if len(names) == 1 else 'these columns'}",
     )
 
 

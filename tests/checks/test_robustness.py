@@ -142,3 +142,14 @@ def test_an_error_in_a_check_is_logged_and_becomes_a_warning(
 def test_what_a_guarded_check_finds_is_kept() -> None:
     assert guarded("nothing", "here", lambda: None) == []
     assert guarded("nothing", "here", lambda: [None]) == []
+
+
+def test_a_constant_force_is_removed_and_that_of_a_marker_may_be_emptied() -> None:
+    """A dataset refuses an axis of the force that has no value at all."""
+    for dataset, remedy in zip(bases(), ("empty or remove this column", "remove this column"), strict=True):
+        first, *others = dataset.recordings
+        values = first.values.copy()
+        values[:, 0] = 0.01
+        found = examine(replace(dataset, recordings=(replace(first, values=values), *others)))
+        (constant,) = (one for one in found if one.kind == "constant channel")
+        assert constant.change.endswith(f".csv: {remedy}")
