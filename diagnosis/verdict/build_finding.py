@@ -52,6 +52,8 @@ from wingfit.records import AnyRecording
 
 Step = tuple[float, str, Finding | None]
 
+OUTLYING = 5.0  # times the median misfit of the others, and times the floor: a recording with more gets a remark
+MANY_OTHERS = 2  # recordings with which one is compared
 WORSE_FACTOR = 1.1  # times the misfit before: recordings that fit worse than that get a remark
 
 
@@ -191,6 +193,7 @@ def _finding(
             *marker_remarks(data, state.position_errors, best.fit),
             *_unidentified_sizes(genes, best),
             *_worsened(rows, best, unit),
+            *_outlying(rows, unit),
         ),
     )
 
@@ -266,3 +269,21 @@ def _worsened(rows: Sequence[RecordingMisfit], best: Refit, unit: str) -> tuple[
         if best.names and row.after.value > WORSE_FACTOR * row.before.value
     ]
     return (f"with the added effects the misfit increases in {', '.join(worse)}",) if worse else ()
+
+
+def _outlying(rows: Sequence[RecordingMisfit], unit: str) -> tuple[str, ...]:
+    """Return a remark on a recording that the model "after" misses far more than the others; empty if there is none.
+
+    A series, whose misfit may depend on what was done in it, gets none.
+    """
+    *others, worst = sorted(rows, key=lambda row: row.after.value)
+    if len(others) < MANY_OTHERS or worst.flap_frequency_hz is None:
+        return ()
+    usual = float(np.median([row.after.value for row in others]))
+    if worst.after.value < OUTLYING * max(usual, worst.floor):
+        return ()
+    missed = f"{amount(worst.after.value, unit)}, and half of the others by {amount(usual, unit)} or less"
+    return (
+        f"the model misses {worst.name} by {missed}: something acts there that they do not show, or the recording has "
+        "a mistake (axes, signs, unit, start of the beat)",
+    )
