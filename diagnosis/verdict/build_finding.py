@@ -53,7 +53,7 @@ from wingfit.records import AnyRecording
 Step = tuple[float, str, Finding | None]
 
 OUTLYING = 5.0  # times the median misfit of the others, and times the floor: a recording with more gets a remark
-MANY_OTHERS = 2  # recordings with which one is compared
+FEWEST_OTHERS = 2  # recordings with which another one is compared
 WORSE_FACTOR = 1.1  # times the misfit before: recordings that fit worse than that get a remark
 
 
@@ -277,7 +277,7 @@ def _outlying(rows: Sequence[RecordingMisfit], unit: str) -> tuple[str, ...]:
     A series, whose misfit may depend on what was done in it, gets none.
     """
     *others, worst = sorted(rows, key=lambda row: row.after.value)
-    if len(others) < MANY_OTHERS or worst.flap_frequency_hz is None:
+    if len(others) < FEWEST_OTHERS or worst.flap_frequency_hz is None:
         return ()
     usual = float(np.median([row.after.value for row in others]))
     if worst.after.value < OUTLYING * max(usual, worst.floor):

@@ -271,8 +271,7 @@ class BladeElementWing:
         curves = len(CURVE_ROWS) if "steady_curves" in self.terms else 0
         found = np.zeros((len(scene), len(ROWS) + curves, 2, n // LANES, LANES))
         rows = scene.rows(first)
-        apart, together = rows[:, PEELED], scene.together[:, None]
-        rows[:, PEELED] = np.where(together == 0.0, 1.0, apart + (1.0 - together) * (1.0 - apart))
+        rows[:, PEELED] = scene.apart(rows)
         masses, loading = scene.mass_factor[:, None] * mass, scene.loading[:, : len(r)].copy()
         grouped = rows.reshape(*rows.shape[:2], -1, LANES)
         for side in scene.each_side(rows):

@@ -238,8 +238,7 @@ class VehicleScene:
         the air, and the rate of change of ``air`` is neglected.
         """
         (cosine, sine), places, (rows, _) = self.wings.turns, self.stations, self.wings.sides[0]
-        apart = self.together[:, None] * (rows[:, PEELED] - 1.0) + 1.0
-        factor = apart**2 * rows[:, PITCH_RATE] * (0.25 * np.pi * self.carried * self.density)[:, None]
+        factor = self.apart(rows) ** 2 * rows[:, PITCH_RATE] * (0.25 * np.pi * self.carried * self.density)[:, None]
         force = factor[:, :, None] * air * places.chord**2 * places.twist
         along, normal = self._share("inertial") * force * cosine, self._share("added_mass") * force * sine
         x, z = along * sine + normal * cosine, along * cosine - normal * sine
@@ -258,6 +257,11 @@ class VehicleScene:
         The first element has the fraction ``half_step`` of the twist at the pitch station.
         """
         return motion_rows(self.angles, self.forward(self.inflow), self.setting.motion.root_pitch, half_step)
+
+    def apart(self, rows: Array) -> Array:
+        """Return the part [B, n] of the chord that carries added mass, from the motion ``rows`` [B, 14, n]."""
+        peeled, together = rows[:, PEELED], self.together[:, None]
+        return np.where(together == 0.0, 1.0, peeled + (1.0 - together) * (1.0 - peeled))
 
     def each_side(self, rows: Array) -> Iterator[Side]:
         """Yield each computed side: the lower wings, then the upper ones of a vehicle that has them (layout "x4").
