@@ -66,6 +66,7 @@ class Mistake:
         change: what to change, exactly: file, key or column, old and new value.
         certain: whether a dataset with it is refused; otherwise it is a warning.
         edits: the same change as data, empty where nobody but the user can make it.
+        alone: whether the other recordings show that they do not have it.
     """
 
     kind: Kind
@@ -76,6 +77,7 @@ class Mistake:
     change: str
     certain: bool = False
     edits: tuple[Edit, ...] = ()
+    alone: bool = False
 
     @property
     def message(self) -> str:

@@ -10,6 +10,7 @@ import numpy as np
 
 from wingfit.checks.mistake import Edit, KeyEdit, Kind
 from wingfit.records import Condition, Dataset, Flap, FourierFlap, FourierPitch, Recording, WingMotion
+from wingfit.records.array_types import Array
 from wingfit.records.description.convert import describe_rig
 
 RADIANS = 180.0 / np.pi
@@ -173,3 +174,12 @@ HYPOTHESES: tuple[Hypothesis, ...] = (
         _air(lambda c: replace(c, pressure=10 * c.pressure) if c.pressure < 12e3 else None),
     ),
 )
+
+
+def body_pitches(pitch: Array) -> tuple[tuple[Array, str], ...]:
+    """Return the body pitch [N] (rad) without each of the usual mistakes, and the mistake in words."""
+    return (
+        (np.degrees(pitch), "the body pitch is in radians, in the key body_pitch_deg"),
+        (np.pi / 2 - pitch, "the body pitch is measured from the vertical, not from level"),
+        (-pitch, "the sign of the body pitch: positive nose up"),
+    )

@@ -114,6 +114,21 @@ def _copied(dataset: Dataset, _: Rng) -> Dataset:
     return replace(dataset, recordings=(first, same, *rest))
 
 
+def _one(change: Change) -> Change:
+    """Change the second recording only, which the others then show; a single one shows nothing."""
+
+    def make(dataset: Dataset, rng: Rng) -> Dataset | None:
+        if len(dataset.recordings) < 2:
+            return None
+        changed = change(dataset, rng)
+        if changed is None:
+            return None
+        first, _, *rest = dataset.recordings
+        return replace(dataset, recordings=(first, changed.recordings[1], *rest))
+
+    return make
+
+
 def _stopping(values: Array, _: Recording, rng: Rng) -> Array:
     third = len(values) // 3
     values[-third:] = 0.003 * rng.standard_normal((third, values.shape[1]))
@@ -145,6 +160,24 @@ KINDS = (
     Kind("time zero a quarter beat late", "vehicle", _late(0.25), ("force phase",)),
     Kind("time zero half a beat late", "vehicle", _late(0.5), ("force phase",)),
     Kind("time zero a quarter beat early", "vehicle", _late(-0.25), ("force phase",)),
+    Kind("sign of x, one recording", "vehicle", _one(forces(lambda f, *_: f * np.array([-1.0, 1.0]))), ("force axes",)),
+    Kind(
+        "sign of z, one recording",
+        "vehicle",
+        _one(forces(lambda f, *_: f * np.array([1.0, -1.0]))),
+        ("force axes", "body pitch"),
+        False,
+    ),
+    Kind("x and z exchanged, one recording", "vehicle", _one(forces(lambda f, *_: f[:, ::-1])), ("force axes",)),
+    Kind("gram-force, one recording", "vehicle", _one(forces(lambda f, *_: f / 9.80665e-3)), ("force unit",)),
+    Kind("a quarter beat late, one recording", "vehicle", _one(_late(0.25)), ("force phase",)),
+    Kind(
+        "sign of the body pitch, one recording",
+        "vehicle",
+        _one(condition(lambda c: replace(c, angle_of_attack=-c.angle_of_attack))),
+        ("body pitch", "force axes"),
+        False,
+    ),
     Kind("lost samples are zeros", "vehicle", forces(_lost), ("placeholders",)),
     Kind("frequency 5 % high", "vehicle", _frequency(1.05), ("frequency",)),
     Kind("frequency 3 % low", "vehicle", _frequency(0.97), ("frequency",)),

@@ -74,7 +74,7 @@ class MistakeDoubt:
                 f" The dataset has likely mistakes ({_listed(causes)}), and one of them may be the cause: correct the "
                 f"dataset, or exclude the recordings that have them (see the remarks).{name}"
             )
-        same = [kind for kind in self._shown() if set(DESCRIBED_BY[kind]) & set(after.named)]
+        same = [one.kind for one in self._shown() if _described_by(one) & set(after.named)]
         found = f" The checks of the dataset find it, too ({_listed(same)}): correct the dataset (see the remarks)."
         return found if same else ""
 
@@ -96,19 +96,21 @@ class MistakeDoubt:
     def _causes(self, named: Sequence[str]) -> list[Kind]:
         """Return the kinds of mistakes that neither the model nor an effect in ``named`` describes."""
         causes = []
-        for kind in self._shown():
-            by = set(DESCRIBED_BY[kind])
-            competes = kind in COMPETING and not by.isdisjoint(self.suspects)
+        for one in self._shown():
+            by = _described_by(one)
+            competes = one.kind in COMPETING and not by.isdisjoint(self.suspects)
             if by.isdisjoint(self.included) and by.isdisjoint(named) and not competes:
-                causes.append(kind)
+                causes.append(one.kind)
         return causes
 
-    def _shown(self) -> list[Kind]:
-        return [
-            one.kind
-            for one in self.mistakes
-            if one.kind in DESCRIBED_BY and not (one.kind in CONDITIONS and one.where != EVERY)
-        ]
+    def _shown(self) -> list[Mistake]:
+        improbable = [one for one in self.mistakes if one.kind in CONDITIONS and one.where != EVERY]
+        return [one for one in self.mistakes if one.kind in DESCRIBED_BY and one not in improbable]
+
+
+def _described_by(mistake: Mistake) -> set[str]:
+    """Return the effects that describe ``mistake``: none if it is one recording's alone, since they act in all."""
+    return set() if mistake.alone else set(DESCRIBED_BY[mistake.kind])
 
 
 def _listed(kinds: Sequence[Kind]) -> str:

@@ -82,7 +82,8 @@ CAUGHT = [
     "vehicle: sign of z", "vehicle: both signs: forces on the balance", "vehicle: x and z exchanged",
     "vehicle: gram-force", "vehicle: time zero a quarter beat late", "vehicle: lost samples are zeros",
     "vehicle: pressure in kPa", "vehicle: mass in grams", "vehicle: times in milliseconds",
-    "vehicle: body pitch in radians",
+    "vehicle: body pitch in radians", "vehicle: sign of x, one recording", "vehicle: gram-force, one recording",
+    "vehicle: x and z exchanged, one recording", "vehicle: a quarter beat late, one recording",
 ]  # fmt: skip
 
 
@@ -114,7 +115,8 @@ SEEN = [
     "wing: a recording copied",
     "wing: rig at rest for a third", "wing: one column constant", "wing: a stream in the vacuum chamber",
     "vehicle: a recording copied", "vehicle: wings stop in the last third", "vehicle: one axis constant",
-    "vehicle: thickness a thousand times",
+    "vehicle: thickness a thousand times", "vehicle: sign of z, one recording",
+    "vehicle: sign of the body pitch, one recording",
 ]  # fmt: skip
 
 

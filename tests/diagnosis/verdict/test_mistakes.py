@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any, cast, get_args
 
 import pytest
@@ -69,6 +70,15 @@ def test_effects_of_the_model_describe_a_mistake() -> None:
     sure = decision("named", "damage")
     assert doubt("swapped markers").applied(sure).verdict == "unnamed"
     assert doubt("swapped markers", included=("marker_swap",)).applied(sure) is sure
+
+
+def test_no_effect_describes_the_mistake_of_one_recording() -> None:
+    sure = decision("measurement fault", "axis_sign")
+    [one] = doubt("force axes").mistakes
+    alone = MistakeDoubt((replace(one, alone=True),), ("axis_sign",), ("axis_sign",))
+    assert alone.applied(sure).verdict == "unnamed"
+    late = MistakeDoubt((replace(one, kind="force phase", alone=True),), ("phase_reference",))
+    assert late.applied(sure).verdict == "unnamed"
 
 
 def test_another_start_of_the_beat_competes_as_an_effect_if_it_is_a_suspect() -> None:

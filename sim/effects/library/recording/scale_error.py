@@ -11,13 +11,17 @@ def _observe(sampling: Sampling, values: Values) -> None:
     sampling.beat = sampling.beat * factor.reshape(-1, *(1,) * (sampling.beat.ndim - 1))
 
 
+_OF_LENGTHS = "relative error of recorded lengths; positive if they are too large"
+_OF_FORCES = "relative error of recorded forces; positive if they are too large"
+
 EFFECT = fault_of_recordings(
     name="scale_error",
     title="Scale error",
+    # Free coefficients absorb most of a factor of forces, as they do of the air's density and of added mass: the bounds
+    # are alike, so that none of these three stands in for another that has ended at its bound.
     size=(
-        Parameter(
-            "part", "1", -0.3, 0.3, 0.01, "relative error of recorded lengths or forces; positive if they are too large"
-        ),
+        Parameter("part", "1", -0.3, 0.3, 0.01, _OF_LENGTHS, wing_only=True),
+        Parameter("part", "1", -0.6, 2.0, 0.01, _OF_FORCES, vehicle_only=True),
     ),
     law="p' = (1 + part) p          tracks\nF' = (1 + part) F          forces",
     source="Luhmann et al. (2014), Close-Range Photogrammetry: a reconstruction takes its scale from a reference "
