@@ -80,13 +80,16 @@ CHECKS: tuple[Check, ...] = (
 def examine(dataset: AnyDataset) -> tuple[Mistake, ...]:
     """Return the likely mistakes in ``dataset``: certain ones first. The same dataset gives the same answer.
 
-    An error inside a check is logged and becomes a warning (:mod:`wingfit.checks.guard`).
+    An error inside a check is logged and becomes a warning (:mod:`wingfit.checks.guard`). Of doubtful mistakes, those
+    of the kinds that the dataset has ``verified`` are none.
     """
     found = guarded("the recordings", "dataset", lambda: check_recordings(dataset))
     if isinstance(dataset, Dataset):
         found += guarded("the conditions", "dataset", lambda: check_conditions(dataset))
         found += _wing(dataset, dataset.rig) if isinstance(dataset.rig, Wing) else _vehicle(dataset)
-    merged = together(found, len(dataset.recordings))
+    verified = dataset.verified if isinstance(dataset, Dataset) else ()
+    doubted = [one for one in found if one.certain or one.kind not in verified]
+    merged = together(doubted, len(dataset.recordings))
     return tuple(sorted(merged, key=lambda one: not one.certain))
 
 

@@ -4,19 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
-from typing import Literal
 
 from wingfit.records.array_types import Array, Float
 from wingfit.records.description.yaml_text import Path, dotted
 from wingfit.records.errors import Fault
+from wingfit.records.mistake_kinds import MistakeKind
 
-Kind = Literal[
-    "air pressure", "air temperature", "airspeed", "amplitude", "axes", "body pitch", "constant channel", "cut",
-    "density", "duplicate", "force axes", "force phase", "force unit", "frequency", "frozen marker", "jumps",
-    "length unit", "mass", "mean angle", "motion", "not carried out", "origin", "phase lag", "placeholders",
-    "pressure and rig", "scale", "side", "swapped markers", "thickness", "tilt", "time unit", "unsteady",
-    "vertical sign", "weight",
-]  # fmt: skip
+Kind = MistakeKind
 
 Alter = Callable[[Float[Array, " T"], Float[Array, "T C"], tuple[str, ...]], tuple[Array, Array]]
 """Returns changed copies of the times [T] and values [T, C] of a recording, whose channels have these names."""

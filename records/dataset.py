@@ -10,6 +10,7 @@ import numpy as np
 
 from wingfit.records.array_types import Array, Bool, Float, Mask
 from wingfit.records.camera_pose import CameraPose
+from wingfit.records.mistake_kinds import MistakeKind
 from wingfit.records.name_lists import refuse_text
 from wingfit.records.recorded import Recorded
 from wingfit.records.series import Series, SeriesDataset
@@ -149,7 +150,7 @@ class Dataset(Recorded[Recording]):
     Recordings named in ``held_out`` are used for validation only, never for fitting. ``frame_error``: of the frame of
     the tracks, which all recordings share; None if unknown, and for a vehicle. ``cameras``: which filmed all recordings
     of a wing, in the frame of the tracks; empty if unknown. ``rig_limits``: conditions that can be recorded; None if
-    they are not stated.
+    they are not stated. ``verified``: kinds of likely mistakes that were verified to be none: no check warns of them.
     """
 
     name: str
@@ -160,9 +161,10 @@ class Dataset(Recorded[Recording]):
     frame_error: FrameError | None = None
     cameras: tuple[CameraPose, ...] = ()
     rig_limits: RigLimits | None = None
+    verified: tuple[MistakeKind, ...] = ()
 
     def __post_init__(self) -> None:
-        refuse_text(self, "held_out")
+        refuse_text(self, "held_out", "verified")
 
     @property
     def kind(self) -> Kind:

@@ -55,7 +55,7 @@ def low_passed(recording: Recording, low_pass: LowPass) -> Recording:
     if gaps:
         raise ValueError(
             f"recording {recording.name!r} has {gaps} missing values, but a filter needs all; "
-            "fill the gaps, cut the recording, or calibrate without low-pass filter"
+            "fill the gaps, cut the recording, or calibrate without one (low-pass 0: --low-pass-hz 0)"
         )
     sections = _sections(low_pass, sampling_rate(recording), f"recording {recording.name!r}")
     # The padding must be longer than the impulse response of the filter.

@@ -72,7 +72,8 @@ class MistakeDoubt:
             name = " No effect is named until then." if before.verdict != after.verdict else ""
             return (
                 f" The dataset has likely mistakes ({_listed(causes)}), and one of them may be the cause: correct the "
-                f"dataset, or exclude the recordings that have them (see the remarks).{name}"
+                "dataset, or exclude the recordings that have them (see the remarks). If you have verified that it is "
+                f"right, state verified: [{_listed(causes)}] in dataset.yaml.{name}"
             )
         same = [one.kind for one in self._shown() if _described_by(one) & set(after.named)]
         found = f" The checks of the dataset find it, too ({_listed(same)}): correct the dataset (see the remarks)."

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Mapping
-from typing import Annotated, Literal
+from typing import Annotated, Literal, get_args
 
 from pydantic import BeforeValidator, Field
 
@@ -18,7 +18,10 @@ from wingfit.records.description.series_file import ChannelFile, QuantityFile, S
 from wingfit.records.description.vehicle_file import VehicleFile, VehicleLimitsFile, VehicleRecordingFile
 from wingfit.records.description.wing_file import FrameErrorFile, WingFile, WingLimitsFile, WingRecordingFile
 from wingfit.records.limits import MAX_QUANTITIES, MAX_RECORDINGS
+from wingfit.records.mistake_kinds import MistakeKind
 
+VERIFIED = "likely mistakes that you have verified to be none, so that no check warns of them"
+MOST_VERIFIED = len(get_args(MistakeKind))
 LIMITS = "[least, largest] value of the settings that the rig allows: no recording beyond is proposed"
 
 
@@ -44,6 +47,7 @@ class WingDatasetFile(_DatasetFile):
         description="which filmed all recordings, two to eight; leave out if unknown",
     )
     rig_limits: WingLimitsFile | None = Field(None, description=LIMITS)
+    verified: list[MistakeKind] = Field(default_factory=list, max_length=MOST_VERIFIED, description=VERIFIED)
     recordings: list[WingRecordingFile] = Field(min_length=1, max_length=MAX_RECORDINGS)
 
 
@@ -52,6 +56,7 @@ class VehicleDatasetFile(_DatasetFile):
 
     vehicle: VehicleFile
     rig_limits: VehicleLimitsFile | None = Field(None, description=LIMITS)
+    verified: list[MistakeKind] = Field(default_factory=list, max_length=MOST_VERIFIED, description=VERIFIED)
     recordings: list[VehicleRecordingFile] = Field(min_length=1, max_length=MAX_RECORDINGS)
 
 

@@ -87,7 +87,8 @@ def assemble(
     faults.raise_any()
     frame = to_frame_error(checked)
     held_out, cameras, limits = tuple(checked.held_out), to_cameras(checked), to_rig_limits(checked)
-    return Dataset(checked.name, rig, tuple(recordings), held_out, checked.description, frame, cameras, limits)
+    given = frame, cameras, limits, tuple(dict.fromkeys(checked.verified))
+    return Dataset(checked.name, rig, tuple(recordings), held_out, checked.description, *given)
 
 
 def _read_all(
@@ -160,6 +161,7 @@ def describe(dataset: Dataset) -> dict[str, object]:
         **({"rig_limits": describe_rig_limits(dataset.rig_limits, dataset.rig)} if dataset.rig_limits else {}),
         "recordings": [describe_recording(recording) for recording in dataset.recordings],
         **({"held_out": list(dataset.held_out)} if dataset.held_out else {}),
+        **({"verified": list(dataset.verified)} if dataset.verified else {}),
     }
 
 

@@ -128,6 +128,27 @@ def test_a_mistake_that_only_the_user_can_undo_is_named(name: str) -> None:
     assert {one.kind for one in examine(wrong)} & set(kind.causes)
 
 
+def test_what_was_verified_is_no_mistake(tmp_path: Path) -> None:
+    wrong = KINDS["vehicle: sign of z"].make(GOOD["vehicle"], np.random.default_rng(1))
+    assert isinstance(wrong, Dataset)
+    assert [one.kind for one in examine(wrong)] == ["force axes"]
+    written(replace(wrong, verified=("unsteady", "force axes")), tmp_path / "unusual")
+    again = check_dataset(tmp_path / "unusual")
+    assert again.mistakes == ()
+    assert isinstance(again.dataset, Dataset)
+    assert again.dataset.verified == ("unsteady", "force axes")
+    text = (tmp_path / "unusual/dataset.yaml").read_text()
+    (tmp_path / "unusual/dataset.yaml").write_text(text.replace("unsteady", "unstedy"))
+    with pytest.raises(DatasetError, match="'unsteady'"):
+        read_dataset(tmp_path / "unusual")
+
+
+def test_what_is_certain_cannot_be_verified() -> None:
+    wrong = KINDS["vehicle: lost samples are zeros"].make(GOOD["vehicle"], np.random.default_rng(1))
+    assert isinstance(wrong, Dataset)
+    assert any(one.certain for one in examine(replace(wrong, verified=("placeholders",))))
+
+
 def test_certain_mistakes_are_refused_and_doubtful_ones_warned_about(tmp_path: Path) -> None:
     wing = GOOD["wing"]
     left = KINDS["wing: left wing: y negative"].make(wing, np.random.default_rng(1))

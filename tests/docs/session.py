@@ -18,7 +18,7 @@ IDS = {"ds": "DATASET_ID", "run": "RUN_ID", "dx": "DIAGNOSIS_ID"}
 END = "--- end of the output of a command ---"
 # A search of a wing takes minutes. Options given twice count as given last, so this one makes a small one.
 SMALL_SEARCH = "--division 4 --population 4 --max-generations 1 --recording vac-0010mbar-lag0-2.0hz --mode joint"
-TIMEOUT_S = 300.0
+TIMEOUT_S = 900.0  # for what hangs: beside the other tests, half a minute takes ten times as long
 
 
 class Session:
