@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +11,7 @@ from wingfit.checks.mistake import Alter, Kind, TableEdit
 from wingfit.checks.quasi_steady import HARMONICS
 from wingfit.records import Recording
 from wingfit.records.array_types import Array
-from wingfit.records.dataset import STANDARD_GRAVITY
+from wingfit.records.dataset import STANDARD_GRAVITY, ForceAxis
 
 SHIFTS = 24  # parts of a beat that are tried
 LATE = 2 / 24  # beats: smaller shifts are not remarked on
@@ -44,10 +44,14 @@ class ColumnMistake:
     beats: float = 0.0
 
 
-def column_mistakes(*, both: bool) -> Iterator[ColumnMistake]:
-    """Yield all but a shifted beat; ``both``: whether both axes were recorded, so that they can be exchanged."""
+def column_mistakes(axes: Collection[ForceAxis], *, both: bool) -> Iterator[ColumnMistake]:
+    """Yield all but a shifted beat.
+
+    ``axes``: which were recorded; ``both``: whether every recording has both of them, so that they can be exchanged.
+    """
     for signs in ((1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)):
-        yield _signs(signs)
+        if all(axis in axes for axis, sign in zip("xz", signs, strict=True) if sign < 0):
+            yield _signs(signs)
     for turn in ((1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)) if both else ():
         yield _exchange(turn)
     for factor, unit in UNITS:

@@ -31,16 +31,17 @@ TRIMMED, UNTRIMMED, NEARER = 0.65, 0.9, 0.6
 
 
 def check_forces(dataset: Dataset) -> Iterator[Mistake]:
-    """Yield the likeliest mistake in the forces of a vehicle, if there is one."""
-    found = list(_together(dataset)) or list(check_single_forces(dataset))
-    yield from found or _trim(dataset)
-
-
-def _together(dataset: Dataset) -> Iterator[Mistake]:
-    """Yield the likeliest mistake that all recordings have."""
+    """Yield the likeliest mistake in the forces of a vehicle, or one for each recording that has its own."""
     chosen = list(enumerate(dataset.recordings))[:: max(1, len(dataset.recordings) // RECORDINGS)][:RECORDINGS]
     beats = [beat_of(dataset.vehicle, recording, index) for index, recording in chosen if enough(recording)]
-    given = _left(beats) if beats else 0.0
+    if beats:
+        found = list(_together(dataset, beats)) or list(check_single_forces(dataset))
+        yield from found or _trim(dataset)
+
+
+def _together(dataset: Dataset, beats: Sequence[Beat]) -> Iterator[Mistake]:
+    """Yield the likeliest mistake that all recordings have, as ``beats`` of some of them show."""
+    given = _left(beats)
     if given <= SUSPECT:
         return
     found = _rearranged(dataset, beats, given)
@@ -70,9 +71,10 @@ def _rearranged(dataset: Dataset, beats: Sequence[Beat], given: float) -> tuple[
         return _left(beats, one.undo)
 
     both = all(len(beat.recording.forces) == 2 for beat in beats)
+    axes = {axis for beat in beats for axis in beat.recording.forces}
     shift = best_shift(left)
     shifts = [shift] if abs(shift.beats) > LATE else []
-    tried = [(left(one), one) for one in (*column_mistakes(both=both), *shifts)]
+    tried = [(left(one), one) for one in (*column_mistakes(axes, both=both), *shifts)]
     tried = [one for one in tried if one[0] < _enough_better(given)]
     if not tried:
         return None

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from typing import Literal
 
 from wingfit.records.array_types import Array, Float
 from wingfit.records.description.yaml_text import Path, dotted
 from wingfit.records.errors import Fault
 from wingfit.records.mistake_kinds import MistakeKind
 
-Kind = MistakeKind
+Kind = MistakeKind | Literal["not carried out"]
 
 Alter = Callable[[Float[Array, " T"], Float[Array, "T C"], tuple[str, ...]], tuple[Array, Array]]
 """Returns changed copies of the times [T] and values [T, C] of a recording, whose channels have these names."""

@@ -18,12 +18,13 @@ from wingfit.checks.quasi_steady import Beat, beat_of, enough, fitted, left_of
 from wingfit.records import Dataset
 from wingfit.records.array_types import Array
 
-RECORDINGS = 16  # that are compared, at most
+RECORDINGS = 64  # that are compared, at most
 MISSED = 0.75  # of the forces of the recording, at least
 OTHERS = 0.6  # of those of the others, at most: physics that the model does not have leaves up to that
 UNUSUAL = 2.5  # times that of the others, at least
 BETTER, NEAR = 0.45, (1.5, 0.05)  # with the mistake undone, at most: of before; times that of the others, and more
-ALIKE = 1.3  # times what the best leaves: what leaves less may be the cause as well
+ALIKE = 1.3, 0.01  # times what the best leaves, and more: what leaves less may be the cause as well
+LEAST = 0.02  # of the forces: the quasi-steady model does not come nearer
 
 
 @dataclass(frozen=True)
@@ -36,18 +37,20 @@ class _Undone:
 
 
 def check_single_forces(dataset: Dataset) -> Iterator[Mistake]:
-    """Yield the likeliest mistake in one recording, if there is one."""
+    """Yield the likeliest mistake in each recording that has one of its own."""
     chosen = [(k, one) for k, one in enumerate(dataset.recordings) if enough(one)][:RECORDINGS]
-    if len(chosen) < 2:
-        return
     beats = [beat_of(dataset.vehicle, recording, index) for index, recording in chosen]
-    if max(left_of(beat, fitted(beats)) for beat in beats) < OTHERS * MISSED:
-        return
-    candidates = [_missed(beats, beat) for beat in beats]
-    likeliest = max(candidates, key=lambda one: one.missed / max(one.usual, NEAR[1]))
-    found = likeliest.undone(dataset)
-    if found is not None:
+    while len(beats) > 1:
+        together = fitted(beats)
+        if max(left_of(beat, together) for beat in beats) < OTHERS * MISSED:
+            return
+        candidates = sorted((_missed(beats, beat) for beat in beats), key=lambda one: -one.missed / one.usual)
+        tried = ((one.beat, one.undone(dataset)) for one in candidates)
+        beat, found = next(((beat, found) for beat, found in tried if found is not None), (None, None))
+        if found is None:
+            return
         yield found
+        beats = [one for one in beats if one is not beat]
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +59,7 @@ class _Candidate:
 
     Attributes:
         missed: of its own forces.
-        usual: of those of the others, root mean square.
+        usual: of those of the others, their median.
     """
 
     beat: Beat
@@ -73,16 +76,16 @@ class _Candidate:
         if not tried:
             return None
         least = min(one.left for one in tried)
-        alike = sorted((one for one in tried if one.left <= ALIKE * least), key=lambda one: (one.rank, one.left))
-        return self._mistake(alike)
+        alike = [one for one in tried if one.left <= ALIKE[0] * least + ALIKE[1]]
+        return self._mistake(sorted(alike, key=lambda one: (one.rank, one.left)))
 
     def _columns(self) -> Iterator[_Undone]:
         def left(one: ColumnMistake) -> float:
             return left_of(replace(self.beat, forces=one.undo(self.beat.forces)), self.coefficients)
 
-        shift = best_shift(left)
+        axes, shift = self.beat.recording.forces, best_shift(left)
         shifts = [shift] if abs(shift.beats) > LATE else []
-        for one in (*column_mistakes(both=len(self.beat.recording.forces) == 2), *shifts):
+        for one in (*column_mistakes(axes, both=len(axes) == 2), *shifts):
             yield _Undone(left(one), one.rank, one.kind, one.cause, (one.edit(self.beat.recording),))
 
     def _pitches(self, dataset: Dataset) -> Iterator[_Undone]:
@@ -93,7 +96,10 @@ class _Candidate:
             if abs(new) > np.pi / 2 * 1.01:
                 continue
             changed = replace(recording, condition=replace(recording.condition, angle_of_attack=new))
-            again = replace(beat_of(dataset.vehicle, changed, self.beat.index), forces=self.beat.forces)
+            try:
+                again = replace(beat_of(dataset.vehicle, changed, self.beat.index), forces=self.beat.forces)
+            except (ValueError, ArithmeticError):
+                continue
             edit = KeyEdit(
                 ("recordings", self.beat.index, "body_pitch_deg"), f"{np.degrees(pitch):.6g}", f"{np.degrees(new):.6g}"
             )
@@ -119,5 +125,5 @@ class _Candidate:
 def _missed(beats: Sequence[Beat], beat: Beat) -> _Candidate:
     others = [one for one in beats if one is not beat]
     coefficients = fitted(others)
-    usual = float(np.sqrt(np.mean([left_of(one, coefficients) ** 2 for one in others])))
-    return _Candidate(beat, coefficients, left_of(beat, coefficients), usual)
+    usual = float(np.median([left_of(one, coefficients) for one in others]))
+    return _Candidate(beat, coefficients, left_of(beat, coefficients), max(usual, LEAST))

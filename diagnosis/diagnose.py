@@ -67,10 +67,10 @@ def diagnose(dataset: Dataset, spec: DiagnosisSpec, evaluator: Evaluator) -> Ite
     subject, fitted, held_out, free = _prepare(dataset, spec)
     _check_search(subject, spec)
     axes, frame = _axes(dataset, spec), dataset.frame_error
-    mistakes = _likely_mistakes(dataset, fitted)
+    mistakes, noted = _likely_mistakes(dataset, fitted)
     yield from diagnose_subject(
         subject, dataset.name, fitted, held_out, spec, evaluator,
-        free=free, axes=axes, frame=frame, mistakes=mistakes,
+        free=free, axes=axes, frame=frame, mistakes=mistakes, noted=noted,
     )  # fmt: skip
 
 
@@ -84,7 +84,7 @@ def diagnose_rig(rig: Rig, dataset: SeriesDataset, spec: DiagnosisSpec, evaluato
     subject, fitted, held_out, free = _prepare_rig(rig, dataset, spec)
     _check_search(subject, spec)
     series = SeriesReduction.of(dataset.recordings, fitted)
-    mistakes = _likely_mistakes(dataset, fitted)
+    mistakes, _ = _likely_mistakes(dataset, fitted)
     yield from diagnose_subject(
         subject, dataset.name, fitted, held_out, spec, evaluator, free=free, series=series, mistakes=mistakes
     )
@@ -114,13 +114,14 @@ def diagnose_subject(
     series: SeriesReduction | None = None,
     frame: FrameError | None = None,
     mistakes: tuple[Mistake, ...] = (),
+    noted: tuple[str, ...] = (),
 ) -> Iterator[Progress]:
     """Diagnose any rig that implements :class:`Subject`; yields progress, the finding with the last report.
 
     ``name``: of the dataset; ``fitted``, ``held_out``: recordings to fit and to validate with; ``free``: nominal genes
     to fit (empty: all that a calibration searches); ``axes``: force axes to fit (empty: the default); ``series``: how
     recordings without a beat are reduced; ``frame``: errors of the frame of tracks; ``mistakes``: likely ones in the
-    fitted recordings.
+    fitted recordings; ``noted``: further remarks.
     """
     began = time.monotonic()
     yield Progress(0.0, "reading the recordings", 0)
@@ -145,13 +146,15 @@ def diagnose_subject(
     if finding is None:
         raise ValueError("the diagnosis ended without a finding")
     spent, evaluations = time.monotonic() - began, counted.evaluations
-    remarks = (*refuted, *finding.remarks, *copies, *_repeated(fitted, held_out))
+    remarks = (*refuted, *finding.remarks, *copies, *_repeated(fitted, held_out), *noted)
     finding = replace(finding, remarks=remarks, seconds=spent, evaluations=evaluations, versions=_versions())
     yield Progress(1.0, "done", evaluations, finding)
 
 
-def _likely_mistakes(dataset: AnyDataset, fitted: Sequence[AnyRecording]) -> tuple[Mistake, ...]:
-    """Return the likely mistakes in ``dataset`` that the ``fitted`` recordings show by themselves."""
+def _likely_mistakes(
+    dataset: AnyDataset, fitted: Sequence[AnyRecording]
+) -> tuple[tuple[Mistake, ...], tuple[str, ...]]:
+    """Return the likely mistakes in ``dataset`` that the ``fitted`` recordings show, and remarks on the others."""
 
     def found(examined: AnyDataset) -> tuple[Mistake, ...]:
         return tuple(one for one in examine(examined) if is_finding(one))
@@ -159,10 +162,12 @@ def _likely_mistakes(dataset: AnyDataset, fitted: Sequence[AnyRecording]) -> tup
     names = {one.name for one in fitted}
     mistakes, others = found(dataset), [one.name for one in dataset.recordings if one.name not in names]
     if not (mistakes and others and isinstance(dataset, Dataset)):
-        return mistakes
+        return mistakes, ()
     alone = replace(dataset, recordings=tuple(one for one in dataset.recordings if one.name in names), held_out=())
     kinds = {one.kind for one in found(alone)}
-    return tuple(one for one in mistakes if one.kind in kinds)
+    shown = tuple(one for one in mistakes if one.kind in kinds)
+    unseen = "likely mistake in the dataset that the fitted recordings do not show: "
+    return shown, tuple(f"{unseen}{one}" for one in mistakes if one not in shown)
 
 
 def _without_copies(

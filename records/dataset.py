@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -165,6 +165,11 @@ class Dataset(Recorded[Recording]):
 
     def __post_init__(self) -> None:
         refuse_text(self, "held_out", "verified")
+        known = get_args(MistakeKind)
+        if unknown := [kind for kind in self.verified if kind not in known]:
+            raise ValueError(
+                f"verified has {unknown[0]!r}, which is no kind of mistake; the kinds are {', '.join(known)}"
+            )
 
     @property
     def kind(self) -> Kind:

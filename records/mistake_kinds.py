@@ -7,7 +7,7 @@ from typing import Literal
 MistakeKind = Literal[
     "air pressure", "air temperature", "airspeed", "amplitude", "axes", "body pitch", "constant channel", "cut",
     "density", "duplicate", "force axes", "force phase", "force unit", "frequency", "frozen marker", "jumps",
-    "length unit", "mass", "mean angle", "motion", "not carried out", "origin", "phase lag", "placeholders",
+    "length unit", "mass", "mean angle", "motion", "origin", "phase lag", "placeholders",
     "pressure and rig", "scale", "side", "swapped markers", "thickness", "tilt", "time unit", "unsteady",
     "vertical sign", "weight",
 ]  # fmt: skip

@@ -70,10 +70,12 @@ class MistakeDoubt:
         causes = self._causes(before.named)
         if causes and after.verdict != "adequate":
             name = " No effect is named until then." if before.verdict != after.verdict else ""
+            unusual = f" If you have verified that it is right, state verified: [{_listed(causes)}] in dataset.yaml."
+            if any(one.certain for one in self._shown()):
+                unusual = ""
             return (
                 f" The dataset has likely mistakes ({_listed(causes)}), and one of them may be the cause: correct the "
-                "dataset, or exclude the recordings that have them (see the remarks). If you have verified that it is "
-                f"right, state verified: [{_listed(causes)}] in dataset.yaml.{name}"
+                f"dataset, or exclude the recordings that have them (see the remarks).{unusual}{name}"
             )
         same = [one.kind for one in self._shown() if _described_by(one) & set(after.named)]
         found = f" The checks of the dataset find it, too ({_listed(same)}): correct the dataset (see the remarks)."

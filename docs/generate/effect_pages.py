@@ -88,8 +88,7 @@ def genes(effect: Effect) -> str:
     lines = ["| gene | kind | unit | bounds | typical | what it is |", "|---|---|---|---|---|---|"]
     for one, kind in zip(effect.parameters, kinds, strict=True):
         bounds = f"{one.lower:g} to {one.upper:g}{_of(one)}{', log' if one.scale == 'log' else ''}"
-        typical, description = f"{one.typical:g}{_of(one)}", one.description + _only(one)
-        cells = (f"`{effect.name}.{one.name}`", kind, one.unit, bounds, typical, description)
+        cells = (f"`{effect.name}.{one.name}`", kind, one.unit, bounds, f"{one.typical:g}{_of(one)}", one.description)
         lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
     return "\n".join([*textwrap.wrap(" ".join(legend), 120), "", *lines])
 
@@ -100,10 +99,6 @@ def _kind(effect: Effect, parameter: Parameter) -> str:
 
 def _capital(text: str) -> str:
     return text[0].upper() + text[1:]
-
-
-def _only(one: Parameter) -> str:
-    return " (wings only)" if one.wing_only else " (vehicles only)" if one.vehicle_only else ""
 
 
 def _of(parameter: Parameter) -> str:

@@ -64,6 +64,7 @@ class Parameter:
             pass between them, and a diagnosis rejects what ends there. Empty: any value.
         scale: how a search spreads over the bounds, "linear" or "log".
         assumed: whether it places cameras that are assumed; with a dataset that states its cameras it is not there.
+        vehicle_bounds: bounds of a vehicle's parameter, in the same unit; None where they are ``lower`` and ``upper``.
     """
 
     name: str
@@ -79,6 +80,12 @@ class Parameter:
     positions: tuple[float, ...] = ()
     scale: Scale = "linear"
     assumed: bool = False
+    vehicle_bounds: tuple[float, float] | None = None
+
+    def bounds_of(self, rig: Wing | Vehicle) -> tuple[float, float]:
+        """Return the bounds (unit of the gene) of the parameter on ``rig``."""
+        own = self.vehicle_bounds if self.vehicle_bounds and isinstance(rig, Vehicle) else (self.lower, self.upper)
+        return own[0] * measure(rig, self.of), own[1] * measure(rig, self.of)
 
 
 @dataclass(frozen=True)
@@ -216,7 +223,7 @@ class Effect:
     def _gene(self, parameter: Parameter, rig: Wing | Vehicle) -> Gene:
         unit = measure(rig, parameter.of)
         nominal = 0.0 if parameter in self.size else parameter.typical * unit
-        lower, upper = parameter.lower * unit, parameter.upper * unit
+        lower, upper = parameter.bounds_of(rig)
         name = f"{self.name}.{parameter.name}"
         return Gene(name, parameter.unit, nominal, lower, upper, parameter.scale, parameter.description)
 

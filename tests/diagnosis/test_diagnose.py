@@ -118,7 +118,7 @@ def test_a_check_that_fails_is_no_mistake_of_the_dataset(monkeypatch: pytest.Mon
     wrong = Mistake("frequency", "recording 'a'", "3 Hz", "4 Hz", "a typing error", "flap_frequency_hz")
     examined_is(monkeypatch, lambda _: (failed, wrong))
     dataset = load_dataset(ROOT / "examples" / "robird")
-    assert _likely_mistakes(dataset, dataset.recordings) == (wrong,)
+    assert _likely_mistakes(dataset, dataset.recordings) == ((wrong,), ())
 
 
 def test_mistakes_in_other_recordings_are_not_those_of_the_fitted(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -126,8 +126,10 @@ def test_mistakes_in_other_recordings_are_not_those_of_the_fitted(monkeypatch: p
     first, *others = dataset.recordings
     found = [Mistake(kind, EVERY, "one", "another", "a slip", "the key") for kind in ("scale", "frequency")]
     examined_is(monkeypatch, lambda given: found if first in given.recordings else found[1:])
-    assert _likely_mistakes(dataset, (first,)) == tuple(found)
-    assert _likely_mistakes(dataset, others) == tuple(found[1:])
+    assert _likely_mistakes(dataset, (first,)) == (tuple(found), ())
+    shown, remarks = _likely_mistakes(dataset, others)
+    assert shown == tuple(found[1:])
+    assert remarks == (f"likely mistake in the dataset that the fitted recordings do not show: {found[0]}",)
 
 
 def examined_is(monkeypatch: pytest.MonkeyPatch, examine: Callable[[AnyDataset], Sequence[Mistake]]) -> None:

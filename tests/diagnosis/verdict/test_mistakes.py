@@ -12,6 +12,7 @@ from wingfit.checks.mistake import EVERY, Kind, Mistake
 from wingfit.diagnosis.finding import VERDICTS, Verdict, of_the_library
 from wingfit.diagnosis.verdict.mistakes import DESCRIBED_BY, MistakeDoubt
 from wingfit.diagnosis.verdict.verdict import Decision
+from wingfit.records.mistake_kinds import MistakeKind
 from wingfit.sim.effects.registry import EFFECTS
 
 CAUSE = "may be the cause: correct the dataset"
@@ -32,7 +33,7 @@ def doubt(
 
 
 def test_each_effect_that_describes_a_mistake_acts_on_what_is_checked() -> None:
-    assert set(DESCRIBED_BY) <= set(get_args(Kind))
+    assert set(DESCRIBED_BY) <= set(get_args(MistakeKind))
     for kind, names in DESCRIBED_BY.items():
         rigs = {rig for check in CHECKS for rig in check.of if kind in check.finds}
         for effect in (EFFECTS[name] for name in names):

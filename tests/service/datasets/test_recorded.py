@@ -17,12 +17,11 @@ from tests.service.conftest import Api
 from tests.service.rigs.test_drive import client_of
 from tests.service.shapes import valid
 from wingfit.checks import CHECKS
-from wingfit.checks.guard import NOT_CARRIED_OUT
-from wingfit.checks.mistake import Kind
 from wingfit.client.recorded import answers as a
 from wingfit.client.transport import zip_folder
 from wingfit.records import CameraPose, Dataset, FrameError, Recording, load_dataset
 from wingfit.records.files.netcdf import write_netcdf
+from wingfit.records.mistake_kinds import MistakeKind
 from wingfit.service.datasets import beat_views, gaps, wing_views
 from wingfit.sim.wing.alignment import recorded_crossing
 
@@ -216,7 +215,7 @@ def test_a_long_recording_is_thinned() -> None:
 
 def test_every_mistake_belongs_to_one_check() -> None:
     finds = [kind for check in CHECKS for kind in check.finds]
-    assert sorted(finds) == sorted(set(get_args(Kind)) - {NOT_CARRIED_OUT})
+    assert sorted(finds) == sorted(get_args(MistakeKind))
     assert [one["name"] for one in wing_views.checks("series", [])["checks"]] == ["copies", "constant columns"]
     found = valid(a.Checks, wing_views.checks("tracks", [{"kind": "side"}, {"kind": "tilt"}, {"kind": "cut"}]))
     assert {one.name: one.found for one in found.checks if one.found} == {"axes": 2, "steadiness": 1}

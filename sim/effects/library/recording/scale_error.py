@@ -11,23 +11,21 @@ def _observe(sampling: Sampling, values: Values) -> None:
     sampling.beat = sampling.beat * factor.reshape(-1, *(1,) * (sampling.beat.ndim - 1))
 
 
-_OF_LENGTHS = "relative error of recorded lengths; positive if they are too large"
-_OF_FORCES = "relative error of recorded forces; positive if they are too large"
+_TEXT = "relative error of recorded lengths or forces (of forces between -0.6 and 2); positive if they are too large"
 
 EFFECT = fault_of_recordings(
     name="scale_error",
     title="Scale error",
-    # Free coefficients absorb most of a factor of forces, as they do of the air's density and of added mass: the bounds
-    # are alike, so that none of these three stands in for another that has ended at its bound.
     size=(
-        Parameter("part", "1", -0.3, 0.3, 0.01, _OF_LENGTHS, wing_only=True),
-        Parameter("part", "1", -0.6, 2.0, 0.01, _OF_FORCES, vehicle_only=True),
+        # Free coefficients absorb most of a factor of forces, as they do of the air's density and of added mass: these
+        # three have the same bounds, so that none stands in for another that has ended at its bound.
+        Parameter("part", "1", -0.3, 0.3, 0.01, _TEXT, vehicle_bounds=(-0.6, 2.0)),
     ),
     law="p' = (1 + part) p          tracks\nF' = (1 + part) F          forces",
     source="Luhmann et al. (2014), Close-Range Photogrammetry: a reconstruction takes its scale from a reference "
     "length; AIAA R-091A (2020): gain of a balance",
     signature="the whole wing is larger, at rest as in motion, or all forces are larger, by the same factor in every "
     "condition",
-    confused_with=("stroke_amplitude", "camera_shift", "lens_distortion", "added_mass_error"),
+    confused_with=("stroke_amplitude", "camera_shift", "lens_distortion", "added_mass_error", "residual_air"),
     observe=_observe,
 )
