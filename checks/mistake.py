@@ -85,7 +85,7 @@ class Mistake:
         return Fault(self.where, self.value, self.message)
 
     def __str__(self) -> str:
-        return f"{self.where}: {self.message}"
+        return f"{self.where}, {self.kind}: {self.message}"
 
 
 def change_of(edits: Iterable[Edit]) -> str:

@@ -225,7 +225,7 @@ def _list(datasets: list[a.Dataset]) -> None:
 def _warned(dataset: a.Dataset) -> None:
     """Print the likely mistakes that the server found at the upload."""
     for one in dataset["warnings"]:
-        text = f"{one['where']}: {one['value']}; expected {one['expected']}; likely cause: {one['cause']}"
+        text = f"{one['where']}, {one['kind']}: {one['value']}; expected {one['expected']}; likely cause: {one['cause']}"
         remarks([f"{text}; change {one['change']}"], "warning")
 
 

@@ -36,7 +36,7 @@ from wingfit.records import (
 
 Array = npt.NDArray[np.float64]
 
-ATTEMPTS = 12  # draws of a trial, if the plant cannot be simulated with the first ones, or no dataset takes them
+ATTEMPTS = 48  # draws of a trial, if the plant cannot be simulated with the first ones, or no dataset takes them
 ROUNDS = 8  # limit of a refit's iterations; genes that can imitate a mass almost completely converge slowly
 CORRECTIONS = 1  # full refits to correct a strength; the remaining error is corrected by lowering the noise
 LITTLE = 0.85  # fraction of the target d below which the noise is lowered, as far as real equipment allows

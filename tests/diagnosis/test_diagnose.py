@@ -101,7 +101,7 @@ def test_likely_mistakes_of_the_dataset_speak_against_a_name() -> None:
     assert (found.advice, bool(sure.advice)) == ((), True)
     assert found.hypotheses[0].probability == pytest.approx(0.5 * sure.hypotheses[0].probability)
     assert headline(found) == "Missing physics; whether an effect of the library explains it is not certain"
-    assert found.remarks[0].startswith("likely mistake in the dataset: all recordings: 0.07 rad")
+    assert found.remarks[0].startswith("likely mistake in the dataset: all recordings, vertical sign: 0.07 rad")
 
 
 def test_likely_mistakes_that_no_effect_imitates_leave_the_name() -> None:

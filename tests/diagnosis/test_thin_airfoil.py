@@ -74,4 +74,4 @@ def test_wings_that_flap_the_other_way_round_start_half_a_beat_later() -> None:
     assert found.named[:1] == ("phase_reference",)
     assert set(found.named) <= {"phase_reference", "circulation_lag"}
     assert "The checks of the dataset find it, too (force phase): correct the dataset" in found.summary
-    assert any(one.startswith("likely mistake in the dataset: all recordings: a quasi-steady") for one in found.remarks)
+    assert any(one.startswith("likely mistake in the dataset: all recordings, force phase: ") for one in found.remarks)
