@@ -225,8 +225,8 @@ def _list(datasets: list[a.Dataset]) -> None:
 def _warned(dataset: a.Dataset) -> None:
     """Print the likely mistakes that the server found at the upload."""
     for one in dataset["warnings"]:
-        text = f"{one['where']}, {one['kind']}: {one['value']}; expected {one['expected']}; likely cause: {one['cause']}"
-        remarks([f"{text}; change {one['change']}"], "warning")
+        text = f"{one['where']}, {one['kind']}: {one['value']}; expected {one['expected']}"
+        remarks([f"{text}; likely cause: {one['cause']}; change {one['change']}"], "warning")
 
 
 def _uploaded(dataset: a.Dataset, url: str) -> None:
