@@ -19,7 +19,7 @@ from wingfit.records import Dataset
 from wingfit.records.array_types import Array
 
 RECORDINGS = 64  # that are compared, at most
-MISSED = 0.75  # of the forces of the recording, at least
+MISSED, SEEN = 0.75, 0.45  # of the forces of the recording, at least; and with coefficients of all recordings
 OTHERS = 0.6  # of those of the others, at most: physics that the model does not have leaves up to that
 UNUSUAL = 2.5  # times that of the others, at least
 BETTER, NEAR = 0.45, (1.5, 0.05)  # with the mistake undone, at most: of before; times that of the others, and more
@@ -42,7 +42,7 @@ def check_single_forces(dataset: Dataset) -> Iterator[Mistake]:
     beats = [beat_of(dataset.vehicle, recording, index) for index, recording in chosen]
     while len(beats) > 1:
         together = fitted(beats)
-        if max(left_of(beat, together) for beat in beats) < OTHERS * MISSED:
+        if max(left_of(beat, together) for beat in beats) < SEEN:
             return
         candidates = sorted((_missed(beats, beat) for beat in beats), key=lambda one: -one.missed / one.usual)
         tried = ((one.beat, one.undone(dataset)) for one in candidates)
