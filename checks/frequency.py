@@ -145,11 +145,15 @@ def _by_ratio(recording: Recording, index: int, times: Array, values: Array, giv
         if wanted * length < 0.9 or wanted * step * ONE_A_BEAT > 1.0:
             continue
         if ratio == 2.0:
-            if not _only_even(times, values, given):
+            # Along one axis, the strokes forth and back of a wing may well have the same force.
+            alike = recording.kind == "forces" and values.shape[1] < 2
+            if alike or not _only_even(times, values, given):
                 continue
         elif ratio == 60.0 and given.frequency * length < FEW_BEATS:
             # Of next to no beat, any harmonics explain all; and any samples, if a frame is taken in about each beat.
-            limit = 0.15 if given.frequency * length < 1.0 or wanted * step < 0.5 else limit
+            # Harmonics beyond half the sampling rate are others in disguise, those of the stated beat among them.
+            seen = wanted * step * HARMONICS < 0.5
+            limit = 0.15 if given.frequency * length < 1.0 or seen else limit
         elif ratio == 1e-3 and given.frequency * step > MANY_BEATS:
             limit = max(limit, 1.5 * given.left)
         elif given.left < (REFUSED if ratio == 0.5 else 0.2):

@@ -20,9 +20,9 @@ from wingfit.records.array_types import Array
 
 RECORDINGS = 64  # that are compared, at most
 MISSED, SEEN = 0.75, 0.45  # of the forces of the recording, at least; and with coefficients of all recordings
-OTHERS = 0.6  # of those of the others, at most: physics that the model does not have leaves up to that
+OTHERS = 0.4  # of those of the others, at most: beyond, the model explains too little to compare
 UNUSUAL = 2.5  # times that of the others, at least
-BETTER, NEAR = 0.45, (1.5, 0.05)  # with the mistake undone, at most: of before; times that of the others, and more
+LIKE, NEAR = 0.4, (1.5, 0.05)  # with the mistake undone, at most: of the forces; times that of the others, and more
 ALIKE = 1.3, 0.01  # times what the best leaves, and more: what leaves less may be the cause as well
 LEAST = 0.02  # of the forces: the quasi-steady model does not come nearer
 
@@ -71,7 +71,7 @@ class _Candidate:
         """Return the mistake without which this recording is like the others, None if there is none."""
         if self.missed < max(MISSED, UNUSUAL * self.usual) or self.usual > OTHERS:
             return None
-        most = min(BETTER * self.missed, NEAR[0] * self.usual + NEAR[1])
+        most = min(LIKE, NEAR[0] * self.usual + NEAR[1])
         tried = [one for one in (*self._columns(), *self._pitches(dataset)) if one.left <= most]
         if not tried:
             return None

@@ -16,7 +16,8 @@ from wingfit.records.limits import UNEVEN_STEPS
 
 CUTOFF_HARMONIC = 3.2  # 40 Hz at 12.5 beats per second (Armanini et al. 2016): just above the third harmonic
 END_PERIODS = 2.0  # length of the filter's transient at either end, in periods of the cut-off frequency
-MIN_BEATS_TO_TRIM = 4
+MIN_BEATS_TO_TRIM = 8
+BEAT_BANDWIDTH, MOST_OF_RATE = 4.0, 0.4  # highest frequency of the mean beat, over cut-off and sampling rate
 
 
 def default_cutoff(flap_frequency: float) -> float:
@@ -60,8 +61,10 @@ def low_passed(recording: Recording, low_pass: LowPass) -> Recording:
     sections = _sections(low_pass, sampling_rate(recording), f"recording {recording.name!r}")
     # The padding must be longer than the impulse response of the filter.
     pad = min(len(recording.times) - 1, int(3 * low_pass.order * sampling_rate(recording) / low_pass.cutoff))
-    values = np.ascontiguousarray(scipy.signal.sosfiltfilt(sections, recording.values, axis=0, padlen=pad))
     frequency, rate = recording.condition.flap_frequency, sampling_rate(recording)
+    beat, filtered = _mean_beat(recording, low_pass, rate)
+    rest = scipy.signal.sosfiltfilt(sections, recording.values - beat, axis=0, padlen=pad)
+    values = np.ascontiguousarray(filtered + rest)
     if len(values) * frequency >= MIN_BEATS_TO_TRIM * rate:
         lost = round(min(END_PERIODS / low_pass.cutoff, 1.0 / frequency) * rate)
         values[:lost] = values[len(values) - lost :] = np.nan
@@ -69,6 +72,22 @@ def low_passed(recording: Recording, low_pass: LowPass) -> Recording:
     if noise is not None:
         noise = noise * np.sqrt(np.mean(gain(low_pass, rate, np.linspace(0.0, 0.5, 4096, endpoint=False) * rate) ** 2))
     return replace(recording, values=values, low_pass=low_pass, standard_deviation=noise)
+
+
+def _mean_beat(recording: Recording, low_pass: LowPass, rate: float) -> tuple[Array, Array]:
+    """Return the mean beat [T, C] of ``recording``, and the same after the filter, which is exact up to both ends.
+
+    The filter then has no transient but that of the rest, which is small.
+    """
+    frequency = recording.condition.flap_frequency
+    most = min(BEAT_BANDWIDTH * low_pass.cutoff, MOST_OF_RATE * rate) / frequency
+    k = np.arange(max(int(most), 1) + 1)
+    phase = 2.0 * np.pi * frequency * (recording.times - recording.times[0])
+    waves = np.exp(1j * phase[:, None] * k)
+    columns = np.hstack([waves.real, waves[:, 1:].imag])
+    fitted = np.linalg.lstsq(columns, recording.values, rcond=None)[0]
+    kept = gain(low_pass, rate, k * frequency)
+    return columns @ fitted, columns @ (np.concatenate([kept, kept[1:]])[:, None] * fitted)
 
 
 def gain(low_pass: LowPass, rate: float, frequency: ArrayLike) -> Array:

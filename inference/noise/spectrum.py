@@ -99,6 +99,8 @@ def _first_order(lines: Array, mean: Array, advance: float, harmonics: int) -> A
     Whittle's likelihood is maximised. ``lines`` [L]: frequencies in multiples of the flap frequency; ``mean`` [L]:
     density at each; ``advance``: apparent advance of the beat per sample, beats.
     """
+    kept = mean >= FLAT * mean.max()  # what a low-pass has removed says nothing of the noise where it passes
+    lines, mean = lines[kept], mean[kept]
 
     def model(x: Array, at: Array) -> Array:
         lag1, coloured, white = 0.98 / (1 + np.exp(-x[0])), np.exp(x[1]), np.exp(x[2])

@@ -13,6 +13,7 @@ from wingfit.checks import Mistake, examine
 from wingfit.records import Dataset, Recording
 from wingfit.records.array_types import Array
 from wingfit.records.dataset import ForceAxis
+from wingfit.sim.virtual_rigs.balance import EXAMPLE, TRIALS, campaign
 
 GOOD = good_vehicle()
 GRAM_FORCE = 9.80665e-3
@@ -52,9 +53,11 @@ def test_of_one_axis_the_sign_has_one_correction() -> None:
 
 
 def test_each_of_two_recordings_is_named() -> None:
-    wrong = changed(GOOD, {NAMES[0]: np.array([-1.0, 1.0]), NAMES[2]: 1.0 / GRAM_FORCE})
+    five = campaign(3, replace(EXAMPLE, beats=12), TRIALS[1:6])
+    first, second = five.recordings[0].name, five.recordings[3].name
+    wrong = changed(five, {first: np.array([-1.0, 1.0]), second: 1.0 / GRAM_FORCE})
     found = {place(one): one.kind for one in examine(wrong)}
-    assert found == {NAMES[0]: "force axes", NAMES[2]: "force unit"}
+    assert found == {first: "force axes", second: "force unit"}
 
 
 def test_what_one_recording_has_is_not_what_all_have() -> None:

@@ -15,7 +15,7 @@ EFFECT = Effect(
     title="Error of added mass",
     family="aerodynamics",
     port="inertia",
-    size=(Parameter("part", "1", -0.6, 2.0, 0.2, "relative error of added mass; positive if more air is accelerated"),),
+    size=(Parameter("part", "1", -0.6, 1.2, 0.2, "relative error of added mass; positive if more air is accelerated"),),
     law="m_22' = (1 + part) pi rho c^2 / 4",
     source="Sedov (1965), Two-Dimensional Problems in Hydrodynamics and Aerodynamics: plates near each other and near "
     "walls; Armanini et al. (2016), Eq. 10",
