@@ -151,8 +151,9 @@ def _look_alikes(state: SearchState, best: Refit) -> list[StartPoint]:
     A score test does not see what the nominal genes, or a similar effect fitted first, have already absorbed. Choices,
     such as two signs, may explain the recordings equally, and exactly. Otherwise, where ``best`` leaves only noise, of
     forces in prediction too, an effect may be more probable only if it has fewer genes, such as a stall without a
-    vortex.
+    vortex, or if the fit with it alone has not converged, as after a way as long as that to twice the forces.
     """
+    unfinished = {one.names for one in state.refits if not one.fit.converged}
     left = max(best.excess, best.predicted or 0.0) if state.data.kind == "forces" else best.excess
     exact = left <= tolerated_excess(state.data, 0.0, 0.0)
     choice = any(part.suspect.positions for part in best.trials)
@@ -163,7 +164,7 @@ def _look_alikes(state: SearchState, best: Refit) -> list[StartPoint]:
         for name, trial in found.items():
             alike = name in part.suspect.confused_with or part.suspect.name in trial.suspect.confused_with
             smaller = len(trial.suspect.genes) < len(part.suspect.genes)
-            if alike and name not in best.names and (choice or smaller or not exact):
+            if alike and name not in best.names and (choice or smaller or not exact or (name,) in unfinished):
                 starts += start_points(trial, others, best)
     return starts
 

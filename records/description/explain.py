@@ -107,13 +107,19 @@ class _Explainer:
             return f"unknown key {key!r}; write {renamed[-1]!r} and give the value in that unit"
         fields = self._fields(location)
         this = next(name for name, root in _ROOTS.items() if root is self.root)
-        for that, root in _ROOTS.items():
-            if that == this:
-                continue
-            parent = tuple(that if part == this else part for part in location[:-1])
-            if any(key in model.model_fields for model in _models(root, parent)):
-                return f"key {key!r} is for {_NAMES[that]}, this is {_NAMES[this]}; {nearest(key, fields)}"
+        others = [
+            _NAMES[that]
+            for that, root in _ROOTS.items()
+            if that != this and any(key in model.model_fields for model in self._alike(root, location, this, that))
+        ]
+        if others:
+            return f"key {key!r} is for {' or '.join(others)}, this is {_NAMES[this]}; {nearest(key, fields)}"
         return f"unknown key {key!r}; {nearest(key, fields)}"
+
+    @staticmethod
+    def _alike(root: type[BaseModel], location: Location, this: str, that: str) -> list[type[BaseModel]]:
+        """Return the models at the place of ``location`` in a description of ``that`` instead of ``this``."""
+        return _models(root, tuple(that if part == this else part for part in location[:-1]))
 
     def _renamed(self, location: Location) -> Location | None:
         """Return the location of the known key that differs from the key at ``location`` only in its unit, or None."""
