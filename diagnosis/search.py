@@ -151,10 +151,11 @@ def _look_alikes(state: SearchState, best: Refit) -> list[StartPoint]:
     A score test does not see what the nominal genes, or a similar effect fitted first, have already absorbed. Choices,
     such as two signs, may explain the recordings equally, and exactly. Otherwise, where ``best`` leaves only noise, of
     forces in prediction too, an effect may be more probable only if it has fewer genes, such as a stall without a
-    vortex, or if the fit with it alone has not converged, as after a way as long as that to twice the forces.
+    vortex, or, of forces, if the fit with it alone has not converged: the way to twice the forces is long.
     """
-    unfinished = {one.names for one in state.refits if not one.fit.converged}
-    left = max(best.excess, best.predicted or 0.0) if state.data.kind == "forces" else best.excess
+    forces = state.data.kind == "forces"
+    unfinished = {one.names for one in state.refits if not one.fit.converged} if forces else set[tuple[str, ...]]()
+    left = max(best.excess, best.predicted or 0.0) if forces else best.excess
     exact = left <= tolerated_excess(state.data, 0.0, 0.0)
     choice = any(part.suspect.positions for part in best.trials)
     found = {trials[0].suspect.name: trials[0] for trials in state.trials if trials}

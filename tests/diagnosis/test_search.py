@@ -38,7 +38,7 @@ def trial(name: str, *, confused_with: tuple[str, ...] = ()) -> Trial:
 def refit(*trials: Trial, excess: float = 1.0, predicted: float | None = None) -> Any:
     """A refit with ``excess``, fitted and ``predicted``, every gene at 0.8 of its box."""
     free = tuple(gene.name for one in trials for gene in one.suspect.genes)
-    fit = SimpleNamespace(problem=SimpleNamespace(free=free), unit=np.full(len(free), 0.8))
+    fit = SimpleNamespace(problem=SimpleNamespace(free=free), unit=np.full(len(free), 0.8), converged=True)
     names = tuple(one.suspect.name for one in trials)
     return SimpleNamespace(trials=trials, names=names, excess=excess, predicted=predicted, fit=fit)
 
@@ -60,7 +60,7 @@ def state(*tried: Trial) -> Any:
         gene_cost=POLICY.gene_cost,
         kind="tracks",
     )
-    return SimpleNamespace(data=data, trials=[[one] for one in tried])
+    return SimpleNamespace(data=data, refits=[], trials=[[one] for one in tried])
 
 
 def names(start_points: Sequence[StartPoint]) -> list[tuple[str, ...]]:
@@ -133,6 +133,11 @@ def test_a_hypothesis_at_the_noise_has_no_look_alikes() -> None:
     forces.data.kind = "forces"
     assert names(_look_alikes(forces, cast("Any", unpredicted))) == [("gain",)], "it may imitate the other"
     assert _look_alikes(state(cubic, gain), cast("Any", unpredicted)) == [], "a fit to tracks takes seconds"
+    noise = cast("Any", refit(cubic, excess=0.05))
+    forces.refits = [refit(gain)]
+    assert _look_alikes(forces, noise) == [], "its fit has converged"
+    forces.refits[0].fit.converged = False
+    assert names(_look_alikes(forces, noise)) == [("gain",)]
 
 
 def test_a_hypothesis_at_the_noise_competes_with_look_alikes_of_fewer_genes() -> None:
