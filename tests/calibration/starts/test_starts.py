@@ -241,9 +241,10 @@ def test_auto_finishes_each_stage_of_a_staged_calibration(small: tuple[Dataset, 
 
 @pytest.mark.parametrize(("mode", "drag"), [("local", 2.0), ("joint", 2.5)])
 def test_auto_fits_a_vehicle(forces: Dataset, mode: Any, drag: float) -> None:
-    """Nowhere worse than Gauss-Newton alone; better where each of two recordings, fitted together, has its valley.
+    """Here nowhere worse than Gauss-Newton alone; better where each of two recordings, fitted together, has its valley.
 
-    That is so with a drag fixed that is not the true one: with free drag, one valley leads to the other.
+    That is so with this drag, fixed and not the true one. With 1.5, it ends in the worse valley; with
+    free drag, one valley leads to the other.
     """
     fixed = {"C_D0": 0.0, "C_Dpi2": drag}
     spec = CalibrationSpec(method="auto", mode=mode, population=8, axes=("x", "z"), fixed=fixed)

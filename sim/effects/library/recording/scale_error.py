@@ -11,7 +11,11 @@ def _observe(sampling: Sampling, values: Values) -> None:
     sampling.beat = sampling.beat * factor.reshape(-1, *(1,) * (sampling.beat.ndim - 1))
 
 
-_TEXT = "relative error of recorded lengths or forces (of forces between -0.6 and 1.2); positive if they are too large"
+_OF_FORCES = (-0.6, 1.2)
+_TEXT = (
+    f"relative error of recorded lengths or forces (of forces between {_OF_FORCES[0]:g} and {_OF_FORCES[1]:g}); "
+    "positive if they are too large"
+)
 
 EFFECT = fault_of_recordings(
     name="scale_error",
@@ -19,7 +23,7 @@ EFFECT = fault_of_recordings(
     size=(
         # Free coefficients absorb most of a factor of forces, as they do of the air's density and of added mass: these
         # three have the same bounds, so that none stands in for another that has ended at its bound.
-        Parameter("part", "1", -0.3, 0.3, 0.01, _TEXT, vehicle_bounds=(-0.6, 1.2)),
+        Parameter("part", "1", -0.3, 0.3, 0.01, _TEXT, vehicle_bounds=_OF_FORCES),
     ),
     law="p' = (1 + part) p          tracks\nF' = (1 + part) F          forces",
     source="Luhmann et al. (2014), Close-Range Photogrammetry: a reconstruction takes its scale from a reference "
