@@ -52,7 +52,13 @@ class Policy:
         "a motion that markers share with more is no noise: something changes between beats",
     )
     doubted_noise: float = _threshold(
-        0.6, "probability", "most that a model is adequate where missing physics may hide in the assumed noise"
+        0.6, "probability", "most that a model is adequate where missing physics may hide in the noise"
+    )
+    doubted_rest: float = _threshold(
+        0.6,
+        "noise RMS",
+        "recordings with a beat: a misfit beyond the noise that noise could make, but rarely does: missing physics may "
+        "hide in it",
     )
     least_evidence: float = _threshold(2.0, "evidence", "no effect is searched for, or added to the model, for less")
     most_left: float = _threshold(

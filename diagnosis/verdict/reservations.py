@@ -12,7 +12,13 @@ from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.finding import NAMING, Proof, Verdict, amount
 from wingfit.diagnosis.verdict.noise_doubt import noise_may_hide
 from wingfit.diagnosis.verdict.verdict import Decision
-from wingfit.diagnosis.verdict.weigh_hypotheses import HypothesisWeights, beyond_chance, leaves_a_rest, nominal_refuted
+from wingfit.diagnosis.verdict.weigh_hypotheses import (
+    HypothesisWeights,
+    beyond_chance,
+    large_rest,
+    leaves_a_rest,
+    nominal_refuted,
+)
 from wingfit.records import Series
 from wingfit.rigs.suspect import Suspect
 
@@ -50,10 +56,11 @@ def remaining_sentence(data: WhitenedData, decision: Decision, best: Refit, floo
             f" A misfit of {amount(size, data.unit)} beyond the noise remains{share}: the law has another form, or "
             "something else is missing too."
         )
-    return (
-        f" A misfit of {amount(size, data.unit)} beyond the noise remains{share}, no more than errors of the noise "
-        "and of the discretisation explain."
-    )
+    start = f" A misfit of {amount(size, data.unit)} beyond the noise remains{share}"
+    if large_rest(data, best, floor):
+        also = "" if decision.verdict == "adequate" else " too"
+        return f"{start}, more than noise usually makes: something may be missing{also}; record more beats and flights."
+    return f"{start}, no more than errors of the noise and of the discretisation explain."
 
 
 def candidate_sentence(

@@ -92,7 +92,7 @@ def weigh(
     weight, other = np.exp(weight - top), np.exp(unknown - top)
     total = weight.sum() + other
     probabilities, unknown = weight / total, float(other / total)
-    if noise_may_hide(data, nominal.fit):  # as far as no hypothesis has shown how large the noise is
+    if doubtful(data, nominal, floor):  # as far as no hypothesis has shown how large the noise is
         doubted = max(float(probabilities[0]) - policy.doubted_noise, 0.0)
         probabilities[0], unknown = probabilities[0] - doubted, unknown + doubted
     if data.kind != "series":
@@ -231,6 +231,24 @@ def nominal_refuted(data: WhitenedData, excess: float, floor: float, error: floa
     return excess - explainable > data.policy.refuting_excess * (data.excess_standard_error if error is None else error)
 
 
+def doubtful(data: WhitenedData, nominal: Refit, floor: float) -> bool:
+    """Return whether missing physics may hide in the noise, or in a misfit that noise could have made.
+
+    ``floor`` (m or N): discretisation error.
+    """
+    return noise_may_hide(data, nominal.fit) or large_rest(data, nominal, floor)
+
+
+def large_rest(data: WhitenedData, nominal: Refit, floor: float) -> bool:
+    """Return whether the ``nominal`` model leaves more of recordings with a beat than noise makes, but rarely.
+
+    The noise of few forces is known so badly that it could have made a misfit larger than itself. ``floor`` (m or N):
+    discretisation error.
+    """
+    rest = beyond_chance(data, nominal) - floor**2 - data.accepted**2
+    return data.kind != "series" and rest > max(data.policy.doubted_rest * data.noise, data.tolerance) ** 2
+
+
 def drifts(data: WhitenedData) -> bool:
     """Return whether the beat changes slowly in any recording, by more than what counts as none.
 
@@ -283,7 +301,7 @@ def nominal_suffices(data: WhitenedData, nominal: Refit, suspects: int, floor: f
 
     ``floor`` (m or N): discretisation error.
     """
-    if nominal_refuted(data, beyond_chance(data, nominal), floor) or drifts(data) or noise_may_hide(data, nominal.fit):
+    if nominal_refuted(data, beyond_chance(data, nominal), floor) or drifts(data) or doubtful(data, nominal, floor):
         return False
     tau = tolerated_excess(data, nominal.excess, floor)
     excess = _misfit(data, nominal, tau)

@@ -49,6 +49,7 @@ def data(kind: str = "series", accepted: float = 0.0) -> Any:
         unit="noise",
         noise=1.0,
         accepted=accepted,
+        tolerance=0.1,
         policy=POLICY,
         excess_standard_error=0.05,
         excess_by_chance=lambda _: 0.0,
@@ -123,6 +124,18 @@ def test_a_misfit_that_remains_is_stated() -> None:
     assert remaining_sentence(data(), exact, exact.best, 0.0) == ""
     small = replace_excess(found, 0.2)
     assert "remains, no more than errors of the noise and of the" in remaining_sentence(data(), small, small.best, 1.0)
+
+
+@pytest.mark.parametrize(("verdict", "also"), [("adequate", ""), ("named", " too")])
+def test_a_misfit_that_noise_rarely_makes_is_not_called_noise(verdict: Verdict, also: str) -> None:
+    """The noise of few forces is known badly: with this error, noise could make a misfit of its own size."""
+    few = data("forces")
+    few.excess_standard_error = 0.7
+    large, small = (replace_excess(decision(verdict), (share * POLICY.doubted_rest) ** 2) for share in (1.1, 0.9))
+    words = remaining_sentence(few, large, large.best, 0.0)
+    assert f"more than noise usually makes: something may be missing{also}" in words
+    assert "no more than errors of the noise" in remaining_sentence(few, small, small.best, 0.0)
+    assert "no more than errors of the noise" in remaining_sentence(few, large, large.best, 0.5), "discretisation"
 
 
 @pytest.mark.parametrize(
