@@ -73,11 +73,15 @@ def weigh(
     drift_alone = only_drifts(data, nominal, floor)
     if nominal_refuted(data, beyond_chance(data, nominal), floor, error) or (drifts(data) and not drift_alone):
         # A hypothesis that leaves the misfit as it was explains nothing; nor does the nominal model. With few
-        # recordings, one that explains most of the misfit may have little evidence, if its size is not zero; with a
-        # single experiment, nothing shows that it predicts.
+        # recordings, one that explains most of the misfit may have little evidence; with a single experiment, nothing
+        # shows that it predicts. One whose size may be zero is possible only beside others: else it would be named
+        # although its own interval says nothing of it.
         possible = evidence - evidence[0] > policy.least_evidence
-        for k in np.flatnonzero(~possible & (excess < policy.drift_left * excess[0])):
-            possible[k] = hypotheses[k].predicted is not None and not absent(data, hypotheses[k])
+        most = np.flatnonzero(~possible & (excess < policy.drift_left * excess[0]))
+        weak = [k for k in most if hypotheses[k].predicted is not None]
+        possible[[k for k in weak if not absent(data, hypotheses[k])]] = True
+        if possible.any():
+            possible[weak] = True
     if drift_alone:
         possible &= [explains_drift(data, nominal, one) for one in hypotheses]
     imitates = _imitation(data, hypotheses, floor, error)
