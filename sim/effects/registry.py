@@ -13,7 +13,7 @@ FILES = (
     # changes of the springs before effects in proportion to their stiffness
     ("structure", "stiffness_drift damage cubic_stiffness rod_slip hysteresis viscoelastic tether cable"),
     ("inertia", "lumped_mass mass_offset"),
-    ("terms", "inertial wing_acceleration"),
+    ("terms", "inertial wing_acceleration wing_mass_error"),
     ("actuation", "stroke_amplitude stroke_bias drive_harmonics phase_lag_error"),
     ("actuation", "wing_pitch_zero wing_pitch_amplitude wing_pitch_phase"),
     ("actuation", "hinge_tilt hinge_offset compliant_drive backlash"),
@@ -33,7 +33,7 @@ FILES = (
     ("cameras", "marker_swap tracker_lag exponential_smoothing camera_rotation camera_shift"),
     # axes, mount, amplifier
     ("balance", "phase_reference axis_sign axis_swap unit_error"),
-    ("balance", "balance_tilt balance_resonance filter_delay balance_offset balance_drift"),
+    ("balance", "balance_tilt balance_resonance filter_delay balance_offset balance_drift axis_scale"),
     ("recording", "scale_error clock_offset strobe_rate"),
 )
 

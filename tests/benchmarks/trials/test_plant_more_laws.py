@@ -37,7 +37,7 @@ NEW = (
     "stroke_bias", "wing_pitch_zero", "wing_pitch_amplitude", "wing_pitch_phase", "body_pitch_error", "residual_air",
     "downwash", "wake_tip_loss", "translation", "rotational_circulation", "viscous", "zero_lift_angle", "lift_curve",
     "leading_edge_suction", "stall_vortex", "varying_coefficients", "inertial", "wing_acceleration", "added_mass",
-    "added_mass_error", "effective_chord", "mass_offset", "body_drag", "tail_lift",
+    "added_mass_error", "wing_mass_error", "effective_chord", "mass_offset", "body_drag", "tail_lift",
 )  # fmt: skip
 ALONE = {"rotational_circulation": "rotation"}  # other names of the terms that the library's effects are
 # Genes of the library's effects whose meaning differs from the law's, at the values that come nearest.

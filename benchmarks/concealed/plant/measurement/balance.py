@@ -220,6 +220,9 @@ def _shown(forces: Array, t: Array, vehicle: Vehicle, hidden: Concealed) -> Arra
     """
     gain = 1.0 + strength(hidden, "scale_error") * np.array([1.0, _UNEQUAL])
     forces = forces * gain
+    if strength(hidden, "axis_scale"):
+        p = hidden["axis_scale"]
+        forces = forces * (1.0 + p["strength"] * _of_axis(p))
     if strength(hidden, "clipping"):
         part = strength(hidden, "clipping") * np.abs(forces) / (vehicle.mass * STANDARD_GRAVITY)
         forces = forces / (1.0 + part**4) ** 0.25
@@ -245,9 +248,14 @@ def _confused(forces: Array, hidden: Concealed) -> Array:
     return np.asarray(forces)
 
 
+def _of_axis(p: Parameters) -> Array:
+    """One for the ``axis`` that is wrong and zero for the other, in the order x, z: 0 to 1 is x, 1 to 2 is z."""
+    return np.array([1.0, 0.0] if p["axis"] < 1.0 else [0.0, 1.0])
+
+
 def _signs(p: Parameters) -> Array:
-    """Signs [2] of the forces along x and z, of which that of the ``axis`` is wrong: 0 to 1 for x, 1 to 2 for z."""
-    return np.array([-1.0, 1.0] if p["axis"] < 1.0 else [1.0, -1.0])
+    """Signs [2] of the forces along x and z, of which that of the ``axis`` is wrong."""
+    return 1.0 - 2.0 * _of_axis(p)
 
 
 def _unit(p: Parameters) -> float:
@@ -294,6 +302,14 @@ FAULTS = {
             shape={"time": (0.1, 0.5)} | _WAY,
         ),
         _listed("scale_error", typical=0.05, source="gains of both axes, unequal (AIAA R-091A 2020)", both_signs=True),
+        _listed(
+            "axis_scale",
+            typical=0.08,
+            source="gain of a component (AIAA R-091A 2020)",
+            both_signs=True,
+            shape={"axis": (0.0, 2.0)},
+            values=lambda p: dict(zip(("axis_scale.x", "axis_scale.z"), p["strength"] * _of_axis(p), strict=True)),
+        ),
         _listed(
             "clock_offset",
             typical=8e-4,

@@ -57,6 +57,13 @@ def wing_inertia(flow: Flow, own: Complex, vehicle: Vehicle, hidden: Concealed) 
     return force
 
 
+def wing_mass(flow: Flow, vehicle: Vehicle, hidden: Concealed) -> Array:
+    """Mass of a wing per length of span [E], kg/m, with a hidden error: that part of its mass, as chord squared."""
+    mass = mass_per_length(flow, vehicle)
+    error = strength(hidden, "wing_mass_error")
+    return np.asarray(mass * (1.0 + error * flow.chord / (np.sum(flow.chord**2) / np.sum(flow.chord))))
+
+
 _listed = partial(Law, side="physics")
 INERTIA = (
     _listed(
@@ -82,6 +89,13 @@ INERTIA = (
         typical=0.2,
         source="Sedov (1965): plates near each other; largest where the wings are near",
         both_signs=True,
+    ),
+    _listed(
+        "wing_mass_error",
+        typical=0.2,
+        source="Armanini et al. (2016), Eqs. 12-14: wings that were weighed wrongly, thicker at the root",
+        both_signs=True,
+        values=lambda p: {"wing_mass_error.part": p["strength"]},
     ),
     _listed(
         "effective_chord",

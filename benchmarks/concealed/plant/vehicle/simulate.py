@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from benchmarks.concealed.plant.law import Concealed, check_known, strength
-from benchmarks.concealed.plant.vehicle.flow import Flow, mass_per_length
+from benchmarks.concealed.plant.vehicle.flow import Flow
 from benchmarks.concealed.plant.vehicle.flow import density as density
 from benchmarks.concealed.plant.vehicle.laws import AFTERWARDS, CIRCULATION, GUSTS, LAWS
 from benchmarks.concealed.plant.vehicle.laws_circulation import (
@@ -26,7 +26,7 @@ from benchmarks.concealed.plant.vehicle.laws_circulation import (
     varied,
     wake_tip,
 )
-from benchmarks.concealed.plant.vehicle.laws_inertia import moved_air, wing_inertia
+from benchmarks.concealed.plant.vehicle.laws_inertia import moved_air, wing_inertia, wing_mass
 from benchmarks.concealed.plant.vehicle.laws_motion import flapped, pitched
 from benchmarks.concealed.plant.vehicle.laws_stream import deflected, disc_inflow, flown
 from wingfit.records import Condition, FourierFlap, FourierPitch, SplitCycleFlap, Vehicle
@@ -329,7 +329,7 @@ def _inertia(flow: Flow, stream: Complex, vehicle: Vehicle, hidden: Concealed, t
     """
     rho, chord, own = flow.rho, flow.chord, flow.turned(flow.own)
     peeled = flow.peeled[:, None] if "effective_chord" in terms else 1.0
-    mass, along = mass_per_length(flow, vehicle), np.pi / 4 * rho * vehicle.thickness**2
+    mass, along = wing_mass(flow, vehicle, hidden), np.pi / 4 * rho * vehicle.thickness**2
     across = moved_air(flow, vehicle, np.pi / 4 * rho * (chord * peeled) ** 2, hidden)
     inertial, moved = (float(name in terms) + strength(hidden, name) for name in ("inertial", "added_mass"))
     turning = mass * (own.imag - 1j * own.real) + across * stream.imag - 1j * along * stream.real
