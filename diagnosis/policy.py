@@ -60,6 +60,14 @@ class Policy:
         "recordings with a beat: a misfit beyond the noise that noise could make, but rarely does: missing physics may "
         "hide in it",
     )
+    doubted_recording: float = _threshold(
+        1.2, "noise RMS of the recording", "the same for the misfit to one recording, which has more by chance"
+    )
+    unpredicted: float = _threshold(
+        2.0,
+        "floor",
+        "held-out misfit from which a model does not predict; of effects named with more, one in six was wrong",
+    )
     least_evidence: float = _threshold(2.0, "evidence", "no effect is searched for, or added to the model, for less")
     most_left: float = _threshold(
         0.14,
@@ -79,7 +87,7 @@ class Policy:
         0.2,
         "probability",
         "recordings with a beat: of effects that leave more than noise and the form of a law explain, about one in "
-        "five imitated a law outside the library",
+        "five imitated a law outside the library; so for effects that do not predict",
     )
     single: float = _threshold(
         0.885,

@@ -41,6 +41,7 @@ from wingfit.diagnosis.verdict.reservations import (
     doubted_by_held_out,
     held_out_sentence,
     judged_by_accepted_error,
+    missed_sentence,
     noise_sentence,
     partly,
     remaining_sentence,
@@ -164,8 +165,9 @@ def _finding(
         + candidate_sentence(data, decision, weights, suspects)
         + accepted_error_sentence(decided, judged_by_accepted_error(decided, data, weights, floor))
         + accepted_sentence(data, decision, nominal, floor)
+        + missed_sentence(data, decision, nominal, floor)
         + noise_sentence(data, decision, nominal)
-        + held_out_sentence(first, proved, refuted=refuted),
+        + held_out_sentence(first, proved, data, refuted=refuted),
         probabilities=decision.probabilities,
         named=decision.named,
         added_effects=best.names,

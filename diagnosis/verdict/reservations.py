@@ -17,6 +17,7 @@ from wingfit.diagnosis.verdict.weigh_hypotheses import (
     beyond_chance,
     large_rest,
     leaves_a_rest,
+    missed,
     nominal_refuted,
 )
 from wingfit.records import Series
@@ -25,7 +26,6 @@ from wingfit.rigs.suspect import Suspect
 CLAIMING: tuple[Verdict, ...] = (*NAMING, "ambiguous")
 WORTH_MENTIONING = 0.5  # of a misfit that an adequate model leaves: an effect that would remove more of it is mentioned
 NO_GAIN = 0.1  # of the held-out misfit: effects that remove less of it are not named
-NOT_PREDICTED = 2.0  # times the floor: the lower end of a held-out misfit from which a model does not predict
 
 
 def partly(decision: Decision, data: WhitenedData, nominal: Refit, floor: float) -> Decision:
@@ -37,7 +37,15 @@ def partly(decision: Decision, data: WhitenedData, nominal: Refit, floor: float)
         return decision
     found = dict(decision.probabilities)
     found[decision.verdict], found["partly named"] = 0.0, found[decision.verdict]
-    return replace(decision, verdict="partly named", probabilities=found)
+    return _at_most(replace(decision, verdict="partly named", probabilities=found), 1.0 - data.policy.partial_doubt)
+
+
+def _at_most(decision: Decision, limit: float) -> Decision:
+    """Return ``decision`` with at most the probability ``limit``; what is more goes to an unnamed cause."""
+    found = dict(decision.probabilities)
+    moved = max(found[decision.verdict] - limit, 0.0)
+    found[decision.verdict], found["unnamed"] = found[decision.verdict] - moved, found["unnamed"] + moved
+    return replace(decision, probabilities=found)
 
 
 def remaining_sentence(data: WhitenedData, decision: Decision, best: Refit, floor: float) -> str:
@@ -97,6 +105,18 @@ def accepted_sentence(data: WhitenedData, decision: Decision, nominal: Refit, fl
     return f" What exceeds the noise is within the accepted error: {errors}."
 
 
+def missed_sentence(data: WhitenedData, decision: Decision, nominal: Refit, floor: float) -> str:
+    """Return a sentence on recordings that a model misses although it is called adequate; else empty.
+
+    ``floor`` (m or N): discretisation error.
+    """
+    found = missed(data, nominal, floor) if decision.verdict == "adequate" else {}
+    if not found:
+        return ""
+    each = ", ".join(f"{name} by {size:.2g} times its noise" for name, size in found.items())
+    return f" But it misses {each}: something may act there that the others do not show."
+
+
 def noise_sentence(data: WhitenedData, decision: Decision, nominal: Refit) -> str:
     """Return a sentence on a noise that may hide missing physics, if the model is called adequate; else empty."""
     if decision.verdict != "adequate" or not noise_may_hide(data, nominal.fit):
@@ -148,20 +168,22 @@ def doubted_by_held_out(
     """Return ``decision`` with less certainty where held-out recordings contradict it.
 
     A model that they refute (``refuted``) is not adequate. One that does not predict them otherwise is adequate with a
-    limited probability (`Policy.doubted_noise`). Effects with which they are predicted no better are not named.
+    limited probability (`Policy.doubted_noise`). Effects with which they are predicted no better are not named, and
+    those with which they are not predicted either have a limited probability (`Policy.partial_doubt`).
     """
-    found = dict(decision.probabilities)
     if refuted and decision.verdict == "adequate":
+        found = dict(decision.probabilities)
         found["adequate"], found["unnamed"] = 0.0, found["unnamed"] + found["adequate"]
         return replace(decision, verdict="unnamed", probabilities=found, named=(), alternatives=())
-    if _unpredicted(decision, proved):
-        moved = max(found["adequate"] - data.policy.doubted_noise, 0.0)
-        found["adequate"], found["unnamed"] = found["adequate"] - moved, found["unnamed"] + moved
-        return replace(decision, probabilities=found)
-    return without_names(decision) if _useless(decision, proved) else decision
+    if _useless(decision, proved):
+        return without_names(decision)
+    if _unpredicted(decision, proved, data):
+        adequate = decision.verdict == "adequate"
+        return _at_most(decision, data.policy.doubted_noise if adequate else 1.0 - data.policy.partial_doubt)
+    return decision
 
 
-def held_out_sentence(before: Decision, proved: Proof | None, *, refuted: bool = False) -> str:
+def held_out_sentence(before: Decision, proved: Proof | None, data: WhitenedData, *, refuted: bool = False) -> str:
     """Return a sentence on held-out recordings that contradict ``before``, the decision without them; else empty."""
     if proved is None:
         return ""
@@ -170,24 +192,30 @@ def held_out_sentence(before: Decision, proved: Proof | None, *, refuted: bool =
             " The fitted recordings do not show it, but the held-out ones do: their misfit is "
             f"{proved.before.value:.3g} times the floor, more than noise and the errors of the genes explain."
         )
-    if _unpredicted(before, proved):
-        return (
-            f" But it does not predict the held-out recordings: their misfit is {proved.before.value:.3g} times the "
-            "floor. Something is missing or wrong there, or the fitted recordings do not determine the genes."
-        )
     if _useless(before, proved):
         return (
             " It is not named, because with it the held-out recordings are predicted no better: their misfit is "
             f"{proved.before.value:.3g} times the floor before, and {proved.after.value:.3g} after."
         )
-    return ""
+    if not _unpredicted(before, proved, data):
+        return ""
+    if before.verdict == "adequate":
+        return (
+            f" But it does not predict the held-out recordings: their misfit is {proved.before.value:.3g} times the "
+            "floor. Something is missing or wrong there, or the fitted recordings do not determine the genes."
+        )
+    return (
+        f" But with it the held-out recordings are still missed by {proved.after.value:.3g} times the floor: the law "
+        "has another form, something else is missing too, or the fitted recordings do not determine the genes."
+    )
 
 
-def _unpredicted(decision: Decision, proved: Proof | None) -> bool:
-    if decision.verdict != "adequate" or proved is None:
+def _unpredicted(decision: Decision, proved: Proof | None, data: WhitenedData) -> bool:
+    """Return whether a model that is adequate, or one with named effects, does not predict the held-out recordings."""
+    if proved is None or decision.verdict not in ("adequate", *NAMING):
         return False
-    low = proved.before.low
-    return (proved.before.value if low is None else low) > NOT_PREDICTED
+    misfit = proved.before if decision.verdict == "adequate" else proved.after
+    return (misfit.value if misfit.low is None else misfit.low) > data.policy.unpredicted
 
 
 def _useless(decision: Decision, proved: Proof | None) -> bool:

@@ -240,7 +240,7 @@ def doubtful(data: WhitenedData, nominal: Refit, floor: float) -> bool:
 
     ``floor`` (m or N): discretisation error.
     """
-    return noise_may_hide(data, nominal.fit) or large_rest(data, nominal, floor)
+    return noise_may_hide(data, nominal.fit) or large_rest(data, nominal, floor) or bool(missed(data, nominal, floor))
 
 
 def large_rest(data: WhitenedData, nominal: Refit, floor: float) -> bool:
@@ -251,6 +251,19 @@ def large_rest(data: WhitenedData, nominal: Refit, floor: float) -> bool:
     """
     rest = beyond_chance(data, nominal) - floor**2 - data.accepted**2
     return data.kind != "series" and rest > max(data.policy.doubted_rest * data.noise, data.tolerance) ** 2
+
+
+def missed(data: WhitenedData, nominal: Refit, floor: float) -> dict[str, float]:
+    """Return recordings with a beat of which the ``nominal`` model leaves more than noise makes, and that over noise.
+
+    What acts in one recording alone is little for all of them. ``floor`` (m or N): discretisation error.
+    """
+    if data.kind == "series":
+        return {}
+    noise = np.maximum(data.noise_of_recordings, data.tolerance)
+    rest = data.excess_by_recording(nominal.fit.coefficients) - floor**2
+    left = np.sqrt(np.maximum(rest, 0.0)) / noise
+    return {data.recordings[k].name: float(left[k]) for k in np.flatnonzero(left > data.policy.doubted_recording)}
 
 
 def drifts(data: WhitenedData) -> bool:

@@ -33,8 +33,9 @@ def refit(
 
 
 def data(
-    recordings: int = 6, excess_standard_error: float = 0.0, drift: float = 0.0, mean: float = 0.0
+    recordings: int = 6, excess_standard_error: float = 0.0, drift: float = 0.0, mean: float = 0.0, worst: float = 0.0
 ) -> WhitenedData:
+    """Recordings with a noise of one, of which the first has an excess of ``worst`` noises (RMS)."""
     return cast(
         "WhitenedData",
         SimpleNamespace(
@@ -49,6 +50,8 @@ def data(
             drift=drift,
             noise_of_recordings=np.ones(recordings),
             uncertainty_of_beats=np.zeros(recordings),
+            recordings=[SimpleNamespace(name=f"r{k}") for k in range(recordings)],
+            excess_by_recording=lambda _: np.array([worst**2, *[0.0] * (recordings - 1)]),
             tolerance=POLICY.tolerance,
             change_of_beat=float,
             mean_beat_excess=lambda _: mean,

@@ -18,6 +18,7 @@ from wingfit.diagnosis.verdict.reservations import (
     doubted_by_held_out,
     held_out_sentence,
     judged_by_accepted_error,
+    missed_sentence,
     partly,
     remaining_sentence,
 )
@@ -64,7 +65,7 @@ def test_effects_that_predict_no_better_are_not_named(verdict: Verdict) -> None:
     after = doubted_by_held_out(before, useless, data())
     assert (after.verdict, after.named) == ("unnamed", ())
     assert after.probabilities["unnamed"] == pytest.approx(1.0)
-    assert "It is not named, because" in held_out_sentence(before, useless)
+    assert "It is not named, because" in held_out_sentence(before, useless, data())
 
 
 @pytest.mark.parametrize(("before", "after", "improved"), [(2.1, 1.0, True), (2.1, 1.5, False), (1.02, 1.02, False)])
@@ -73,7 +74,7 @@ def test_effects_that_predict_better_or_where_nothing_was_missed_stay(
 ) -> None:
     found, proved = decision("named"), proof(before, after, improved=improved)
     assert doubted_by_held_out(found, proved, data()) == found
-    assert held_out_sentence(found, proved) == ""
+    assert held_out_sentence(found, proved, data()) == ""
 
 
 def test_a_model_that_does_not_predict_is_adequate_with_little_certainty() -> None:
@@ -82,8 +83,33 @@ def test_a_model_that_does_not_predict_is_adequate_with_little_certainty() -> No
     assert after.verdict == "adequate"
     assert after.probabilities["adequate"] == POLICY.doubted_noise
     assert sum(after.probabilities.values()) == pytest.approx(1.0)
-    assert "does not predict the held-out recordings: their misfit is 4.6 times" in held_out_sentence(before, wrong)
+    assert "does not predict the held-out recordings: their misfit is 4.6 times" in held_out_sentence(
+        before, wrong, data()
+    )
     assert doubted_by_held_out(before, proof(1.1, 1.1, improved=False), data()) == before
+
+
+def test_effects_that_do_not_predict_are_named_with_limited_certainty() -> None:
+    """As an error of one axis of a balance, with the nearest effect of the library."""
+    before, far = decision("named"), proof(6.0, 3.6, improved=True)
+    after = doubted_by_held_out(before, far, data("forces"))
+    assert (after.verdict, after.named) == ("named", ("drag",))
+    assert after.probabilities["named"] == pytest.approx(1.0 - POLICY.partial_doubt)
+    assert "still missed by 3.6 times the floor" in held_out_sentence(before, far, data("forces"))
+    near = proof(6.0, 1.9, improved=True)
+    assert doubted_by_held_out(before, near, data("forces")) == before
+    assert held_out_sentence(before, near, data("forces")) == ""
+
+
+def test_a_recording_that_an_adequate_model_misses_is_stated() -> None:
+    """Mains hum at a harmonic of one recording's beat is noise in the others."""
+    hum = data("tracks")
+    hum.recordings = (SimpleNamespace(name="quiet"), SimpleNamespace(name="hum"))
+    hum.noise_of_recordings, hum.excess_by_recording = np.array([0.5, 0.5]), lambda _: np.array([0.0, 4.0])
+    found = decision("adequate")
+    assert "misses hum by 4 times its noise" in missed_sentence(hum, found, found.best, 0.0)
+    assert missed_sentence(hum, decision("named"), found.best, 0.0) == ""
+    assert missed_sentence(hum, found, found.best, 2.0) == "", "the discretisation explains it"
 
 
 def test_a_model_that_held_out_recordings_refute_is_not_adequate() -> None:
@@ -91,7 +117,7 @@ def test_a_model_that_held_out_recordings_refute_is_not_adequate() -> None:
     after = doubted_by_held_out(before, wrong, data(), refuted=True)
     assert (after.verdict, after.probabilities["adequate"]) == ("unnamed", 0.0)
     assert sum(after.probabilities.values()) == pytest.approx(1.0)
-    assert "but the held-out ones do: their misfit is 3 times" in held_out_sentence(before, wrong, refuted=True)
+    assert "but the held-out ones do: their misfit is 3 times" in held_out_sentence(before, wrong, data(), refuted=True)
     assert doubted_by_held_out(decision("named"), proof(3.0, 1.0, improved=True), data(), refuted=True) == decision(
         "named"
     )
@@ -217,7 +243,7 @@ def test_effects_that_leave_more_than_noise_and_form_are_a_part(verdict: Verdict
         assert after is before
         return
     assert (after.verdict, after.named) == ("partly named", ("drag",))
-    assert after.probabilities["partly named"] == before.probabilities[verdict]
+    assert after.probabilities["partly named"] == pytest.approx(1.0 - POLICY.partial_doubt), "although each leaves less"
     assert sum(after.probabilities.values()) == pytest.approx(1.0)
     other_form = cast("Any", SimpleNamespace(excess=25.0 / POLICY.form**2, fit=FIT))
     assert partly(before, data("forces"), other_form, 0.0).verdict == verdict, "laws of two forms differ by as much"

@@ -43,18 +43,6 @@ def test_an_excess_below_the_noise_is_adequate() -> None:
     assert verdict(0.15, refit(0.1, ("a",)), refit(0.05, ("b",), 3)) == ("adequate", ())
 
 
-def test_a_model_is_not_surely_adequate_where_it_leaves_what_noise_rarely_makes() -> None:
-    """Forces of four recordings: noise could make a misfit larger than itself, so none of this size is refuted."""
-    few = data(4, excess_standard_error=0.7)
-    fits = refit(1.1 * POLICY.doubted_rest), [refit(0.5, ("a",), 6)]
-    found = decide(weigh(few, *fits, 0.0, 40))
-    assert (found.verdict, found.probabilities["adequate"]) == ("adequate", POLICY.doubted_noise)
-    assert not nominal_suffices(few, fits[0], 40)
-    small = refit(0.9 * POLICY.doubted_rest)
-    for nominal, floor in ((small, 0.0), (fits[0], 0.5)):
-        assert decide(weigh(few, nominal, fits[1], floor, 40)).probabilities["adequate"] > 0.9
-
-
 def test_a_drift_is_not_adequate_even_where_the_mean_beat_fits() -> None:
     fits = refit(0.15), [refit(0.05, ("a",), drift=0.9)]
     assert decide(weigh(data(drift=0.2), *fits, 0.0, 40)).verdict == "adequate", "too small to matter"
@@ -369,6 +357,7 @@ def test_no_verdict_depends_on_the_unit_of_length(unit: float, nominal: float, e
                 policy=POLICY,
                 drift=0.5,
                 noise_of_recordings=np.full(6, unit),
+                excess_by_recording=lambda _: np.full(6, 0.5 * unit**2),
                 uncertainty_of_beats=np.zeros(6),
                 tolerance=POLICY.tolerance * unit,
                 change_of_beat=lambda power: power * unit**2,

@@ -1,0 +1,30 @@
+"""A model is not surely adequate where it leaves what noise could make, but rarely does."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.diagnosis.verdict.refits import data, refit
+from wingfit.diagnosis.policy import POLICY
+from wingfit.diagnosis.verdict.verdict import decide
+from wingfit.diagnosis.verdict.weigh_hypotheses import nominal_suffices, weigh
+
+
+def test_a_model_is_not_surely_adequate_where_it_leaves_what_noise_rarely_makes() -> None:
+    """Forces of four recordings: noise could make a misfit larger than itself, so none of this size is refuted."""
+    few = data(4, excess_standard_error=0.7)
+    fits = refit(1.1 * POLICY.doubted_rest), [refit(0.5, ("a",), 6)]
+    found = decide(weigh(few, *fits, 0.0, 40))
+    assert (found.verdict, found.probabilities["adequate"]) == ("adequate", POLICY.doubted_noise)
+    assert not nominal_suffices(few, fits[0], 40)
+    small = refit(0.9 * POLICY.doubted_rest)
+    for nominal, floor in ((small, 0.0), (fits[0], 0.5)):
+        assert decide(weigh(few, nominal, fits[1], floor, 40)).probabilities["adequate"] > 0.9
+
+
+def test_a_model_that_misses_one_recording_is_not_surely_adequate() -> None:
+    for worst, most in ((1.1 * POLICY.doubted_recording, POLICY.doubted_noise), (0.9 * POLICY.doubted_recording, 1.0)):
+        one = data(excess_standard_error=0.4, worst=worst)
+        found = decide(weigh(one, refit(0.3), [refit(0.25, ("a",))], 0.0, 40))
+        assert found.verdict == "adequate"
+        assert found.probabilities["adequate"] == pytest.approx(most, abs=0.05)
