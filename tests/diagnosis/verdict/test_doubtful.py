@@ -1,4 +1,4 @@
-"""A model is not surely adequate where it leaves what noise could make, but rarely does."""
+"""A model is not surely adequate where it leaves what noise could make but rarely does, or a beat that changes."""
 
 from __future__ import annotations
 
@@ -28,3 +28,12 @@ def test_a_model_that_misses_one_recording_is_not_surely_adequate() -> None:
         found = decide(weigh(one, refit(0.3), [refit(0.25, ("a",))], 0.0, 40))
         assert found.verdict == "adequate"
         assert found.probabilities["adequate"] == pytest.approx(most, abs=0.05)
+
+
+def test_a_drift_is_not_adequate_even_where_the_mean_beat_fits() -> None:
+    fits = refit(0.15), [refit(0.05, ("a",), drift=0.9)]
+    assert decide(weigh(data(drift=0.2), *fits, 0.0, 40)).verdict == "adequate", "too small to matter"
+    found = decide(weigh(data(drift=0.5), *fits, 0.0, 40))
+    assert found.verdict == "unnamed"
+    assert found.probabilities["unnamed"] == pytest.approx(1.0)
+    assert not nominal_suffices(data(drift=0.5), refit(0.05), 40)

@@ -43,15 +43,6 @@ def test_an_excess_below_the_noise_is_adequate() -> None:
     assert verdict(0.15, refit(0.1, ("a",)), refit(0.05, ("b",), 3)) == ("adequate", ())
 
 
-def test_a_drift_is_not_adequate_even_where_the_mean_beat_fits() -> None:
-    fits = refit(0.15), [refit(0.05, ("a",), drift=0.9)]
-    assert decide(weigh(data(drift=0.2), *fits, 0.0, 40)).verdict == "adequate", "too small to matter"
-    found = decide(weigh(data(drift=0.5), *fits, 0.0, 40))
-    assert found.verdict == "unnamed"
-    assert found.probabilities["unnamed"] == pytest.approx(1.0)
-    assert not nominal_suffices(data(drift=0.5), refit(0.05), 40)
-
-
 def test_an_effect_that_explains_the_drift_is_possible() -> None:
     """A wrong rate of the strobe shifts the phase of the beat slowly."""
     weights = weigh(data(drift=0.5), refit(0.25), [refit(0.05, ("a",), drift=0.1), refit(0.0, ("b",))], 0.0, 40)
