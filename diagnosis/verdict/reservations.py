@@ -67,7 +67,9 @@ def remaining_sentence(data: WhitenedData, decision: Decision, best: Refit, floo
     start = f" A misfit of {amount(size, data.unit)} beyond the noise remains{share}"
     if large_rest(data, best, floor):
         also = "" if decision.verdict == "adequate" else " too"
-        return f"{start}, more than noise usually makes: something may be missing{also}; record more beats and flights."
+        return (
+            f"{start}, more than noise usually makes: something may be missing{also}; record more beats and conditions."
+        )
     return f"{start}, no more than errors of the noise and of the discretisation explain."
 
 

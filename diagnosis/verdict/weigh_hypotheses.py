@@ -243,20 +243,21 @@ def doubtful(data: WhitenedData, nominal: Refit, floor: float) -> bool:
     return noise_may_hide(data, nominal.fit) or large_rest(data, nominal, floor) or bool(missed(data, nominal, floor))
 
 
-def large_rest(data: WhitenedData, nominal: Refit, floor: float) -> bool:
-    """Return whether the ``nominal`` model leaves more of recordings with a beat than noise makes, but rarely.
+def large_rest(data: WhitenedData, refit: Refit, floor: float) -> bool:
+    """Return whether ``refit`` leaves a misfit of recordings with a beat that noise could make, but rarely does.
 
-    The noise of few forces is known so badly that it could have made a misfit larger than itself. ``floor`` (m or N):
+    The noise of few forces is known so badly that it could make a misfit larger than itself. ``floor`` (m or N):
     discretisation error.
     """
-    rest = beyond_chance(data, nominal) - floor**2 - data.accepted**2
+    rest = beyond_chance(data, refit) - floor**2 - data.accepted**2
     return data.kind != "series" and rest > max(data.policy.doubted_rest * data.noise, data.tolerance) ** 2
 
 
 def missed(data: WhitenedData, nominal: Refit, floor: float) -> dict[str, float]:
-    """Return recordings with a beat of which the ``nominal`` model leaves more than noise makes, and that over noise.
+    """Return recordings with a beat that the ``nominal`` model misses by more than noise usually makes, and how much.
 
-    What acts in one recording alone is little for all of them. ``floor`` (m or N): discretisation error.
+    That is the misfit beyond the noise over the noise of the recording. What acts in one recording alone is little
+    for all of them. ``floor`` (m or N): discretisation error.
     """
     if data.kind == "series":
         return {}
