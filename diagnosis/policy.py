@@ -61,12 +61,13 @@ class Policy:
         "hide in it",
     )
     doubted_recording: float = _threshold(
-        1.2, "noise RMS of the recording", "the same for the misfit to one recording, which has more by chance"
+        1.2, "noise RMS of the recording", "the same for one recording of forces, which has more by chance"
     )
     unpredicted: float = _threshold(
         2.0,
         "floor",
-        "held-out misfit from which a model does not predict; of effects named with more, one in six was wrong",
+        "lower end of the held-out misfit from which a model does not predict; of effects named with more, one in six "
+        "was wrong",
     )
     least_evidence: float = _threshold(2.0, "evidence", "no effect is searched for, or added to the model, for less")
     most_left: float = _threshold(

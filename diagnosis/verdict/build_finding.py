@@ -161,11 +161,11 @@ def _finding(
         verdict=decision.verdict,
         summary=summary(decision, suspects, _summary_texts(data, nominal, best, located, proved))
         + ("" if data.kind == "series" else _drift_sentence(data, nominal, best))
-        + remaining_sentence(data, decision, best, floor)
+        + remaining_sentence(data, decision, best, floor, weights.floor)
+        + missed_sentence(data, decision, nominal, weights.floor)
         + candidate_sentence(data, decision, weights, suspects)
         + accepted_error_sentence(decided, judged_by_accepted_error(decided, data, weights, floor))
         + accepted_sentence(data, decision, nominal, floor)
-        + missed_sentence(data, decision, nominal, floor)
         + noise_sentence(data, decision, nominal)
         + held_out_sentence(first, proved, data, refuted=refuted),
         probabilities=decision.probabilities,
@@ -173,7 +173,7 @@ def _finding(
         added_effects=best.names,
         strength=float(np.sqrt(1.0 + max(nominal.excess, 0.0) / data.noise**2)),
         floors=_floors(state),
-        hypotheses=hypotheses(data, weights, state.trials),
+        hypotheses=hypotheses(data, weights, state.trials, decision),
         indistinguishable=decision.alternatives,
         where=located.where if decision.verdict != "adequate" else None,
         markers=located.markers,

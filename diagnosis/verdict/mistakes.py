@@ -84,17 +84,8 @@ class MistakeDoubt:
     def stated(self, finding: Finding, before: Decision, after: Decision) -> Finding:
         """Return ``finding`` with the mistakes in its summary and remarks; arguments as of :meth:`sentence`."""
         remarks = tuple(f"likely mistake in the dataset: {one}" for one in self.mistakes)
-        hypotheses = finding.hypotheses
-        if before.verdict != after.verdict:
-            hypotheses = tuple(
-                replace(one, probability=(1.0 - LIKELY) * one.probability) if one.effects else one for one in hypotheses
-            )
-        return replace(
-            finding,
-            summary=finding.summary + self.sentence(before, after),
-            hypotheses=hypotheses,
-            remarks=(*remarks, *finding.remarks),
-        )
+        summary = finding.summary + self.sentence(before, after)
+        return replace(finding, summary=summary, remarks=(*remarks, *finding.remarks))
 
     def _causes(self, named: Sequence[str]) -> list[Kind]:
         """Return the kinds of mistakes that neither the model nor an effect in ``named`` describes."""

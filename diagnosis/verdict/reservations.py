@@ -37,7 +37,8 @@ def partly(decision: Decision, data: WhitenedData, nominal: Refit, floor: float)
         return decision
     found = dict(decision.probabilities)
     found[decision.verdict], found["partly named"] = 0.0, found[decision.verdict]
-    return _at_most(replace(decision, verdict="partly named", probabilities=found), 1.0 - data.policy.partial_doubt)
+    part = replace(decision, verdict="partly named", probabilities=found)
+    return part if data.kind == "series" else _at_most(part, 1.0 - data.policy.partial_doubt)
 
 
 def _at_most(decision: Decision, limit: float) -> Decision:
@@ -48,10 +49,11 @@ def _at_most(decision: Decision, limit: float) -> Decision:
     return replace(decision, probabilities=found)
 
 
-def remaining_sentence(data: WhitenedData, decision: Decision, best: Refit, floor: float) -> str:
+def remaining_sentence(data: WhitenedData, decision: Decision, best: Refit, floor: float, weighed: float) -> str:
     """Return a sentence on the misfit that the named effects, or an adequate model, leave; empty if it is negligible.
 
-    An unnamed verdict speaks of nothing else. ``floor`` (m or N): discretisation error.
+    An unnamed verdict speaks of nothing else. ``floor`` (m or N): discretisation error; ``weighed``: that with which
+    the hypotheses were weighed.
     """
     size = float(np.sqrt(max(best.excess, 0.0)))
     if decision.verdict == "unnamed" or size <= data.policy.negligible * data.noise:
@@ -65,11 +67,13 @@ def remaining_sentence(data: WhitenedData, decision: Decision, best: Refit, floo
             "something else is missing too."
         )
     start = f" A misfit of {amount(size, data.unit)} beyond the noise remains{share}"
-    if large_rest(data, best, floor):
+    if large_rest(data, best, weighed):
         also = "" if decision.verdict == "adequate" else " too"
         return (
             f"{start}, more than noise usually makes: something may be missing{also}; record more beats and conditions."
         )
+    if decision.verdict == "adequate" and missed(data, best, weighed):
+        return f"{start}."
     return f"{start}, no more than errors of the noise and of the discretisation explain."
 
 
@@ -116,7 +120,8 @@ def missed_sentence(data: WhitenedData, decision: Decision, nominal: Refit, floo
     if not found:
         return ""
     each = ", ".join(f"{name} by {size:.2g} times its noise" for name, size in found.items())
-    return f" But it misses {each}: something may act there that the others do not show."
+    others = ": something may act there that the others do not show" if len(found) < len(data.recordings) else ""
+    return f" The model misses {each}{others}."
 
 
 def noise_sentence(data: WhitenedData, decision: Decision, nominal: Refit) -> str:
@@ -171,7 +176,7 @@ def doubted_by_held_out(
 
     A model that they refute (``refuted``) is not adequate. One that does not predict them otherwise is adequate with a
     limited probability (`Policy.doubted_noise`). Effects with which they are predicted no better are not named, and
-    those with which they are not predicted either have a limited probability (`Policy.partial_doubt`).
+    those with which recordings with a beat are not predicted either have one as well (`Policy.partial_doubt`).
     """
     if refuted and decision.verdict == "adequate":
         found = dict(decision.probabilities)
@@ -206,15 +211,15 @@ def held_out_sentence(before: Decision, proved: Proof | None, data: WhitenedData
             f" But it does not predict the held-out recordings: their misfit is {proved.before.value:.3g} times the "
             "floor. Something is missing or wrong there, or the fitted recordings do not determine the genes."
         )
-    return (
-        f" But with it the held-out recordings are still missed by {proved.after.value:.3g} times the floor: the law "
-        "has another form, something else is missing too, or the fitted recordings do not determine the genes."
-    )
+    return " But held-out recordings are still missed: what is named may be wrong, or only a part."
 
 
 def _unpredicted(decision: Decision, proved: Proof | None, data: WhitenedData) -> bool:
-    """Return whether a model that is adequate, or one with named effects, does not predict the held-out recordings."""
-    if proved is None or decision.verdict not in ("adequate", *NAMING):
+    """Return whether an adequate model, or one with effects that may be the cause, does not predict what is held out.
+
+    Effects in series are not judged: no trials show how often they are wrong then.
+    """
+    if proved is None or decision.verdict == "unnamed" or (decision.verdict != "adequate" and data.kind == "series"):
         return False
     misfit = proved.before if decision.verdict == "adequate" else proved.after
     return (misfit.value if misfit.low is None else misfit.low) > data.policy.unpredicted

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -77,16 +77,29 @@ def _common_subset(possible: Sequence[Refit]) -> Refit | None:
 
 
 def hypotheses(
-    data: WhitenedData, weights: HypothesisWeights, trials: Sequence[Sequence[Trial]]
+    data: WhitenedData, weights: HypothesisWeights, trials: Sequence[Sequence[Trial]], decision: Decision
 ) -> tuple[Hypothesis, ...]:
-    """Return all weighed hypotheses, most probable first, then suspects that were only score-tested (``trials``)."""
-    order = np.argsort(-weights.probabilities, kind="stable")
+    """Return all weighed hypotheses, most probable first, then suspects that were only score-tested (``trials``).
+
+    Their probabilities are those of the last ``decision``, which may have been doubted after weighing.
+    """
+    before, weights = weights.probabilities, _as_decided(weights, decision)
+    order = np.lexsort((-before, -weights.probabilities))
     gains = {one[0].suspect.name: one[0] for one in trials if one}
     refitted = [_refitted_hypothesis(data, weights, int(k), gains) for k in order]
     known = {refit.names for refit in weights.refits}
     screened = sorted((t for name, t in gains.items() if (name,) not in known), key=lambda t: -t.gain)
     start = max(weights.refits[0].excess, 0.0) / data.noise**2
     return (*refitted, *(_screened_hypothesis(trial, start, data) for trial in screened[:MAX_SCREENED_LISTED]))
+
+
+def _as_decided(weights: HypothesisWeights, decision: Decision) -> HypothesisWeights:
+    """Return ``weights`` with the probability of effects shared as before, and its sum as in ``decision``."""
+    adequate, unknown = decision.probabilities["adequate"], decision.probabilities["unnamed"]
+    effects = weights.probabilities[1:]
+    whole = float(effects.sum())
+    shared = effects * (max(1.0 - adequate - unknown, 0.0) / whole) if whole > 0.0 else effects
+    return replace(weights, probabilities=np.array([adequate, *shared]), unknown=unknown)
 
 
 def _refitted_hypothesis(

@@ -41,7 +41,8 @@ class HypothesisWeights:
     """Evidence and probability of each of H hypotheses, the nominal model first.
 
     ``evidence``: natural logarithm, relative to the nominal model; ``unknown``: probability of a law outside the
-    library; ``excess``: mean square beyond the noise, fitted and cross-validated, divided by the noise variance.
+    library; ``excess``: mean square beyond the noise, fitted and cross-validated, divided by the noise variance;
+    ``floor`` (m or N): discretisation error with which they were weighed.
     """
 
     refits: tuple[Refit, ...]
@@ -50,6 +51,7 @@ class HypothesisWeights:
     unknown: float
     excess: Float[Array, " H"]
     policy: Policy = POLICY
+    floor: float = 0.0
 
 
 def weigh(
@@ -69,23 +71,22 @@ def weigh(
     effects = np.array([len(one.trials) for one in hypotheses], float)
     evidence = _evidence(data, tau + excess, genes, effects, suspects)
     unknown = _unknown(data, tau + policy.unknown_residual**2 * excess[0])
-    possible = np.ones(len(hypotheses), bool)
+    possible, rival = np.ones(len(hypotheses), bool), np.zeros(len(hypotheses), bool)
     drift_alone = only_drifts(data, nominal, floor)
     if nominal_refuted(data, beyond_chance(data, nominal), floor, error) or (drifts(data) and not drift_alone):
         # A hypothesis that leaves the misfit as it was explains nothing; nor does the nominal model. With few
         # recordings, one that explains most of the misfit may have little evidence; with a single experiment, nothing
-        # shows that it predicts. One whose size may be zero is possible only beside others: else it would be named
-        # although its own interval says nothing of it.
+        # shows that it predicts.
         possible = evidence - evidence[0] > policy.least_evidence
-        most = np.flatnonzero(~possible & (excess < policy.drift_left * excess[0]))
-        weak = [k for k in most if hypotheses[k].predicted is not None]
-        possible[[k for k in weak if not absent(data, hypotheses[k])]] = True
-        if possible.any():
-            possible[weak] = True
+        for k in np.flatnonzero(~possible & (excess < policy.drift_left * excess[0])):
+            possible[k] = hypotheses[k].predicted is not None
+            rival[k] = possible[k] and absent(data, hypotheses[k])
     if drift_alone:
         possible &= [explains_drift(data, nominal, one) for one in hypotheses]
     imitates = _imitation(data, hypotheses, floor, error)
     weight = np.where(possible, evidence - imitates, -np.inf)
+    # One whose size may be zero is no more probable than the best of the others, so that it is never named alone.
+    weight[rival] = np.minimum(weight[rival], weight[~rival].max())
     if data.kind != "series":
         closer = _unknown(data, tau + policy.several_left**2 * excess[0])
         several = _imitation_by_several(hypotheses, weight, unknown, closer)
@@ -96,14 +97,14 @@ def weigh(
     weight, other = np.exp(weight - top), np.exp(unknown - top)
     total = weight.sum() + other
     probabilities, unknown = weight / total, float(other / total)
-    if doubtful(data, nominal, floor):  # as far as no hypothesis has shown how large the noise is
+    if doubtful(data, nominal, floor):
         doubted = max(float(probabilities[0]) - policy.doubted_noise, 0.0)
         probabilities[0], unknown = probabilities[0] - doubted, unknown + doubted
     if data.kind != "series":
         partial = [leaves_a_rest(data, nominal, one, floor) for one in refits]
         imitated = policy.partial_doubt * np.array([0.0, *(probabilities[1:] * partial)])
         probabilities, unknown = probabilities - imitated, unknown + float(imitated.sum())
-    return HypothesisWeights(hypotheses, evidence - evidence[0], probabilities, unknown, excess, data.policy)
+    return HypothesisWeights(hypotheses, evidence - evidence[0], probabilities, unknown, excess, data.policy, floor)
 
 
 def leaves_a_rest(data: WhitenedData, nominal: Refit, refit: Refit, floor: float) -> bool:
@@ -249,17 +250,18 @@ def large_rest(data: WhitenedData, refit: Refit, floor: float) -> bool:
     The noise of few forces is known so badly that it could make a misfit larger than itself. ``floor`` (m or N):
     discretisation error.
     """
-    rest = beyond_chance(data, refit) - floor**2 - data.accepted**2
+    rest = beyond_chance(data, refit) - floor**2
     return data.kind != "series" and rest > max(data.policy.doubted_rest * data.noise, data.tolerance) ** 2
 
 
 def missed(data: WhitenedData, nominal: Refit, floor: float) -> dict[str, float]:
-    """Return recordings with a beat that the ``nominal`` model misses by more than noise usually makes, and how much.
+    """Return recordings of forces that the ``nominal`` model misses by more than noise usually makes, and by how much.
 
     That is the misfit beyond the noise over the noise of the recording. What acts in one recording alone is little
-    for all of them. ``floor`` (m or N): discretisation error.
+    for all of them; of tracks, whose noise is known well, that little refutes a model (:func:`nominal_refuted`).
+    ``floor`` (m or N): discretisation error.
     """
-    if data.kind == "series":
+    if data.kind != "forces":
         return {}
     noise = np.maximum(data.noise_of_recordings, data.tolerance)
     rest = data.excess_by_recording(nominal.fit.coefficients) - floor**2

@@ -41,6 +41,14 @@ def weighed(hidden: Concealed | None = None) -> Weighed:
     return weigh(FORCES, VEHICLE, AIR, silent(draw_weighing(rng(1))), rng(), hidden)
 
 
+@pytest.mark.parametrize("axis", [0.5, 1.5])
+def test_the_gain_of_an_axis_is_that_of_the_library(axis: float) -> None:
+    drawn = {"strength": 0.08, "axis": axis}
+    gains = [1.0 + FAULTS["axis_scale"].values(drawn)[f"axis_scale.{name}"] for name in "xz"]
+    np.testing.assert_allclose(weighed({"axis_scale": drawn}).clean, weighed().clean * gains, rtol=1e-6, atol=1e-9)
+    assert gains == ([1.08, 1.0] if axis < 1.0 else [1.0, 1.08])
+
+
 @pytest.mark.parametrize("name", CHOICES)
 @pytest.mark.parametrize("seed", [1, 2, 3, 4])
 def test_a_mistake_is_whole_at_any_strength_and_is_that_of_the_library(name: str, seed: int) -> None:

@@ -33,7 +33,12 @@ def refit(
 
 
 def data(
-    recordings: int = 6, excess_standard_error: float = 0.0, drift: float = 0.0, mean: float = 0.0, worst: float = 0.0
+    recordings: int = 6,
+    excess_standard_error: float = 0.0,
+    drift: float = 0.0,
+    mean: float = 0.0,
+    worst: float = 0.0,
+    kind: str = "tracks",
 ) -> WhitenedData:
     """Recordings with a noise of one, of which the first has an excess of ``worst`` noises (RMS)."""
     return cast(
@@ -45,7 +50,7 @@ def data(
             excess_by_chance=lambda _: 0.0,
             accepted=0.0,
             gene_cost=POLICY.gene_cost,
-            kind="tracks",
+            kind=kind,
             policy=POLICY,
             drift=drift,
             noise_of_recordings=np.ones(recordings),

@@ -1,11 +1,15 @@
-"""A model is not surely adequate where it leaves what noise could make but rarely does, or a beat that changes."""
+"""Verdicts that are not sure: a misfit that noise rarely makes, a beat that changes, an effect that may be zero."""
 
 from __future__ import annotations
+
+from types import SimpleNamespace
 
 import pytest
 
 from tests.diagnosis.verdict.refits import data, refit
+from wingfit.diagnosis.finding import Interval
 from wingfit.diagnosis.policy import POLICY
+from wingfit.diagnosis.verdict import weigh_hypotheses
 from wingfit.diagnosis.verdict.verdict import decide
 from wingfit.diagnosis.verdict.weigh_hypotheses import nominal_suffices, weigh
 
@@ -24,10 +28,11 @@ def test_a_model_is_not_surely_adequate_where_it_leaves_what_noise_rarely_makes(
 
 def test_a_model_that_misses_one_recording_is_not_surely_adequate() -> None:
     for worst, most in ((1.1 * POLICY.doubted_recording, POLICY.doubted_noise), (0.9 * POLICY.doubted_recording, 1.0)):
-        one = data(excess_standard_error=0.4, worst=worst)
+        one = data(excess_standard_error=0.4, worst=worst, kind="forces")
         found = decide(weigh(one, refit(0.3), [refit(0.25, ("a",))], 0.0, 40))
         assert found.verdict == "adequate"
         assert found.probabilities["adequate"] == pytest.approx(most, abs=0.05)
+        assert nominal_suffices(one, refit(0.05), 40) == (most == 1.0)
 
 
 def test_a_drift_is_not_adequate_even_where_the_mean_beat_fits() -> None:
@@ -37,3 +42,27 @@ def test_a_drift_is_not_adequate_even_where_the_mean_beat_fits() -> None:
     assert found.verdict == "unnamed"
     assert found.probabilities["unnamed"] == pytest.approx(1.0)
     assert not nominal_suffices(data(drift=0.5), refit(0.05), 40)
+
+
+def test_an_effect_whose_size_may_be_zero_is_a_rival_of_one_that_is_hardly_larger(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Of few flights alike, an airspeed that is wrong fits no better than a body pitch that is."""
+    sizes = {"speed": (0.004, 0.129), "pitch": (-0.036, None)}
+    monkeypatch.setattr(
+        weigh_hypotheses,
+        "gene_values",
+        lambda _, one: (SimpleNamespace(value=Interval(0.07, *sizes[one.names[0]]), off=0.0),),
+    )
+    speed, pitch = refit(0.3, ("speed",), 4), refit(0.35, ("pitch",), 4)
+    for one in (speed, pitch):
+        one.trials[0].suspect.size_genes = (one.names[0],)  # type: ignore[misc]
+    few, nominal = data(2, 0.4), refit(2.1)
+    found = decide(weigh(few, nominal, [speed, pitch], 0.0, 40))
+    assert (found.verdict, found.alternatives) == ("ambiguous", (("speed",), ("pitch",)))
+    assert decide(weigh(few, nominal, [speed], 0.0, 40)).named == ("speed",)
+    assert decide(weigh(few, nominal, [pitch], 0.0, 40)).verdict == "unnamed"
+    worse = refit(1.2, ("speed",), 4)
+    worse.trials[0].suspect.size_genes = ("speed",)  # type: ignore[misc]
+    beside = decide(weigh(few, nominal, [worse, pitch], 0.0, 40))
+    assert beside.verdict != "named", "an effect that explains little makes no other more probable"

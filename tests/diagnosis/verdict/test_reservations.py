@@ -54,6 +54,8 @@ def data(kind: str = "series", accepted: float = 0.0) -> Any:
         policy=POLICY,
         excess_standard_error=0.05,
         excess_by_chance=lambda _: 0.0,
+        noise_of_recordings=np.ones(1),
+        excess_by_recording=lambda _: np.zeros(1),
         drift=0.0,
         recordings=(Series("one", times, (channel,), times[:, None]),),
     )
@@ -95,7 +97,8 @@ def test_effects_that_do_not_predict_are_named_with_limited_certainty() -> None:
     after = doubted_by_held_out(before, far, data("forces"))
     assert (after.verdict, after.named) == ("named", ("drag",))
     assert after.probabilities["named"] == pytest.approx(1.0 - POLICY.partial_doubt)
-    assert "still missed by 3.6 times the floor" in held_out_sentence(before, far, data("forces"))
+    assert "But held-out recordings are still missed" in held_out_sentence(before, far, data("forces"))
+    assert doubted_by_held_out(before, far, data("series")) == before, "no trials show how often it is wrong"
     near = proof(6.0, 1.9, improved=True)
     assert doubted_by_held_out(before, near, data("forces")) == before
     assert held_out_sentence(before, near, data("forces")) == ""
@@ -103,11 +106,15 @@ def test_effects_that_do_not_predict_are_named_with_limited_certainty() -> None:
 
 def test_a_recording_that_an_adequate_model_misses_is_stated() -> None:
     """Mains hum at a harmonic of one recording's beat is noise in the others."""
-    hum = data("tracks")
+    hum = data("forces")
     hum.recordings = (SimpleNamespace(name="quiet"), SimpleNamespace(name="hum"))
     hum.noise_of_recordings, hum.excess_by_recording = np.array([0.5, 0.5]), lambda _: np.array([0.0, 4.0])
     found = decision("adequate")
-    assert "misses hum by 4 times its noise" in missed_sentence(hum, found, found.best, 0.0)
+    words = missed_sentence(hum, found, found.best, 0.0)
+    assert words == " The model misses hum by 4 times its noise: something may act there that the others do not show."
+    assert "no more than errors" not in remaining_sentence(hum, found, replace_excess(found, 0.2).best, 1.0, 0.0)
+    hum.excess_by_recording = lambda _: np.array([4.0, 4.0])
+    assert "the others" not in missed_sentence(hum, found, found.best, 0.0)
     assert missed_sentence(hum, decision("named"), found.best, 0.0) == ""
     assert missed_sentence(hum, found, found.best, 2.0) == "", "the discretisation explains it"
 
@@ -140,16 +147,18 @@ def test_without_held_out_recordings_nothing_changes() -> None:
 def test_a_misfit_that_remains_is_stated() -> None:
     found = decision("named")
     assert "A misfit of 5 times the noise beyond the noise remains" in remaining_sentence(
-        data(), found, found.best, 0.0
+        data(), found, found.best, 0.0, 0.0
     )
     assert "A misfit of 0.447 times the noise" in remaining_sentence(
-        data(), decision("adequate"), replace_excess(found, 0.2).best, 1.0
+        data(), decision("adequate"), replace_excess(found, 0.2).best, 1.0, 1.0
     )
-    assert remaining_sentence(data(accepted=1.0), decision("adequate"), found.best, 0.0) == ""
+    assert remaining_sentence(data(accepted=1.0), decision("adequate"), found.best, 0.0, 0.0) == ""
     exact = replace_excess(found, 0.01)
-    assert remaining_sentence(data(), exact, exact.best, 0.0) == ""
+    assert remaining_sentence(data(), exact, exact.best, 0.0, 0.0) == ""
     small = replace_excess(found, 0.2)
-    assert "remains, no more than errors of the noise and of the" in remaining_sentence(data(), small, small.best, 1.0)
+    assert "remains, no more than errors of the noise and of the" in remaining_sentence(
+        data(), small, small.best, 1.0, 1.0
+    )
 
 
 @pytest.mark.parametrize(("verdict", "also"), [("adequate", ""), ("named", " too")])
@@ -158,10 +167,10 @@ def test_a_misfit_that_noise_rarely_makes_is_not_called_noise(verdict: Verdict, 
     few = data("forces")
     few.excess_standard_error = 0.7
     large, small = (replace_excess(decision(verdict), (share * POLICY.doubted_rest) ** 2) for share in (1.1, 0.9))
-    words = remaining_sentence(few, large, large.best, 0.0)
+    words = remaining_sentence(few, large, large.best, 0.0, 0.0)
     assert f"more than noise usually makes: something may be missing{also}" in words
-    assert "no more than errors of the noise" in remaining_sentence(few, small, small.best, 0.0)
-    assert "no more than errors of the noise" in remaining_sentence(few, large, large.best, 0.5), "discretisation"
+    assert "no more than errors of the noise" in remaining_sentence(few, small, small.best, 0.0, 0.0)
+    assert "no more than errors of the noise" in remaining_sentence(few, large, large.best, 0.5, 0.5), "discretisation"
 
 
 @pytest.mark.parametrize(

@@ -83,26 +83,6 @@ def test_an_effect_whose_sizes_may_all_be_zero_is_not_named(
     assert decide(weigh(data(2, 0.4), refit(2.1), [fitted], 0.0, 40)).verdict == expected
 
 
-def test_an_effect_whose_size_may_be_zero_is_a_rival_of_one_that_is_hardly_larger(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """Of few flights alike, an airspeed that is wrong fits no better than a body pitch that is."""
-    sizes = {"speed": (0.004, 0.129), "pitch": (-0.036, None)}
-    monkeypatch.setattr(
-        weigh_hypotheses,
-        "gene_values",
-        lambda _, one: (SimpleNamespace(value=Interval(0.07, *sizes[one.names[0]]), off=0.0),),
-    )
-    speed, pitch = refit(0.3, ("speed",), 4), refit(0.35, ("pitch",), 4)
-    for one in (speed, pitch):
-        one.trials[0].suspect.size_genes = (one.names[0],)  # type: ignore[misc]
-    few, nominal = data(2, 0.4), refit(2.1)
-    found = decide(weigh(few, nominal, [speed, pitch], 0.0, 40))
-    assert (found.verdict, found.alternatives) == ("ambiguous", (("speed",), ("pitch",)))
-    assert decide(weigh(few, nominal, [speed], 0.0, 40)).named == ("speed",)
-    assert decide(weigh(few, nominal, [pitch], 0.0, 40)).verdict == "unnamed"
-
-
 def test_an_effect_that_explains_nearly_all_is_named() -> None:
     assert verdict(2.0, refit(0.3, ("a",)), refit(1.5, ("b",))) == ("named", ("a",))
 

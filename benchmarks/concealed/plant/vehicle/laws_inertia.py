@@ -46,7 +46,7 @@ def wing_inertia(flow: Flow, own: Complex, vehicle: Vehicle, hidden: Concealed) 
     the other part, Eqs. 12-14). Mass that lies behind the axis of pitch, by the same fraction of every chord, adds
     m e (i theta'' - theta'^2), with ``strength`` the mean of the distance e.
     """
-    mass, force = mass_per_length(flow, vehicle), np.zeros(own.shape, complex)
+    mass, force = wing_mass(flow, vehicle, hidden), np.zeros(own.shape, complex)
     part = strength(hidden, "wing_acceleration")
     if part:
         force -= part * mass * (flow.turned(flow.own_rate) - 1j * flow.turn * own)
