@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
@@ -10,7 +11,7 @@ from tests.diagnosis.verdict.refits import data, refit
 from wingfit.diagnosis.finding import Interval
 from wingfit.diagnosis.policy import POLICY
 from wingfit.diagnosis.verdict import weigh_hypotheses
-from wingfit.diagnosis.verdict.verdict import decide
+from wingfit.diagnosis.verdict.verdict import _as_decided, decide
 from wingfit.diagnosis.verdict.weigh_hypotheses import nominal_suffices, weigh
 
 
@@ -66,3 +67,18 @@ def test_an_effect_whose_size_may_be_zero_is_a_rival_of_one_that_is_hardly_large
     worse.trials[0].suspect.size_genes = ("speed",)  # type: ignore[misc]
     beside = decide(weigh(few, nominal, [worse, pitch], 0.0, 40))
     assert beside.verdict != "named", "an effect that explains little makes no other more probable"
+
+
+def test_the_probabilities_of_hypotheses_are_those_of_the_verdict() -> None:
+    """Of which held-out recordings have taken a fifth."""
+    weights = weigh(data(), refit(2.0), [refit(0.3, ("a",)), refit(0.6, ("b",))], 0.0, 40)
+    decision = decide(weights)
+    doubted = {**decision.probabilities, "named": 0.8 * decision.probabilities["named"]}
+    doubted["unnamed"] += 0.2 * decision.probabilities["named"]
+    found = _as_decided(weights, replace(decision, probabilities=doubted))
+    assert found.probabilities.sum() + found.unknown == pytest.approx(1.0)
+    assert found.unknown == pytest.approx(doubted["unnamed"])
+    assert found.probabilities[1] / found.probabilities[2] == pytest.approx(
+        weights.probabilities[1] / weights.probabilities[2]
+    )
+    assert _as_decided(weights, decision).probabilities == pytest.approx(weights.probabilities)

@@ -30,6 +30,13 @@ EFFECT = fault_of_recordings(
     "length; AIAA R-091A (2020): gain of a balance",
     signature="the whole wing is larger, at rest as in motion, or all forces are larger, by the same factor in every "
     "condition",
-    confused_with=("stroke_amplitude", "camera_shift", "lens_distortion", "added_mass_error", "residual_air"),
+    confused_with=(
+        "stroke_amplitude",
+        "camera_shift",
+        "lens_distortion",
+        "added_mass_error",
+        "residual_air",
+        "axis_scale",
+    ),
     observe=_observe,
 )

@@ -20,7 +20,7 @@ EFFECT = Effect(
     source="Sedov (1965), Two-Dimensional Problems in Hydrodynamics and Aerodynamics: plates near each other and near "
     "walls; Armanini et al. (2016), Eq. 10",
     signature="a force in phase with the acceleration of the wing, in proportion to the density of the air",
-    confused_with=("mass_offset", "clock_offset", "drive_harmonics", "scale_error", "residual_air"),
+    confused_with=("mass_offset", "clock_offset", "drive_harmonics", "scale_error", "residual_air", "wing_mass_error"),
     of_term="added_mass",
     vehicle=_vehicle,
 )
