@@ -179,9 +179,7 @@ def doubted_by_held_out(
     those with which recordings with a beat are not predicted either have one as well (`Policy.partial_doubt`).
     """
     if refuted and decision.verdict == "adequate":
-        found = dict(decision.probabilities)
-        found["adequate"], found["unnamed"] = 0.0, found["unnamed"] + found["adequate"]
-        return replace(decision, verdict="unnamed", probabilities=found, named=(), alternatives=())
+        return replace(_at_most(decision, 0.0), verdict="unnamed", named=(), alternatives=())
     if _useless(decision, proved):
         return without_names(decision)
     if _unpredicted(decision, proved, data):
