@@ -6,13 +6,16 @@ from wingfit.diagnosis.finding import Finding, Hypothesis
 from wingfit.report.number_format import best_of, percent
 
 MOST_SHOWN = 8
+LEAST_LISTED = 1e-3  # probability of a hypothesis of several effects; each effect alone is always listed
 
 
-def parts(finding: Finding) -> tuple[list[Hypothesis], list[Hypothesis]]:
-    """Return the hypotheses that are always shown (the first MOST_SHOWN and the nominal model), and all others."""
+def parts(finding: Finding) -> tuple[list[Hypothesis], list[Hypothesis], int]:
+    """Return the hypotheses shown in full (MOST_SHOWN and the nominal model), those listed, and how many more."""
     # the nominal model is always shown: all others are compared with it
     shown = [h for k, h in enumerate(finding.hypotheses) if k < MOST_SHOWN or not h.effects]
-    return shown, [h for h in finding.hypotheses if h not in shown]
+    others = [h for h in finding.hypotheses if h not in shown]
+    listed = [h for h in others if len(h.effects) == 1 or h.probability >= LEAST_LISTED]
+    return shown, listed, len(others) - len(listed)
 
 
 def is_selected(hypothesis: Hypothesis, finding: Finding) -> bool:

@@ -280,6 +280,19 @@ def test_what_is_left_out_of_the_page_is_counted() -> None:
     )
 
 
+def test_each_effect_is_listed_and_improbable_pairs_are_counted() -> None:
+    finding = wing_finding()
+    one = next(h for h in finding.hypotheses if h.effects)
+    singles = tuple(replace(one, effects=(f"e{k}",), title=f"single {k}", probability=0.0) for k in range(12))
+    pairs = tuple(
+        replace(one, effects=("a", f"b{k}"), title=f"pair {k}", probability=0.002 - k * 1e-4) for k in range(40)
+    )
+    shown = page(replace(finding, hypotheses=(*finding.hypotheses, *pairs, *singles)))
+    assert all(f"single {k}" in shown.texts for k in range(12))
+    assert [k for k in range(40) if f"pair {k}" in shown.texts] == list(range(11)), "those with at least 0.1 %"
+    assert "has 29 more, of several effects and each with a probability below 0.1" in shown.text
+
+
 def test_the_best_three_proposals_are_shown_with_their_cost_and_what_changes() -> None:
     finding = wing_finding()
     cost = AdvisedCost(1, 400, 12.5, 28.0)
