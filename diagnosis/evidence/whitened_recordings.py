@@ -23,6 +23,7 @@ from wingfit.records.array_types import Array, Float
 from wingfit.records.dataset import AnyKind
 
 Reduced = HarmonicFit | SeriesFit
+SMALLEST_TOLERANCE = 1e-6  # of the largest coordinate
 
 
 def _reduced(recording: AnyRecording, axes: tuple[str, ...], series: SeriesReduction | None) -> Reduced:
@@ -83,7 +84,8 @@ class WhitenedData:
         reduced = tuple(_reduced(one, axes, series) for one in recordings)
         noise = np.sqrt(np.mean(np.concatenate([fit.noise[fit.used] ** 2 for fit in reduced])))
         largest = 0.0 if series else max(float(np.nanmax(np.abs(one.values))) for one in recordings)
-        tolerance = max(policy.tolerance * float(noise), 1e-6 * largest)
+        least = policy.solver_error if recordings[0].kind == "forces" else SMALLEST_TOLERANCE
+        tolerance = max(policy.tolerance * float(noise), least * largest)
         return cls(tuple(recordings), reduced, axes, tolerance, policy, series)
 
     def like(self, recordings: Sequence[AnyRecording]) -> WhitenedData:

@@ -13,7 +13,7 @@ from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.verdict.noise_remarks import noise_remarks
 from wingfit.inference.noise.harmonic import noise_distance
 from wingfit.inference.noise.stated import correlation_matrices
-from wingfit.records import Dataset, Recording
+from wingfit.records import Condition, Dataset, Recording
 from wingfit.records.array_types import Array
 from wingfit.sim.virtual_rigs.campaign import Tracking
 
@@ -133,3 +133,23 @@ def test_stated_correlations_make_intervals_narrower() -> None:
         assert value.low < 0.004 < value.high
         widths.append(value.high - value.low)
     assert widths[1] < 0.8 * widths[0]
+
+
+def test_forces_without_noise_allow_for_the_error_of_a_solver() -> None:
+    """Two solvers of the same law differ by a ten-thousandth, not by missing physics."""
+    condition = Condition(
+        pressure=101325.0,
+        temperature=293.0,
+        gravity=9.81,
+        airspeed=2.0,
+        angle_of_attack=0.0,
+        flap_frequency=10.0,
+        phase_lag=0.0,
+    )
+    times = np.arange(400) / 400.0
+    values = np.column_stack([np.cos(2 * np.pi * 10 * times), 0.3 * np.sin(2 * np.pi * 20 * times)])
+    forces = Recording("r", "wind_tunnel", condition, times, (), values, forces=("x", "z"))
+    data = WhitenedData.of([forces], ("x", "z"))
+    small, large = (share * np.cos(2 * np.pi * 30 * times)[:, None] * [[1.0, 1.0]] for share in (2e-4, 2e-3))
+    assert np.sqrt(data.excess(data.coefficients_of([small]))) < data.noise
+    assert np.sqrt(data.excess(data.coefficients_of([large]))) > 4 * data.noise
