@@ -106,7 +106,7 @@ class Policy:
     )
     tolerance: float = _threshold(0.1, "noise RMS", "no model is required to be more exact, however long the recording")
     solver_error: float = _threshold(
-        3e-4, "largest force", "two solvers of the same quasi-steady model differ by as much, also without noise"
+        3e-4, "largest force", "an independent solver of the same law differed by a sixth of it (RMS), without noise"
     )
     gene_freedom: float = _threshold(
         0.1, "gene box", "standard deviation of a gene's move when a recording is left out"
