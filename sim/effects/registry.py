@@ -15,7 +15,7 @@ FILES = (
     ("inertia", "lumped_mass mass_offset"),
     ("terms", "inertial wing_acceleration wing_mass_error"),
     ("actuation", "stroke_amplitude stroke_bias drive_harmonics phase_lag_error"),
-    ("actuation", "wing_pitch_zero wing_pitch_amplitude wing_pitch_phase"),
+    ("actuation", "wing_pitch_zero wing_pitch_amplitude wing_pitch_phase elastic_twist"),
     ("actuation", "hinge_tilt hinge_offset compliant_drive backlash"),
     # each acts on the result of those before: stream, coefficients of the angle of attack, circulation, wake
     ("stream", "residual_air airspeed_error body_pitch_convention body_pitch_error body_drag tail_lift"),

@@ -77,6 +77,11 @@ class StationedWings:
         """Quasi-steady circulation [B, n, 8] due to pitching, m^2/s, which :meth:`flow` includes in its circulation."""
         return self._turned(self.turning)
 
+    @cached_property
+    def flung(self) -> Array:
+        """Circulation [B, n, 8] due to fling, m^2/s, which that of :meth:`flow` does not include."""
+        return self._turned(self.fling)
+
     def flow(self, forward: Array) -> Flow:
         """Quasi-steady flow at the stations in a stream of ``forward`` [B, n] (m/s) along body x, set in ``sides``."""
         flow = Flow(*np.empty((4, len(self.sides), *self.turning.shape, STATIONS)))
@@ -102,7 +107,7 @@ class StationedWings:
     def forces(self, flow: Flow) -> Array:
         """Circulatory (fling included) and viscous forces [B, 2, n] (N) of all wings in ``flow`` along body x and z."""
         out = np.zeros((len(self.turning), 2, self.turning.shape[1]))
-        circulation = flow.circulation + self._turned(self.fling)
+        circulation = flow.circulation + self.flung
         for k, (rows, side) in enumerate(self.sides):
             moving = (flow.along[k], flow.normal[k], flow.speed[k], circulation[k])
             stations.station_forces(rows, side, *self.turns, *moving, self.places, self.density, self.drag, out)

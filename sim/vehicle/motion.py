@@ -39,12 +39,14 @@ class PitchError(NamedTuple):
     """How the wing's pitch at the pitch station differs from that described, for B individuals, [B] each.
 
     ``zero``: rad, added; ``part``: relative increase of its deviation from that at rest
-    (:class:`PassivePitch`) or from its mean (:class:`FourierPitch`); ``lag``: beats of delay.
+    (:class:`PassivePitch`) or from its mean (:class:`FourierPitch`); ``lag``: beats of delay; ``more`` [B, K + 1]:
+    Fourier series added, rad, or None.
     """
 
     zero: Array
     part: Array
     lag: Array
+    more: Complex | None = None
 
 
 @dataclass(frozen=True)
@@ -158,7 +160,8 @@ def _pitch(
     if error is None:
         return found
     zero = _VALUE * rest[:, :, None]
-    return np.asarray(found + error.part[:, None, None] * (found - zero) + error.zero[:, None, None] * _VALUE)
+    found = found + error.part[:, None, None] * (found - zero) + error.zero[:, None, None] * _VALUE
+    return np.asarray(found if error.more is None else found + _derivatives(error.more, frequency, instants, 2))
 
 
 def _passive_pitch(pitch: PassivePitch, values: Mapping[str, Array], flap: Array) -> Array:

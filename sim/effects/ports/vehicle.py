@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal, get_args
 
@@ -20,9 +20,21 @@ from wingfit.sim.vehicle.states import followed
 from wingfit.sim.vehicle.stations import STATIONS, Stations, span_sums, stations
 
 ROTATION_POINT = 0.75  # Eq. 4
+TWIST_INSTANTS, TWIST_ROUNDS = 80, 12  # of a twist that changes the flow by which it arises
+RELAXATION = (0.05, 1.0)  # of the rounds
 # Stages of a scene, in order: each reads what the stages before have changed.
-Stage = Literal["mass", "inflow", "wake", "circulation"]
+Stage = Literal["twist", "mass", "inflow", "wake", "circulation"]
 Change = Callable[["VehicleScene", Mapping[str, Array]], None]
+
+
+def _relaxed(step: Array, last: Complex, rest: Complex) -> Array:
+    """Return the next relaxation [B] of an iteration with the residuals ``last`` and ``rest`` [B, K] (Aitken).
+
+    Küttler and Wall (2008), Comput. Mech. 43, 61, Eq. 44, within bounds.
+    """
+    change = rest - last
+    square, along = (np.sum((change.conj() * one).real, axis=1) for one in (change, last))
+    return np.asarray(np.clip(-step * along / np.maximum(square, 1e-300), *RELAXATION))
 
 
 @dataclass(frozen=True)
@@ -149,6 +161,29 @@ class VehicleScene:
         own, frequency = self.setting, self.setting.condition.flap_frequency
         about = own.instants, own.vehicle.claps, own.peel_width
         return angles_of(self.flap, own.motion, self.genes, frequency, *about, self.pitch)
+
+    def twist(self, law: Callable[[StationedWings, Flow], Array], harmonics: int) -> None:
+        """Add to the wing's pitch the angle (rad) that ``law`` computes [B, m] from the flow, which that angle changes.
+
+        ``law`` has the wings at every few instants, m of them, in quasi-steady flow. ``harmonics``: of the angle.
+        """
+        count = self.setting.instants
+        every = max(k for k in range(1, max(count // TWIST_INSTANTS, 1) + 1) if count % k == 0)
+        angle, step, last = np.zeros((len(self), harmonics + 1), complex), np.full(len(self), 0.5), None
+        for _ in range(TWIST_ROUNDS):
+            wings = self._twisted(angle).wings.every(every)
+            found = law(wings, wings.flow(self.forward(self.inflow)[:, ::every]))
+            target = np.fft.rfft(found)[:, : harmonics + 1] * (2.0 / found.shape[1])
+            target[:, 0] *= 0.5
+            rest = target - angle
+            step = step if last is None else _relaxed(step, last, rest)
+            angle, last = angle + step[:, None] * rest, rest
+        self.pitch = self.pitch._replace(more=angle)
+
+    def _twisted(self, angle: Complex) -> VehicleScene:
+        """Return a copy whose wings have the pitch ``angle`` [B, K + 1] (rad) besides their own."""
+        own = {name: getattr(self, name).copy() for name in ("flap", "airspeed", "density", "loading", "fling")}
+        return replace(self, pitch=self.pitch._replace(more=angle), _waiting={}, **own)
 
     # -- for effects that are terms of other models -----------------------------------------------------------------
 

@@ -34,14 +34,15 @@ TRUTH = {"C_l": 1.3, "C_r": 1.45, "C_F": 1.5, "C_D0": 0.05, "C_Dpi2": 2.0}
 SLOW, FAST = TRIALS[3].condition, TRIALS[7].condition  # 0.65 and 2 m/s
 PAIR_FLIGHT = replace(SLOW, airspeed=3.0, flap_frequency=10.0, angle_of_attack=0.5)
 NEW = (
-    "stroke_bias", "wing_pitch_zero", "wing_pitch_amplitude", "wing_pitch_phase", "body_pitch_error", "residual_air",
-    "downwash", "wake_tip_loss", "translation", "rotational_circulation", "viscous", "zero_lift_angle", "lift_curve",
-    "leading_edge_suction", "stall_vortex", "varying_coefficients", "inertial", "wing_acceleration", "added_mass",
-    "added_mass_error", "wing_mass_error", "effective_chord", "mass_offset", "body_drag", "tail_lift",
+    "stroke_bias", "wing_pitch_zero", "wing_pitch_amplitude", "wing_pitch_phase", "elastic_twist", "body_pitch_error",
+    "residual_air", "downwash", "wake_tip_loss", "translation", "rotational_circulation", "viscous", "zero_lift_angle",
+    "lift_curve", "leading_edge_suction", "stall_vortex", "varying_coefficients", "inertial", "wing_acceleration",
+    "added_mass", "added_mass_error", "wing_mass_error", "effective_chord", "mass_offset", "body_drag", "tail_lift",
 )  # fmt: skip
 ALONE = {"rotational_circulation": "rotation"}  # other names of the terms that the library's effects are
 # Genes of the library's effects whose meaning differs from the law's, at the values that come nearest.
 NEAREST: dict[str, Genes] = {
+    "elastic_twist": lambda p: {"compliance": p["strength"]},
     "translation": lambda p: {"coefficient": 1.8 * p["strength"]},  # the largest lift of either
     "viscous": lambda p: {"friction": 0.39 * p["strength"], "pressure": 3.46 * p["strength"]},
     "downwash": lambda p: {"share": p["strength"]},

@@ -9,6 +9,7 @@ import numpy as np
 from benchmarks.concealed.plant.law import Concealed, Law, strength
 from benchmarks.concealed.plant.vehicle.flow import Array
 
+_DAMPER, _HELD = 0.005, 6  # of a wing that yields: delay in beats, harmonics
 _LARGEST = 0.999  # sine of half the largest deviation of the pitch
 
 
@@ -49,6 +50,16 @@ def pitched(pitch: Array, rest: float, hidden: Concealed) -> Array:
     return np.asarray(pitch + strength(hidden, "wing_pitch_zero"))
 
 
+def yielded(moment: Array, part: float) -> Array:
+    """Twist [n] (rad) by a ``moment`` [n] over a beat, of a wing on a spring and damper (Flügge 1975, ch. 1).
+
+    ``part``: rad per unit of the moment, at rest. Above its lowest harmonics, the wing's inertia holds it.
+    """
+    spectrum = np.fft.rfft(part * moment)
+    k = np.arange(len(spectrum))
+    return np.fft.irfft(spectrum * (k <= _HELD) / (1.0 + 2j * np.pi * _DAMPER * k), len(moment))
+
+
 _listed = partial(Law, side="physics")
 MOTION = (
     _listed(
@@ -84,5 +95,10 @@ MOTION = (
         typical=0.02,
         source="Flügge (1975): spring and damper, in place of a delay alike for all harmonics",
         values=lambda p: {"wing_pitch_phase.lag": p["strength"]},
+    ),
+    _listed(
+        "elastic_twist",
+        typical=0.1,
+        source="Bisplinghoff, Ashley and Halfman (1955), Aeroelasticity, ch. 8: torsion by the moment of the air",
     ),
 )

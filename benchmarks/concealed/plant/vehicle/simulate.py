@@ -27,7 +27,7 @@ from benchmarks.concealed.plant.vehicle.laws_circulation import (
     wake_tip,
 )
 from benchmarks.concealed.plant.vehicle.laws_inertia import moved_air, wing_inertia, wing_mass
-from benchmarks.concealed.plant.vehicle.laws_motion import flapped, pitched
+from benchmarks.concealed.plant.vehicle.laws_motion import flapped, pitched, yielded
 from benchmarks.concealed.plant.vehicle.laws_stream import deflected, disc_inflow, flown
 from wingfit.records import Condition, FourierFlap, FourierPitch, SplitCycleFlap, Vehicle
 from wingfit.records.vehicle import Flap
@@ -42,6 +42,7 @@ _FINE = 4096  # samples of the flap law for its Fourier series
 _HARMONICS = 100
 _NODES = 10  # Gauss points between two stations
 _ROUNDS, _COARSE, _SETTLED = 40, 120, 1e-5  # of the inflow: iterations, instants, m/s
+_TWISTS, _STILL, _PRESSURE = 80, 1e-6, 10.0  # of the twist: iterations, rad, Pa
 
 
 @dataclass(frozen=True)
@@ -83,14 +84,21 @@ def simulate(
     air = flown(condition, hidden)
     if strength(hidden, "varying_coefficients"):
         coefficients = varied(coefficients, condition, hidden["varying_coefficients"])
-    inflow = None
+    inflow = twist = None
+    if strength(hidden, "elastic_twist"):
+        twist = _twist(vehicle, coefficients, air, hidden, terms)
     if strength(hidden, "induced_inflow"):
         inflow = _inflow(vehicle, coefficients, air, hidden, terms, instants)
-    return _forces(vehicle, coefficients, air, hidden, terms, instants, inflow)[0]
+    return _forces(vehicle, coefficients, air, hidden, terms, instants, inflow, twist)[0]
 
 
-def motion_of(vehicle: Vehicle, frequency: float, instants: int, hidden: Concealed) -> Motion:
-    """Flap and pitch angle with two time derivatives, at ``instants`` equal steps of a beat of ``frequency`` (Hz)."""
+def motion_of(
+    vehicle: Vehicle, frequency: float, instants: int, hidden: Concealed, twist: Array | None = None
+) -> Motion:
+    """Flap and pitch angle with two time derivatives, at ``instants`` equal steps of a beat of ``frequency`` (Hz).
+
+    ``twist``: rad, added to the pitch at equal steps of a beat.
+    """
     flap = flapped(_flap_samples(vehicle.motion.flap), hidden)
     rates = [_derived(flap, frequency, order) for order in range(4)]
     law = vehicle.motion.pitch
@@ -99,7 +107,10 @@ def motion_of(vehicle: Vehicle, frequency: float, instants: int, hidden: Conceal
     else:
         rest = np.pi / 2 + law.constant
         samples = rest + law.flap * rates[0] + law.flap_rate * rates[1] + law.flap_rate_squared * rates[1] ** 2
-    pitch = [_derived(pitched(samples, rest, hidden), frequency, order) for order in range(3)]
+    samples = pitched(samples, rest, hidden)
+    if twist is not None:
+        samples = samples + np.fft.irfft(np.fft.rfft(twist) * (_FINE / len(twist)), _FINE)
+    pitch = [_derived(samples, frequency, order) for order in range(3)]
     keep = _FINE / instants * np.arange(instants)
     grid = np.arange(_FINE + 1)
     both = [np.stack([np.interp(keep, grid, np.append(a, a[0])) for a in these]) for these in (rates[:3], pitch)]
@@ -166,12 +177,13 @@ def _forces(
     terms: tuple[str, ...],
     instants: int,
     inflow: Array | None,
+    twist: Array | None = None,
 ) -> tuple[Array, Array]:
     """Forces [n, 2] of all wings along body x and z, and the part along x [n] due to circulation and drag, N.
 
-    ``inflow`` [n]: induced velocity at the wing tips, m/s, or None.
+    ``inflow`` [n]: induced velocity at the wing tips, m/s, or None. ``twist``: of the wings besides their motion, rad.
     """
-    motion = motion_of(vehicle, air.flap_frequency, instants, hidden)
+    motion = motion_of(vehicle, air.flap_frequency, instants, hidden, twist)
     r, chord, width = _elements(vehicle)
     total, carried = np.zeros((instants, 2)), np.zeros(instants)
     alike = 1.0 if vehicle.layout == "single" else 2.0
@@ -336,6 +348,28 @@ def _inertia(flow: Flow, stream: Complex, vehicle: Vehicle, hidden: Concealed, t
     rate = flow.turned(flow.own_rate) - 1j * flow.turn * stream - 0.5j * chord * flow.turn_rate
     force = inertial * flow.turn * turning - moved * (along * rate.real + 1j * across * rate.imag)
     return np.asarray(force + wing_inertia(flow, own, vehicle, hidden))
+
+
+def _twist(
+    vehicle: Vehicle, coefficients: Mapping[str, float], air: Condition, hidden: Concealed, terms: tuple[str, ...]
+) -> Array:
+    """Twist [_COARSE] (rad) at the pitch station, by iteration with the moment of the air that it reduces.
+
+    ValueError if the iteration does not converge.
+    """
+    (r, chord, width), twist, share = _elements(vehicle), np.zeros(_COARSE), hidden["elastic_twist"]["strength"]
+    sides = (1.0, -1.0) if vehicle.layout == "x4" else (1.0,)
+    for _ in range(_TWISTS):
+        motion, moment = motion_of(vehicle, air.flap_frequency, _COARSE, hidden, twist), np.zeros(_COARSE)
+        for sign in sides:
+            flow = _flow(vehicle, air, motion, r, chord, sign)
+            force = flow.turned(_element_forces(flow, vehicle, coefficients, air, hidden, terms, None)[0])
+            moment -= force.imag @ (width * chord) / (len(sides) * _PRESSURE * (width @ chord**2))
+        change = 0.3 * (yielded(moment, share) - twist)
+        twist = twist + change
+        if np.abs(change).max() < _STILL:
+            return twist
+    raise ValueError(f"the twist at {air.airspeed:g} m/s does not converge; choose a strength below {share:g}")
 
 
 def _inflow(
