@@ -38,6 +38,8 @@ from wingfit.diagnosis.verdict.reservations import (
     accepted_error_sentence,
     accepted_sentence,
     candidate_sentence,
+    discretisation_sentence,
+    doubted_by_discretisation,
     doubted_by_held_out,
     held_out_sentence,
     judged_by_accepted_error,
@@ -69,7 +71,8 @@ def build_finding(
     nominal, weights = state.fitted_nominal.refit, state.final_weights
     floor = state.floor(_discretisation_error(state))
     decision = judged_by_accepted_error(decide(weights), state.data, weights, floor)
-    decision = certain = partly(decision, state.data, nominal, floor)
+    decision = partly(decision, state.data, nominal, floor)
+    certain = doubted_by_discretisation(decision, state.data, nominal, _proven(state), weights.floor)
     doubt = MistakeDoubt(mistakes, [one.name for one in state.suspects], state.spec.calibration.effects)
     decision = doubt.applied(certain)
     best = nominal if decision.verdict == "adequate" else decision.best
@@ -162,6 +165,7 @@ def _finding(
         summary=summary(decision, suspects, _summary_texts(data, nominal, best, located, proved))
         + ("" if data.kind == "series" else _drift_sentence(data, nominal, best))
         + remaining_sentence(data, decision, best, floor, weights.floor)
+        + discretisation_sentence(decision, data, nominal, _proven(state), weights.floor)
         + missed_sentence(data, decision, nominal, weights.floor)
         + candidate_sentence(data, decision, weights, suspects)
         + accepted_error_sentence(decided, judged_by_accepted_error(decided, data, weights, floor))
@@ -216,6 +220,11 @@ def _discretisation_error(state: SearchState) -> float:
         return state.fitted_nominal.remaining_error
     least = min(one.excess for one in state.final_weights.refits)
     return min(state.fitted_nominal.possible_error, float(np.sqrt(max(least, 0.0))))
+
+
+def _proven(state: SearchState) -> float:
+    """Return the floor (m or N) with what fits of finer discretisations have shown of the error."""
+    return state.floor(state.fitted_nominal.remaining_error)
 
 
 def _floors(state: SearchState) -> Floors:

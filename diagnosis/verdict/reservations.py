@@ -61,12 +61,9 @@ def remaining_sentence(data: WhitenedData, decision: Decision, best: Refit, floo
     if decision.verdict == "adequate" and data.accepted:  # what accepted_sentence says
         return ""
     share = "" if data.unit == "noise" else f", {size / data.noise:.2g} times the noise"
-    if nominal_refuted(data, beyond_chance(data, best), floor):
-        return (
-            f" A misfit of {amount(size, data.unit)} beyond the noise remains{share}: the law has another form, or "
-            "something else is missing too."
-        )
     start = f" A misfit of {amount(size, data.unit)} beyond the noise remains{share}"
+    if nominal_refuted(data, beyond_chance(data, best), weighed if decision.verdict == "adequate" else floor):
+        return f"{start}: the law has another form, or something else is missing too."
     if large_rest(data, best, weighed):
         also = "" if decision.verdict == "adequate" else " too"
         return (
@@ -75,6 +72,35 @@ def remaining_sentence(data: WhitenedData, decision: Decision, best: Refit, floo
     if decision.verdict == "adequate" and missed(data, best, weighed):
         return f"{start}."
     return f"{start}, no more than errors of the noise and of the discretisation explain."
+
+
+def doubted_by_discretisation(
+    decision: Decision, data: WhitenedData, nominal: Refit, proven: float, weighed: float
+) -> Decision:
+    """Return an adequate ``decision`` with a limited probability where only an unproven error excuses its misfit.
+
+    ``weighed`` (m or N): discretisation error with which the hypotheses were weighed; ``proven``: the part that fits of
+    finer discretisations have shown. What they only might show excuses less (`Policy.doubted_noise`).
+    """
+    excused = _excused(decision, data, nominal, proven, weighed)
+    return _at_most(decision, data.policy.doubted_noise) if excused else decision
+
+
+def discretisation_sentence(
+    decision: Decision, data: WhitenedData, nominal: Refit, proven: float, weighed: float
+) -> str:
+    """Return a sentence on what :func:`doubted_by_discretisation` doubts; else empty."""
+    if not _excused(decision, data, nominal, proven, weighed):
+        return ""
+    return (
+        " Only the discretisation may explain that, and no finer one was fitted: repeat the diagnosis with refinement."
+    )
+
+
+def _excused(decision: Decision, data: WhitenedData, nominal: Refit, proven: float, weighed: float) -> bool:
+    if decision.verdict != "adequate" or weighed <= proven:
+        return False
+    return nominal_refuted(data, beyond_chance(data, nominal), proven) or large_rest(data, nominal, proven)
 
 
 def candidate_sentence(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal, get_args
@@ -21,20 +21,28 @@ from wingfit.sim.vehicle.stations import STATIONS, Stations, span_sums, stations
 
 ROTATION_POINT = 0.75  # Eq. 4
 TWIST_INSTANTS, TWIST_ROUNDS = 80, 12  # of a twist that changes the flow by which it arises
-RELAXATION = (0.05, 1.0)  # of the rounds
+RELAXATION, MEMORY, SMALLEST = 0.5, 5, 1e-12  # of the rounds: step, how many count, damping
 # Stages of a scene, in order: each reads what the stages before have changed.
 Stage = Literal["twist", "mass", "inflow", "wake", "circulation"]
 Change = Callable[["VehicleScene", Mapping[str, Array]], None]
 
 
-def _relaxed(step: Array, last: Complex, rest: Complex) -> Array:
-    """Return the next relaxation [B] of an iteration with the residuals ``last`` and ``rest`` [B, K] (Aitken).
+def _mixed(tried: Sequence[Complex], rests: Sequence[Complex]) -> Complex:
+    """Return the next iterate [B, K] after those ``tried`` with the residuals ``rests``, oldest first (Anderson).
 
-    Küttler and Wall (2008), Comput. Mech. 43, 61, Eq. 44, within bounds.
+    Walker and Ni (2011), SIAM J. Numer. Anal. 49, 1715, Eq. 2.2 with a relaxation: least squares of the residual.
     """
-    change = rest - last
-    square, along = (np.sum((change.conj() * one).real, axis=1) for one in (change, last))
-    return np.asarray(np.clip(-step * along / np.maximum(square, 1e-300), *RELAXATION))
+    step = tried[-1] + RELAXATION * rests[-1]
+    if len(tried) == 1:
+        return step
+    changes, moves = (np.diff(np.stack(one, axis=-1)) for one in (rests, tried))  # [B, K, m]
+    square = np.sum((changes.conj()[..., :, None] * changes[..., None, :]).real, axis=1)
+    along = np.sum((changes.conj() * rests[-1][..., None]).real, axis=1)
+    size = np.trace(square, axis1=1, axis2=2)[:, None, None]
+    share = np.linalg.solve(square + (SMALLEST * size + 1e-300) * np.eye(square.shape[1]), along[..., None])[
+        :, None, :, 0
+    ]
+    return np.asarray(step - np.sum((moves + RELAXATION * changes) * share, axis=2))
 
 
 @dataclass(frozen=True)
@@ -169,15 +177,14 @@ class VehicleScene:
         """
         count = self.setting.instants
         every = max(k for k in range(1, max(count // TWIST_INSTANTS, 1) + 1) if count % k == 0)
-        angle, step, last = np.zeros((len(self), harmonics + 1), complex), np.full(len(self), 0.5), None
+        angle, tried, rests = np.zeros((len(self), harmonics + 1), complex), list[Complex](), list[Complex]()
         for _ in range(TWIST_ROUNDS):
             wings = self._twisted(angle).wings.every(every)
             found = law(wings, wings.flow(self.forward(self.inflow)[:, ::every]))
             target = np.fft.rfft(found)[:, : harmonics + 1] * (2.0 / found.shape[1])
             target[:, 0] *= 0.5
-            rest = target - angle
-            step = step if last is None else _relaxed(step, last, rest)
-            angle, last = angle + step[:, None] * rest, rest
+            tried, rests = [*tried[-MEMORY:], angle], [*rests[-MEMORY:], target - angle]
+            angle = _mixed(tried, rests)
         self.pitch = self.pitch._replace(more=angle)
 
     def _twisted(self, angle: Complex) -> VehicleScene:

@@ -11,6 +11,7 @@ from tests.diagnosis.verdict.refits import data, refit
 from wingfit.diagnosis.finding import Interval
 from wingfit.diagnosis.policy import POLICY
 from wingfit.diagnosis.verdict import weigh_hypotheses
+from wingfit.diagnosis.verdict.reservations import discretisation_sentence, doubted_by_discretisation
 from wingfit.diagnosis.verdict.verdict import _as_decided, decide
 from wingfit.diagnosis.verdict.weigh_hypotheses import nominal_suffices, weigh
 
@@ -34,6 +35,21 @@ def test_a_model_that_misses_one_recording_is_not_surely_adequate() -> None:
         assert found.verdict == "adequate"
         assert found.probabilities["adequate"] == pytest.approx(most, abs=0.05)
         assert nominal_suffices(one, refit(0.05), 40) == (most == 1.0)
+
+
+def test_a_misfit_that_only_an_untried_discretisation_excuses_leaves_a_doubt() -> None:
+    """Tracks of a coarse wing with a floor of one noise, of which a fit of a finer one has shown a part, or nothing."""
+    left, weighed = refit(0.8), 1.0
+    certain = decide(weigh(data(), left, [], weighed, 40))
+    assert certain.verdict == "adequate"
+    assert certain.probabilities["adequate"] > POLICY.doubted_noise
+    doubted = doubted_by_discretisation(certain, data(), left, 0.0, weighed)
+    assert doubted.probabilities["adequate"] == POLICY.doubted_noise
+    assert sum(doubted.probabilities.values()) == pytest.approx(1.0)
+    assert "repeat the diagnosis with refinement" in discretisation_sentence(doubted, data(), left, 0.0, weighed)
+    for nominal, proven in ((left, 0.8), (left, weighed), (refit(0.2), 0.0)):
+        assert doubted_by_discretisation(certain, data(), nominal, proven, weighed) is certain
+        assert not discretisation_sentence(certain, data(), nominal, proven, weighed)
 
 
 def test_a_drift_is_not_adequate_even_where_the_mean_beat_fits() -> None:
