@@ -27,6 +27,7 @@ from wingfit.diagnosis.verdict.held_out import held_out_refutes
 from wingfit.diagnosis.verdict.locate_in_beat import locate_in_beat
 from wingfit.diagnosis.verdict.mistakes import MistakeDoubt
 from wingfit.diagnosis.verdict.noise_remarks import drift_sentence, marker_remarks, noise_remarks
+from wingfit.diagnosis.verdict.odd_recording import OddRecording, odd_recordings
 from wingfit.diagnosis.verdict.proof import (
     ResidualPair,
     fitted_residuals,
@@ -86,6 +87,10 @@ def build_finding(
         and validation is not None
         and held_out_refutes(state.context, best.fit, validation, state.floor(_discretisation_error(state)))
     )
+    odd: tuple[OddRecording, ...] = ()
+    for stage, found_odd in odd_recordings(state, held_out) if decision.verdict != "adequate" else ():
+        odd = found_odd
+        yield 0.1, stage, None
     located: Located | None = None
     for fraction, stage, found in _locate(state, decision, best, own, validation, refuted=refuted):
         located = found
@@ -98,7 +103,7 @@ def build_finding(
         for part, ranked in advise(state.context, state.final_weights, floor, rest=rest):
             advice = ranked
             yield 0.75 + 0.2 * part, "comparing what to record next", None
-    finding = _finding(state, name, decision, best, own, validation, advice, located, refuted=refuted)
+    finding = _finding(state, name, decision, best, own, validation, advice, located, odd, refuted=refuted)
     finding = replace(finding, remarks=(*finding.remarks, *failed))
     yield 1.0, "done", doubt.stated(finding, certain, decision)
 
@@ -143,6 +148,7 @@ def _finding(
     validation: ResidualPair | None,
     advice: tuple[Advice, ...],
     located: Located,
+    odd: tuple[OddRecording, ...],
     *,
     refuted: bool,
 ) -> Finding:
@@ -171,7 +177,8 @@ def _finding(
         + accepted_error_sentence(decided, judged_by_accepted_error(decided, data, weights, floor))
         + accepted_sentence(data, decision, nominal, floor)
         + noise_sentence(data, decision, nominal)
-        + held_out_sentence(first, proved, data, refuted=refuted),
+        + held_out_sentence(first, proved, data, refuted=refuted)
+        + "".join(one.sentence(unit) for one in odd),
         probabilities=decision.probabilities,
         named=decision.named,
         added_effects=best.names,
@@ -199,7 +206,7 @@ def _finding(
             *marker_remarks(data, state.position_errors, best.fit),
             *_unidentified_sizes(genes, best),
             *_worsened(rows, best, unit),
-            *_outlying(rows, unit),
+            *(() if odd else _outlying(rows, unit)),
         ),
     )
 

@@ -71,9 +71,7 @@ def predict_held_out(
     for recording in recordings:
         one, found, reasons = fitted.like([recording]), [], []
         for fit in (before, after):
-            residuals, reason = _predicted(one, context, fit)
-            if reason is None:
-                (residuals,) = _corrected(one, context, errors, fit, (residuals,))
+            residuals, reason = predicted_residuals(one, context, errors, fit)
             found.append(residuals)
             reasons.append(reason)
         incomplete = incomplete or reasons[1] is not None
@@ -90,14 +88,21 @@ def predict_held_out(
     return ResidualPair(data, before_all, after_all, incomplete), tuple(failed)
 
 
-def _predicted(one: WhitenedData, context: FitContext, fit: Fit) -> tuple[Array, str | None]:
-    """Return the residuals [T, C] of the only recording of ``one`` with the genes of ``fit``, and why it failed."""
+def predicted_residuals(
+    one: WhitenedData, context: FitContext, errors: PositionErrors | None, fit: Fit
+) -> tuple[Array, str | None]:
+    """Return the residuals [T, C] of the only recording of ``one`` with the genes of ``fit``, and why it failed.
+
+    Arguments as of :func:`predict_held_out`.
+    """
     try:
         problem, values = with_own_genes(one, context, fit)
     except FIT_ERRORS as error:
         return np.empty(0), str(error)
     _, (reason,), (residuals,) = one.evaluate(problem, context.evaluator, values)
-    return residuals[0], reason
+    if reason is not None:
+        return np.empty(0), reason
+    return _corrected(one, context, errors, fit, (residuals[0],))[0], None
 
 
 def _corrected(
@@ -168,6 +173,15 @@ def proof(predicted: ResidualPair, floor: float, unit: str, *, effects_added: bo
     if effects_added and not better:
         words += "; the improvement is not significant"
     return Proof(_relative_to_floor(before, least), _relative_to_floor(after, least), least, better, words)
+
+
+def misfit_to_floor(one: WhitenedData, residuals: Array, floor: float) -> tuple[float, float]:
+    """Return the misfit of the only recording of ``one`` over the one to be expected, and itself (RMS, m or N).
+
+    ``residuals`` [T, C]; ``floor`` (m or N): discretisation error.
+    """
+    misfit = _misfits(ResidualPair(one, (residuals,), (residuals,)))[0].value
+    return misfit / _least(one.noise, floor, one), misfit
 
 
 def _least(noise: float, floor: float, data: WhitenedData) -> float:

@@ -1,0 +1,184 @@
+"""Find one recording without which the nominal model fits all others.
+
+Then what is missing lies in that recording alone: a mistake in it, such as a wrong condition or an axis, or physics
+that acts only there. The genes cannot show which, but a condition with which the model fits that recording, too, is
+the most likely mistake.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from wingfit.diagnosis.evidence.fit import FIT_ERRORS, PRIOR_SD, Fit, gauss_newton_fit
+from wingfit.diagnosis.evidence.refit import make_refit
+from wingfit.diagnosis.finding import amount
+from wingfit.diagnosis.search_state import SearchState
+from wingfit.diagnosis.verdict.proof import misfit_to_floor, predicted_residuals
+from wingfit.diagnosis.verdict.weigh_hypotheses import beyond_chance, large_rest, missed, nominal_refuted
+from wingfit.inference.gauss_newton import Quadratic
+from wingfit.records import AnyRecording, Condition, Recording
+from wingfit.records.array_types import Array, Float
+
+FEWEST_OTHERS = 3  # recordings that are fitted without the odd one; two agree with almost any genes
+PROMISING = 0.5  # of the excess: a recording without which the linearised model leaves more is not tried
+MOST_TRIED = 3
+STEPS = 8  # of a fit without one recording
+FITS, ODD = 1.25, 1.5  # misfit over the expected one: at most of what is predicted, and at least of what is odd
+CONDITION_STEPS, DIFFERENCE, LARGEST_STEP = 5, 0.02, 0.5  # of the fit of a condition, in logarithms or rad
+
+Name = Literal["airspeed", "angle_of_attack", "pressure", "phase_lag"]
+LABELS: dict[Name, tuple[str, str, float]] = {
+    "airspeed": ("airspeed", "m/s", 1.0),
+    "angle_of_attack": ("angle of attack", "deg", 180.0 / np.pi),
+    "pressure": ("air pressure", "mbar", 0.01),
+    "phase_lag": ("phase lag", "deg", 180.0 / np.pi),
+}
+IN_LOGARITHM: tuple[Name, ...] = ("airspeed", "pressure")
+
+
+@dataclass(frozen=True)
+class OddRecording:
+    """A recording ``name`` without which the model fits all others, which predict it with a ``misfit`` (m or N).
+
+    ``would_fit``: in words, each condition with which the model fits it, too.
+    """
+
+    name: str
+    misfit: float
+    would_fit: tuple[str, ...]
+
+    def sentence(self, unit: str) -> str:
+        """Return what the summary says of it; ``unit``: of the misfit."""
+        found = (
+            f" Without {self.name} the model fits all other recordings, and misses it by {amount(self.misfit, unit)}"
+        )
+        if self.would_fit:
+            return f"{found}: it would fit with {' or '.join(self.would_fit)}. Check the condition of that recording."
+        return f"{found}: something acts there alone, or that recording is wrong (condition, axes, scale, start)."
+
+
+def odd_recordings(
+    state: SearchState, held_out: Sequence[AnyRecording]
+) -> Iterator[tuple[str, tuple[OddRecording, ...]]]:
+    """Yield what is done and the recordings found so far, each of which may be the odd one.
+
+    ``held_out`` recordings must be predicted, too. None is found where the recordings are series.
+    """
+    found: tuple[OddRecording, ...] = ()
+    data, nominal = state.data, state.fitted_nominal.refit
+    if data.kind == "series" or len(data.recordings) <= FEWEST_OTHERS:
+        return
+    moves = [_move(state, r) for r in range(len(data.recordings))]
+    left = np.array([_left(state, r, move) for r, move in enumerate(moves)])
+    for r in np.argsort(left)[:MOST_TRIED].tolist():
+        if left[r] > PROMISING * nominal.excess:
+            break
+        one = data.recordings[r]
+        yield f"fitting without {one.name}", found
+        others = _without(state, r, nominal.fit.unit + moves[r])
+        if others is not None and isinstance(one, Recording):
+            found = (*found, *_judged(*others, one, held_out))
+    yield "fitted without single recordings", found
+
+
+def _move(state: SearchState, r: int) -> Float[Array, " F"]:
+    """Return the move [F] of the nominal genes in unit coordinates that fits all recordings but ``r`` (linearised)."""
+    data, fit = state.data, state.fitted_nominal.refit.fit
+    white, slopes = data.whiten(fit.coefficients), data.whitened_slopes(fit.jacobian)
+    kept = np.ones(len(white), bool)
+    kept[data.recording_slices[r]] = False
+    prior = np.eye(len(fit.unit)) / PRIOR_SD**2
+    gram, score = slopes[kept].T @ slopes[kept], slopes[kept].T @ white[kept]
+    return Quadratic(gram + prior, score + prior @ (fit.unit - 0.5)).step(fit.unit, np.zeros(len(fit.unit)))
+
+
+def _left(state: SearchState, r: int, move: Float[Array, " F"]) -> float:
+    """Return the excess (m^2 or N^2) of all recordings but ``r`` after the ``move`` [F] of the linearised model."""
+    data, fit = state.data, state.fitted_nominal.refit.fit
+    every = data.excess_by_recording(fit.coefficients + fit.jacobian @ move)
+    share = np.delete(data.recording_weights, r)
+    return float(share @ np.delete(every, r) / share.sum())
+
+
+def _without(state: SearchState, r: int, start: Float[Array, " F"]) -> tuple[SearchState, Fit] | None:
+    """Fit the nominal model to all recordings but ``r``, from ``start`` [F]; None if it leaves more than noise does."""
+    data, problem = state.data, state.fitted_nominal.refit.fit.problem
+    kept = tuple(one for k, one in enumerate(data.recordings) if k != r)
+    context = replace(state.context, data=data.like(kept))
+    part = replace(state, context=context, position_errors=None, initial_fit=None)
+    try:
+        *_, fit = gauss_newton_fit(context, replace(problem, recordings=kept), np.clip(start, 0.0, 1.0), STEPS)
+    except FIT_ERRORS:
+        return None
+    if part.allow_for_position_errors(fit):
+        fit = part.fitted_again(fit)
+    refit, floor = make_refit(part.data, fit), _floor(part)
+    refuted = nominal_refuted(part.data, beyond_chance(part.data, refit), floor)
+    return None if refuted or large_rest(part.data, refit, floor) or missed(part.data, refit, floor) else (part, fit)
+
+
+def _floor(state: SearchState) -> float:
+    return state.floor(state.fitted_nominal.remaining_error)
+
+
+def _judged(part: SearchState, fit: Fit, one: Recording, held_out: Sequence[AnyRecording]) -> list[OddRecording]:
+    """Return ``one`` if the ``fit`` to the others of ``part`` predicts those held out, and misses it; else nothing."""
+    if any(_ratio(part, fit, other)[0] > FITS for other in held_out):
+        return []
+    ratio, misfit = _ratio(part, fit, one)
+    if ratio < ODD:
+        return []
+    return [OddRecording(one.name, misfit, tuple(_would_fit(part, fit, one)))]
+
+
+def _ratio(part: SearchState, fit: Fit, recording: AnyRecording) -> tuple[float, float]:
+    """Return the misfit of ``recording`` over the one to be expected, and itself (m or N); infinite if it fails."""
+    one = part.data.like([recording])
+    residuals, reason = predicted_residuals(one, part.context, part.position_errors, fit)
+    return (np.inf, np.inf) if reason else misfit_to_floor(one, residuals, _floor(part))
+
+
+def _would_fit(part: SearchState, fit: Fit, one: Recording) -> Iterator[str]:
+    """Yield each condition, in words, with which the ``fit`` to the others of ``part`` predicts ``one``."""
+    for name in ("airspeed", "angle_of_attack", "pressure", "phase_lag"):
+        if name in {"airspeed", "angle_of_attack"} and not one.condition.airspeed:
+            continue
+        changed = _with_condition(part, fit, one, name)
+        if changed is not None and _ratio(part, fit, changed)[0] <= FITS:
+            label, unit, factor = LABELS[name]
+            found, stated = (factor * getattr(rec.condition, name) for rec in (changed, one))
+            yield f"an {label} of {found:.3g} {unit} (stated: {stated:.3g})".replace("an phase", "a phase")
+
+
+def _with_condition(part: SearchState, fit: Fit, one: Recording, name: Name) -> Recording | None:
+    """Return ``one`` with the value of the condition ``name`` that fits best; None where that cannot be simulated."""
+
+    def white(change: float) -> Array | None:
+        data = part.data.like([_changed(one, name, change)])
+        residuals, reason = predicted_residuals(data, part.context, part.position_errors, fit)
+        return None if reason else data.whiten(data.coefficients_of([residuals]))
+
+    change, now = 0.0, white(0.0)
+    for _ in range(CONDITION_STEPS):
+        beside = white(change + DIFFERENCE)
+        if now is None or beside is None:
+            return None
+        slope = (beside - now) / DIFFERENCE
+        size = float(slope @ slope)
+        if size == 0.0:
+            return None
+        change += float(np.clip(-(slope @ now) / size, -LARGEST_STEP, LARGEST_STEP))
+        now = white(change)
+    return None if now is None else _changed(one, name, change)
+
+
+def _changed(one: Recording, name: Name, change: float) -> Recording:
+    """Return ``one`` with the condition ``name`` changed, in its logarithm or by an angle (rad)."""
+    condition: Condition = one.condition
+    stated = float(getattr(condition, name))
+    value = stated * float(np.exp(change)) if name in IN_LOGARITHM else stated + change
+    return replace(one, condition=replace(condition, **{name: value}))
