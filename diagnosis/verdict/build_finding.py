@@ -27,7 +27,7 @@ from wingfit.diagnosis.verdict.held_out import held_out_refutes
 from wingfit.diagnosis.verdict.locate_in_beat import locate_in_beat
 from wingfit.diagnosis.verdict.mistakes import MistakeDoubt
 from wingfit.diagnosis.verdict.noise_remarks import drift_sentence, marker_remarks, noise_remarks
-from wingfit.diagnosis.verdict.odd_recording import OddRecording, odd_recordings
+from wingfit.diagnosis.verdict.odd_recording import OddRecording, doubted_by_odd, odd_recordings
 from wingfit.diagnosis.verdict.proof import (
     ResidualPair,
     fitted_residuals,
@@ -76,8 +76,13 @@ def build_finding(
     certain = doubted_by_discretisation(decision, state.data, nominal, _proven(state), weights.floor)
     doubt = MistakeDoubt(mistakes, [one.name for one in state.suspects], state.spec.calibration.effects)
     decision = doubt.applied(certain)
+    odd: tuple[OddRecording, ...] = ()
+    for stage, found_odd in odd_recordings(state, held_out) if decision.verdict != "adequate" else ():
+        odd = found_odd
+        yield 0.0, stage, None
+    decision = doubted_by_odd(decision, odd)
     best = nominal if decision.verdict == "adequate" else decision.best
-    yield 0.0, "computing the intervals of the genes", None
+    yield 0.03, "computing the intervals of the genes", None
     best = replace(best, fit=with_measured_jacobian(state.context, best.fit))
     yield 0.05, "predicting the held-out recordings", None
     validation, failed = predict_held_out(held_out, state.context, state.position_errors, nominal.fit, best.fit)
@@ -87,10 +92,6 @@ def build_finding(
         and validation is not None
         and held_out_refutes(state.context, best.fit, validation, state.floor(_discretisation_error(state)))
     )
-    odd: tuple[OddRecording, ...] = ()
-    for stage, found_odd in odd_recordings(state, held_out) if decision.verdict != "adequate" else ():
-        odd = found_odd
-        yield 0.1, stage, None
     located: Located | None = None
     for fraction, stage, found in _locate(state, decision, best, own, validation, refuted=refuted):
         located = found

@@ -17,7 +17,10 @@ from wingfit.diagnosis.evidence.fit import FIT_ERRORS, PRIOR_SD, Fit, gauss_newt
 from wingfit.diagnosis.evidence.refit import make_refit
 from wingfit.diagnosis.finding import amount
 from wingfit.diagnosis.search_state import SearchState
+from wingfit.diagnosis.verdict.mistakes import LIKELY
 from wingfit.diagnosis.verdict.proof import misfit_to_floor, predicted_residuals
+from wingfit.diagnosis.verdict.reservations import CLAIMING, without_names
+from wingfit.diagnosis.verdict.verdict import Decision
 from wingfit.diagnosis.verdict.weigh_hypotheses import beyond_chance, large_rest, missed, nominal_refuted
 from wingfit.inference.gauss_newton import Quadratic
 from wingfit.records import AnyRecording, Condition, Recording
@@ -28,6 +31,7 @@ PROMISING = 0.5  # of the excess: a recording without which the linearised model
 MOST_TRIED = 3
 STEPS = 8  # of a fit without one recording
 FITS, ODD = 1.25, 1.5  # misfit over the expected one: at most of what is predicted, and at least of what is odd
+DETERMINED = 4.0  # least misfit over what errors of the genes make
 CONDITION_STEPS, DIFFERENCE, LARGEST_STEP = 5, 0.02, 0.5  # of the fit of a condition, in logarithms or rad
 
 Name = Literal["airspeed", "angle_of_attack", "pressure", "phase_lag"]
@@ -61,6 +65,11 @@ class OddRecording:
         return f"{found}: something acts there alone, or that recording is wrong (condition, axes, scale, start)."
 
 
+def doubted_by_odd(decision: Decision, odd: Sequence[OddRecording]) -> Decision:
+    """Return ``decision`` without names where all that is missing lies in one recording: it may be wrong instead."""
+    return without_names(decision, LIKELY) if odd and decision.verdict in CLAIMING else decision
+
+
 def odd_recordings(
     state: SearchState, held_out: Sequence[AnyRecording]
 ) -> Iterator[tuple[str, tuple[OddRecording, ...]]]:
@@ -81,7 +90,7 @@ def odd_recordings(
         yield f"fitting without {one.name}", found
         others = _without(state, r, nominal.fit.unit + moves[r])
         if others is not None and isinstance(one, Recording):
-            found = (*found, *_judged(*others, one, held_out))
+            found = (*found, *_judged(*others, one, held_out, _by_genes(state, r, *others)))
     yield "fitted without single recordings", found
 
 
@@ -125,12 +134,30 @@ def _floor(state: SearchState) -> float:
     return state.floor(state.fitted_nominal.remaining_error)
 
 
-def _judged(part: SearchState, fit: Fit, one: Recording, held_out: Sequence[AnyRecording]) -> list[OddRecording]:
-    """Return ``one`` if the ``fit`` to the others of ``part`` predicts those held out, and misses it; else nothing."""
+def _by_genes(state: SearchState, r: int, part: SearchState, fit: Fit) -> float:
+    """Return the mean square (m^2 or N^2) that errors of the genes of ``fit`` make in recording ``r`` (linearised)."""
+    data, slopes = state.data, part.data.whitened_slopes(fit.jacobian)
+    covariance = np.linalg.inv(
+        part.data.likelihood_weight(fit.coefficients) * slopes.T @ slopes + np.eye(len(fit.unit)) / PRIOR_SD**2
+    )
+    rows = data.recording_slices[r]
+    own = state.fitted_nominal.refit.fit.jacobian[rows]
+    moved = data.weight[rows] @ np.einsum("df,fg,dg->d", own, covariance, own, optimize=True)
+    return float(moved / data.recording_weights[r])
+
+
+def _judged(
+    part: SearchState, fit: Fit, one: Recording, held_out: Sequence[AnyRecording], by_genes: float
+) -> list[OddRecording]:
+    """Return ``one`` if the ``fit`` to the others of ``part`` predicts those held out, and misses it; else nothing.
+
+    ``by_genes`` (m^2 or N^2): what errors of the genes make in it. Where they could make the misfit, as with the only
+    recording in air, the others do not say what it should be.
+    """
     if any(_ratio(part, fit, other)[0] > FITS for other in held_out):
         return []
     ratio, misfit = _ratio(part, fit, one)
-    if ratio < ODD:
+    if ratio < ODD or DETERMINED**2 * by_genes > misfit**2:
         return []
     return [OddRecording(one.name, misfit, tuple(_would_fit(part, fit, one)))]
 
