@@ -30,7 +30,8 @@ FEWEST_OTHERS = 3  # recordings that are fitted without the odd one; two agree w
 PROMISING = 0.5  # of the excess: a recording without which the linearised model leaves more is not tried
 MOST_TRIED = 3
 STEPS = 8  # of a fit without one recording
-FITS, ODD = 1.25, 1.5  # misfit over the expected one: at most of what is predicted, and at least of what is odd
+FITS = 1.25  # misfit over the expected one, up to which a condition fits
+ODD = 1.4  # misfit over that of what is predicted worst
 DETERMINED = 4.0  # least misfit over what errors of the genes make
 CONDITION_STEPS, DIFFERENCE, LARGEST_STEP = 5, 0.02, 0.5  # of the fit of a condition, in logarithms or rad
 
@@ -154,12 +155,11 @@ def _judged(
     ``by_genes`` (m^2 or N^2): what errors of the genes make in it. Where they could make the misfit, as with the only
     recording in air, the others do not say what it should be.
     """
-    if any(_ratio(part, fit, other)[0] > FITS for other in held_out):
-        return []
+    worst = max((_ratio(part, fit, other)[0] for other in held_out), default=1.0)
     ratio, misfit = _ratio(part, fit, one)
-    if ratio < ODD or DETERMINED**2 * by_genes > misfit**2:
+    if worst > part.data.policy.unpredicted or ratio < ODD * max(worst, 1.0) or DETERMINED**2 * by_genes > misfit**2:
         return []
-    return [OddRecording(one.name, misfit, tuple(_would_fit(part, fit, one)))]
+    return [OddRecording(one.name, misfit, tuple(_would_fit(part, fit, one, max(worst, FITS))))]
 
 
 def _ratio(part: SearchState, fit: Fit, recording: AnyRecording) -> tuple[float, float]:
@@ -169,13 +169,16 @@ def _ratio(part: SearchState, fit: Fit, recording: AnyRecording) -> tuple[float,
     return (np.inf, np.inf) if reason else misfit_to_floor(one, residuals, _floor(part))
 
 
-def _would_fit(part: SearchState, fit: Fit, one: Recording) -> Iterator[str]:
-    """Yield each condition, in words, with which the ``fit`` to the others of ``part`` predicts ``one``."""
+def _would_fit(part: SearchState, fit: Fit, one: Recording, most: float) -> Iterator[str]:
+    """Yield each condition, in words, with which the ``fit`` to the others of ``part`` predicts ``one``.
+
+    ``most``: misfit over the expected one, up to which it does.
+    """
     for name in ("airspeed", "angle_of_attack", "pressure", "phase_lag"):
         if name in {"airspeed", "angle_of_attack"} and not one.condition.airspeed:
             continue
         changed = _with_condition(part, fit, one, name)
-        if changed is not None and _ratio(part, fit, changed)[0] <= FITS:
+        if changed is not None and _ratio(part, fit, changed)[0] <= most:
             label, unit, factor = LABELS[name]
             found, stated = (factor * getattr(rec.condition, name) for rec in (changed, one))
             yield f"an {label} of {found:.3g} {unit} (stated: {stated:.3g})".replace("an phase", "a phase")
