@@ -1,8 +1,7 @@
 """Find one recording without which the nominal model fits all others.
 
-Then what is missing lies in that recording alone: a mistake in it, such as a wrong condition or an axis, or physics
-that acts only there. The genes cannot show which, but a condition with which the model fits that recording, too, is
-the most likely mistake.
+Then what is missing shows in that recording alone: a mistake in it, such as a wrong condition or an axis, or physics
+that is small in the others. A condition with which the model fits that recording, too, is the most likely mistake.
 """
 
 from __future__ import annotations
@@ -63,12 +62,15 @@ class OddRecording:
         )
         if self.would_fit:
             return f"{found}: it would fit with {' or '.join(self.would_fit)}. Check the condition of that recording."
-        return f"{found}: something acts there alone, or that recording is wrong (condition, axes, scale, start)."
+        return (
+            f"{found}: what is missing shows there alone, or that recording is wrong (condition, axes, scale, start)."
+        )
 
 
 def doubted_by_odd(decision: Decision, odd: Sequence[OddRecording]) -> Decision:
-    """Return ``decision`` without names where all that is missing lies in one recording: it may be wrong instead."""
-    return without_names(decision, LIKELY) if odd and decision.verdict in CLAIMING else decision
+    """Return ``decision`` without names where another condition of a single recording would explain all instead."""
+    wrong = any(one.would_fit for one in odd)
+    return without_names(decision, LIKELY) if wrong and decision.verdict in CLAIMING else decision
 
 
 def odd_recordings(

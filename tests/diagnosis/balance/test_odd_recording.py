@@ -59,7 +59,7 @@ def test_another_mistake_in_it_has_no_condition() -> None:
     found = diagnosed("test-4", lambda one: replace(one, values=one.values * [1.5, 1.0]))
     assert not found.named
     assert "Without test-4 the model fits all other recordings" in found.summary
-    assert "something acts there alone" in found.summary
+    assert "what is missing shows there alone" in found.summary
 
 
 def test_right_recordings_have_none() -> None:
