@@ -36,10 +36,10 @@ CONDITION_STEPS, DIFFERENCE, LARGEST_STEP = 5, 0.02, 0.5  # of the fit of a cond
 
 Name = Literal["airspeed", "angle_of_attack", "pressure", "phase_lag"]
 LABELS: dict[Name, tuple[str, str, float]] = {
-    "airspeed": ("airspeed", "m/s", 1.0),
-    "angle_of_attack": ("angle of attack", "deg", 180.0 / np.pi),
-    "pressure": ("air pressure", "mbar", 0.01),
-    "phase_lag": ("phase lag", "deg", 180.0 / np.pi),
+    "airspeed": ("an airspeed", "m/s", 1.0),
+    "angle_of_attack": ("an angle of attack", "deg", 180.0 / np.pi),
+    "pressure": ("an air pressure", "mbar", 0.01),
+    "phase_lag": ("a phase lag", "deg", 180.0 / np.pi),
 }
 IN_LOGARITHM: tuple[Name, ...] = ("airspeed", "pressure")
 
@@ -176,14 +176,13 @@ def _would_fit(part: SearchState, fit: Fit, one: Recording, most: float) -> Iter
 
     ``most``: misfit over the expected one, up to which it does.
     """
-    for name in ("airspeed", "angle_of_attack", "pressure", "phase_lag"):
+    for name, (label, unit, factor) in LABELS.items():
         if name in {"airspeed", "angle_of_attack"} and not one.condition.airspeed:
             continue
         changed = _with_condition(part, fit, one, name)
         if changed is not None and _ratio(part, fit, changed)[0] <= most:
-            label, unit, factor = LABELS[name]
             found, stated = (factor * getattr(rec.condition, name) for rec in (changed, one))
-            yield f"an {label} of {found:.3g} {unit} (stated: {stated:.3g})".replace("an phase", "a phase")
+            yield f"{label} of {found:.3g} {unit} (stated: {stated:.3g})"
 
 
 def _with_condition(part: SearchState, fit: Fit, one: Recording, name: Name) -> Recording | None:
