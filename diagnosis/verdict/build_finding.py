@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -27,7 +27,7 @@ from wingfit.diagnosis.verdict.held_out import held_out_refutes
 from wingfit.diagnosis.verdict.locate_in_beat import locate_in_beat
 from wingfit.diagnosis.verdict.mistakes import MistakeDoubt
 from wingfit.diagnosis.verdict.noise_remarks import drift_sentence, marker_remarks, noise_remarks
-from wingfit.diagnosis.verdict.odd_recording import OddRecording, doubted_by_odd, odd_recordings
+from wingfit.diagnosis.verdict.odd_recording import OddRecording, doubted_by_odd, odd_recordings, odd_sentences
 from wingfit.diagnosis.verdict.proof import (
     ResidualPair,
     fitted_residuals,
@@ -57,7 +57,7 @@ from wingfit.records import AnyRecording
 Step = tuple[float, str, Finding | None]
 
 OUTLYING = 5.0  # times the median misfit of the others, and times the floor: a recording with more gets a remark
-FEWEST_OTHERS = 2  # recordings with which another one is compared
+LEAST_COMPARED = 2  # recordings with which another one is compared
 WORSE_FACTOR = 1.1  # times the misfit before: recordings that fit worse than that get a remark
 
 
@@ -80,7 +80,7 @@ def build_finding(
     for stage, found_odd in odd_recordings(state, held_out) if decision.verdict != "adequate" else ():
         odd = found_odd
         yield 0.0, stage, None
-    decision = doubted_by_odd(decision, odd)
+    named, decision = decision.named, doubted_by_odd(decision, odd)
     best = nominal if decision.verdict == "adequate" else decision.best
     yield 0.03, "computing the intervals of the genes", None
     best = replace(best, fit=with_measured_jacobian(state.context, best.fit))
@@ -104,7 +104,7 @@ def build_finding(
         for part, ranked in advise(state.context, state.final_weights, floor, rest=rest):
             advice = ranked
             yield 0.75 + 0.2 * part, "comparing what to record next", None
-    finding = _finding(state, name, decision, best, own, validation, advice, located, odd, refuted=refuted)
+    finding = _finding(state, name, decision, best, own, validation, advice, located, odd, named, refuted=refuted)
     finding = replace(finding, remarks=(*finding.remarks, *failed))
     yield 1.0, "done", doubt.stated(finding, certain, decision)
 
@@ -150,6 +150,7 @@ def _finding(
     advice: tuple[Advice, ...],
     located: Located,
     odd: tuple[OddRecording, ...],
+    named: tuple[str, ...],
     *,
     refuted: bool,
 ) -> Finding:
@@ -179,7 +180,7 @@ def _finding(
         + accepted_sentence(data, decision, nominal, floor)
         + noise_sentence(data, decision, nominal)
         + held_out_sentence(first, proved, data, refuted=refuted)
-        + "".join(one.sentence(unit) for one in odd),
+        + odd_sentences(odd, unit, withheld=bool(named) and not first.named),
         probabilities=decision.probabilities,
         named=decision.named,
         added_effects=best.names,
@@ -207,7 +208,7 @@ def _finding(
             *marker_remarks(data, state.position_errors, best.fit),
             *_unidentified_sizes(genes, best),
             *_worsened(rows, best, unit),
-            *(() if odd else _outlying(rows, unit)),
+            *_outlying(rows, unit, {one.name for one in odd}),
         ),
     )
 
@@ -290,13 +291,13 @@ def _worsened(rows: Sequence[RecordingMisfit], best: Refit, unit: str) -> tuple[
     return (f"with the added effects the misfit increases in {', '.join(worse)}",) if worse else ()
 
 
-def _outlying(rows: Sequence[RecordingMisfit], unit: str) -> tuple[str, ...]:
+def _outlying(rows: Sequence[RecordingMisfit], unit: str, odd: Collection[str] = ()) -> tuple[str, ...]:
     """Return a remark on a recording that the model "after" misses far more than the others; empty if there is none.
 
-    A series, whose misfit may depend on what was done in it, gets none.
+    A series, whose misfit may depend on what was done in it, gets none; nor do ``odd`` ones, which the summary names.
     """
     *others, worst = sorted(rows, key=lambda row: row.after.value)
-    if len(others) < FEWEST_OTHERS or worst.flap_frequency_hz is None:
+    if len(others) < LEAST_COMPARED or worst.flap_frequency_hz is None or worst.name in odd:
         return ()
     usual = float(np.median([row.after.value for row in others]))
     if worst.after.value < OUTLYING * max(usual, worst.floor):

@@ -22,7 +22,7 @@ from wingfit.diagnosis.verdict.reservations import CLAIMING, without_names
 from wingfit.diagnosis.verdict.verdict import Decision
 from wingfit.diagnosis.verdict.weigh_hypotheses import beyond_chance, large_rest, missed, nominal_refuted
 from wingfit.inference.gauss_newton import Quadratic
-from wingfit.records import AnyRecording, Condition, Recording
+from wingfit.records import AnyRecording, Recording
 from wingfit.records.array_types import Array, Float
 
 FEWEST_OTHERS = 3  # recordings that are fitted without the odd one; two agree with almost any genes
@@ -32,7 +32,7 @@ STEPS = 8  # of a fit without one recording
 FITS = 1.25  # misfit over the expected one, up to which a condition fits
 ODD = 1.4  # misfit over that of what is predicted worst
 DETERMINED = 4.0  # least misfit over what errors of the genes make
-CONDITION_STEPS, DIFFERENCE, LARGEST_STEP = 5, 0.02, 0.5  # of the fit of a condition, in logarithms or rad
+CONDITION_STEPS, DIFFERENCE, LARGEST_STEP = 5, 0.02, 0.3  # of the fit of a condition, of the largest value or rad
 
 Name = Literal["airspeed", "angle_of_attack", "pressure", "phase_lag"]
 LABELS: dict[Name, tuple[str, str, float]] = {
@@ -41,7 +41,8 @@ LABELS: dict[Name, tuple[str, str, float]] = {
     "pressure": ("an air pressure", "mbar", 0.01),
     "phase_lag": ("a phase lag", "deg", 180.0 / np.pi),
 }
-IN_LOGARITHM: tuple[Name, ...] = ("airspeed", "pressure")
+POSITIVE: tuple[Name, ...] = ("airspeed", "pressure")
+UNITS = (0.01, 0.1, 1 / 3.6, 0.514, 0.75, 1.33, 1 / 0.514, 3.6, 10.0, 100.0)  # km/h, knots, mmHg, lost digits
 
 
 @dataclass(frozen=True)
@@ -71,6 +72,11 @@ def doubted_by_odd(decision: Decision, odd: Sequence[OddRecording]) -> Decision:
     """Return ``decision`` without names where another condition of a single recording would explain all instead."""
     wrong = any(one.would_fit for one in odd)
     return without_names(decision, LIKELY) if wrong and decision.verdict in CLAIMING else decision
+
+
+def odd_sentences(odd: Sequence[OddRecording], unit: str, *, withheld: bool) -> str:
+    """Return what the summary says of ``odd`` recordings; ``unit``: of misfits; ``withheld``: names were."""
+    return "".join(one.sentence(unit) for one in odd) + (" No effect is named until then." if withheld else "")
 
 
 def odd_recordings(
@@ -159,7 +165,9 @@ def _judged(
     """
     worst = max((_ratio(part, fit, other)[0] for other in held_out), default=1.0)
     ratio, misfit = _ratio(part, fit, one)
-    if worst > part.data.policy.unpredicted or ratio < ODD * max(worst, 1.0) or DETERMINED**2 * by_genes > misfit**2:
+    if not np.isfinite(misfit) or worst > part.data.policy.unpredicted or ratio < ODD * max(worst, 1.0):
+        return []
+    if DETERMINED**2 * by_genes > misfit**2:
         return []
     return [OddRecording(one.name, misfit, tuple(_would_fit(part, fit, one, max(worst, FITS))))]
 
@@ -177,8 +185,6 @@ def _would_fit(part: SearchState, fit: Fit, one: Recording, most: float) -> Iter
     ``most``: misfit over the expected one, up to which it does.
     """
     for name, (label, unit, factor) in LABELS.items():
-        if name in {"airspeed", "angle_of_attack"} and not one.condition.airspeed:
-            continue
         changed = _with_condition(part, fit, one, name)
         if changed is not None and _ratio(part, fit, changed)[0] <= most:
             found, stated = (factor * getattr(rec.condition, name) for rec in (changed, one))
@@ -186,30 +192,49 @@ def _would_fit(part: SearchState, fit: Fit, one: Recording, most: float) -> Iter
 
 
 def _with_condition(part: SearchState, fit: Fit, one: Recording, name: Name) -> Recording | None:
-    """Return ``one`` with the value of the condition ``name`` that fits best; None where that cannot be simulated."""
+    """Return ``one`` with the value of the condition ``name`` that fits best; None where none can be simulated."""
+    data, stated = part.data.like([one]), float(getattr(one.condition, name))
+    usual = [float(getattr(other.condition, name)) for other in part.data.beat_recordings]
+    size, positive = (max(map(abs, (stated, *usual))), True) if name in POSITIVE else (1.0, False)
 
-    def white(change: float) -> Array | None:
-        data = part.data.like([_changed(one, name, change)])
-        residuals, reason = predicted_residuals(data, part.context, part.position_errors, fit)
+    def white(value: float) -> Array | None:
+        """Whitened coefficients of the residual at a value; None where it cannot be simulated."""
+        changed = replace(data, recordings=(_changed(one, name, value),))
+        try:
+            residuals, reason = predicted_residuals(changed, part.context, part.position_errors, fit)
+        except (ValueError, ArithmeticError):  # an invented condition must not end the diagnosis
+            return None
         return None if reason else data.whiten(data.coefficients_of([residuals]))
 
-    change, now = 0.0, white(0.0)
+    tried = {value: white(value) for value in _first_values(stated, usual, positive=positive)}
+    known = {value: found for value, found in tried.items() if found is not None}
+    if not known:
+        return None
     for _ in range(CONDITION_STEPS):
-        beside = white(change + DIFFERENCE)
-        if now is None or beside is None:
-            return None
-        slope = (beside - now) / DIFFERENCE
-        size = float(slope @ slope)
-        if size == 0.0:
-            return None
-        change += float(np.clip(-(slope @ now) / size, -LARGEST_STEP, LARGEST_STEP))
-        now = white(change)
-    return None if now is None else _changed(one, name, change)
+        value = min(known, key=lambda one: float(known[one] @ known[one]))
+        beside = white(value + DIFFERENCE * size)
+        if beside is None:
+            break
+        slope = (beside - known[value]) / (DIFFERENCE * size)
+        move = -float(slope @ known[value]) / max(float(slope @ slope), 1e-300)
+        after = value + float(np.clip(move, -LARGEST_STEP * size, LARGEST_STEP * size))
+        found = white(max(after, 0.0) if positive else after)
+        if found is None or float(found @ found) >= float(known[value] @ known[value]):
+            break
+        known[max(after, 0.0) if positive else after] = found
+    best = min(known, key=lambda one: float(known[one] @ known[one]))
+    return _changed(one, name, best) if best != stated else None
 
 
-def _changed(one: Recording, name: Name, change: float) -> Recording:
-    """Return ``one`` with the condition ``name`` changed, in its logarithm or by an angle (rad)."""
-    condition: Condition = one.condition
-    stated = float(getattr(condition, name))
-    value = stated * float(np.exp(change)) if name in IN_LOGARITHM else stated + change
-    return replace(one, condition=replace(condition, **{name: value}))
+def _first_values(stated: float, usual: Sequence[float], *, positive: bool) -> list[float]:
+    """Return values with which a condition is tried first: of other recordings, of another unit or sign."""
+    values = [stated, *usual]
+    if positive:
+        values += [stated * factor for factor in UNITS]
+        return list(dict.fromkeys(values))
+    values += [-stated, np.radians(stated), np.degrees(stated), 0.5 * np.pi - stated]
+    return list(dict.fromkeys(one for one in values if abs(one) <= np.pi))
+
+
+def _changed(one: Recording, name: Name, value: float) -> Recording:
+    return replace(one, condition=replace(one.condition, **{name: value}))

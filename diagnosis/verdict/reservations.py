@@ -93,14 +93,17 @@ def discretisation_sentence(
     if not _excused(decision, data, nominal, proven, weighed):
         return ""
     return (
-        " Only the discretisation may explain that, and no finer one was fitted: repeat the diagnosis with refinement."
+        " Only the discretisation may explain what the model leaves, and no finer one was fitted: repeat the diagnosis "
+        "with refinement."
     )
 
 
 def _excused(decision: Decision, data: WhitenedData, nominal: Refit, proven: float, weighed: float) -> bool:
-    if decision.verdict != "adequate" or weighed <= proven:
-        return False
-    return nominal_refuted(data, beyond_chance(data, nominal), proven) or large_rest(data, nominal, proven)
+    def refuted(floor: float) -> bool:
+        beyond = nominal_refuted(data, beyond_chance(data, nominal), floor)
+        return beyond or large_rest(data, nominal, floor) or bool(missed(data, nominal, floor))
+
+    return decision.verdict == "adequate" and refuted(proven) and not refuted(weighed)
 
 
 def candidate_sentence(

@@ -161,7 +161,6 @@ class DirectVehicle:
         return not any(
             one._waiting or one.added.any() or one.inflow.any()
             or any(not _alike(getattr(one, name), getattr(first, name), name) for name in _FIXED)
-            or one.pitch.more is not None
             or any(not np.allclose(x, y) for x, y in zip(one.pitch[:3], first.pitch[:3], strict=True))
             for one in scenes
         )  # fmt: skip

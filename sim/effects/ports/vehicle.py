@@ -20,7 +20,8 @@ from wingfit.sim.vehicle.states import followed
 from wingfit.sim.vehicle.stations import STATIONS, Stations, span_sums, stations
 
 ROTATION_POINT = 0.75  # Eq. 4
-TWIST_INSTANTS, TWIST_ROUNDS = 80, 12  # of a twist that changes the flow by which it arises
+TWIST_INSTANTS, TWIST_ROUNDS = 80, 20  # of a twist that changes the flow by which it arises
+SETTLED = 1e-3  # rad: a twist that still changes by more has no solution near, or several
 RELAXATION, MEMORY, SMALLEST = 0.5, 5, 1e-12  # of the rounds: step, how many count, damping
 # Stages of a scene, in order: each reads what the stages before have changed.
 Stage = Literal["twist", "mass", "inflow", "wake", "circulation"]
@@ -173,9 +174,11 @@ class VehicleScene:
     def twist(self, law: Callable[[StationedWings, Flow], Array], harmonics: int) -> None:
         """Add to the wing's pitch the angle (rad) that ``law`` computes [B, m] from the flow, which that angle changes.
 
-        ``law`` has the wings at every few instants, m of them, in quasi-steady flow. ``harmonics``: of the angle.
+        ``law`` has the wings at every few instants, m of them, in quasi-steady flow. ``harmonics``: of the angle. NaN
+        where the iteration does not converge, so that the forces are not finite.
         """
         count = self.setting.instants
+        harmonics = min(harmonics, (count - 1) // 2)
         every = max(k for k in range(1, max(count // TWIST_INSTANTS, 1) + 1) if count % k == 0)
         angle, tried, rests = np.zeros((len(self), harmonics + 1), complex), list[Complex](), list[Complex]()
         for _ in range(TWIST_ROUNDS):
@@ -185,6 +188,7 @@ class VehicleScene:
             target[:, 0] *= 0.5
             tried, rests = [*tried[-MEMORY:], angle], [*rests[-MEMORY:], target - angle]
             angle = _mixed(tried, rests)
+        angle[np.abs(rests[-1]).sum(axis=1) > SETTLED] = np.nan
         self.pitch = self.pitch._replace(more=angle)
 
     def _twisted(self, angle: Complex) -> VehicleScene:

@@ -30,6 +30,10 @@ def at(**condition: float) -> Change:
     return lambda one: replace(one, condition=replace(one.condition, **condition))
 
 
+def mirrored(one: Recording) -> Recording:
+    return at(angle_of_attack=-one.condition.angle_of_attack)(one)
+
+
 def diagnosed(name: str, change: Change) -> wingfit.Finding:
     recordings = tuple(change(one) if one.name == name else one for one in right().recordings)
     return wingfit.diagnose(replace(right(), recordings=recordings), DiagnosisSpec(suspects=SUSPECTS))
@@ -39,19 +43,22 @@ def diagnosed(name: str, change: Change) -> wingfit.Finding:
     ("change", "label", "unit", "attribute", "factor"),
     [
         (at(airspeed=2.4), "an airspeed", "m/s", "airspeed", 1.0),
+        (at(airspeed=0.0), "an airspeed", "m/s", "airspeed", 1.0),
+        (at(pressure=3000.0), "an air pressure", "mbar", "pressure", 0.01),
+        (mirrored, "an angle of attack", "deg", "angle_of_attack", 180.0 / np.pi),
         (at(angle_of_attack=0.9), "an angle of attack", "deg", "angle_of_attack", 180.0 / np.pi),
     ],
-    ids=["airspeed", "body pitch"],
+    ids=["airspeed", "no airspeed", "a thousandth of the pressure", "mirrored", "body pitch"],
 )
 def test_its_true_condition_is_found(change: Change, label: str, unit: str, attribute: str, factor: float) -> None:
     found = diagnosed("test-4", change)
     truth = factor * getattr(right().recording("test-4").condition, attribute)
     assert found.verdict == "unnamed"
     assert "Without test-4 the model fits all other recordings" in found.summary
-    stated = re.search(rf"it would fit with .*{label} of ([\d.]+) {unit} \(stated", found.summary)
+    stated = re.search(rf"it would fit with .*{label} of ([\d.e+]+) {unit} \(stated", found.summary)
     assert stated
     assert float(stated[1]) == pytest.approx(truth, rel=0.05)
-    assert not any("misses" in remark for remark in found.remarks)
+    assert not any("the model misses test-4" in remark for remark in found.remarks)
 
 
 def test_another_mistake_in_it_has_no_condition() -> None:

@@ -46,7 +46,9 @@ def test_a_misfit_that_only_an_untried_discretisation_excuses_leaves_a_doubt() -
     doubted = doubted_by_discretisation(certain, data(), left, 0.0, weighed)
     assert doubted.probabilities["adequate"] == POLICY.doubted_noise
     assert sum(doubted.probabilities.values()) == pytest.approx(1.0)
-    assert "repeat the diagnosis with refinement" in discretisation_sentence(doubted, data(), left, 0.0, weighed)
+    assert "no finer one was fitted: repeat the diagnosis with refinement" in discretisation_sentence(
+        doubted, data(), left, 0.0, weighed
+    )
     for nominal, proven in ((left, 0.8), (left, weighed), (refit(0.2), 0.0)):
         assert doubted_by_discretisation(certain, data(), nominal, proven, weighed) is certain
         assert not discretisation_sentence(certain, data(), nominal, proven, weighed)

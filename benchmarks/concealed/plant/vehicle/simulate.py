@@ -88,7 +88,7 @@ def simulate(
     if strength(hidden, "elastic_twist"):
         twist = _twist(vehicle, coefficients, air, hidden, terms)
     if strength(hidden, "induced_inflow"):
-        inflow = _inflow(vehicle, coefficients, air, hidden, terms, instants)
+        inflow = _inflow(vehicle, coefficients, air, hidden, terms, instants, twist)
     return _forces(vehicle, coefficients, air, hidden, terms, instants, inflow, twist)[0]
 
 
@@ -378,16 +378,16 @@ def _inflow(
     air: Condition,
     hidden: Concealed,
     terms: tuple[str, ...],
-    instants: int,
-) -> Array:
+    instants: int, twist: Array | None,
+) -> Array:  # fmt: skip
     """Induced velocity [instants] (m/s) along body x at the wing tips, by iteration with the thrust that it reduces.
 
-    The area of the actuator disc is that which the wings sweep. ValueError if the iteration does not converge.
+    The actuator disc is as large as the area that the wings sweep. ValueError if it does not converge.
     """
     p = hidden["induced_inflow"]
     swept, v = _swept(vehicle), np.zeros(_COARSE)
     for _ in range(_ROUNDS):
-        thrust = _forces(vehicle, coefficients, air, hidden, terms, _COARSE, v)[1]
+        thrust = _forces(vehicle, coefficients, air, hidden, terms, _COARSE, v, twist)[1]
         change = 0.5 * (disc_inflow(thrust, swept, air, density(air), p) - v)
         v = v + change
         if np.abs(change).max() < _SETTLED:

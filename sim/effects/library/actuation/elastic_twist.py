@@ -14,9 +14,16 @@ LARGEST = 1.0  # rad
 
 
 def _drag(wings: StationedWings, flow: Flow) -> Array:
-    """Return the viscous drag over the air's density, normal to the wing (m^3/s^2; Armanini et al. 2016, Eq. 11)."""
+    """Return the viscous drag over the air's density, normal to the wing (m^3/s^2).
+
+    Armanini et al. (2016), Eq. 11; the curve of Dickinson, Lehmann and Sane (1999).
+    """
     first, across = (wings.drag[:, k, None, None] for k in (0, 1))
     drag = (first * flow.along**2 + across * flow.normal**2) * flow.normal / flow.speed
+    if wings.drag[:, 2].any():  # the measured curve of the drag
+        angle = np.degrees(np.arctan2(np.abs(flow.normal), np.abs(flow.along)))
+        measured = 1.92 - 1.55 * np.cos(np.radians(2.04 * angle - 9.82))
+        drag += wings.drag[:, 2, None, None] * measured * flow.speed * flow.normal
     return np.asarray(0.5 * wings.places.chord * drag)
 
 
@@ -36,12 +43,12 @@ EFFECT = effect_of_drive(
     title="Elastic twist by the air load",
     size=(
         Parameter(
-            "compliance", "rad", -0.2, 1.5, 0.15,
+            "compliance", "rad", -0.1, 1.0, 0.15,
             "twist at the pitch station by a pressure of 10 Pa on the wing",
         ),
     ),
-    law="theta_w'(t) = theta_w(t) + compliance int N c dr / (10 Pa int c^2 dr)\n"
-    "N = force per length by circulation and drag, normal to the wing",
+    law="theta_w'(t) = theta_w(t) - compliance int N c dr / (10 Pa int c^2 dr)\n"
+    "N = force per length by circulation and drag, along the wing's normal",
     source="Whitney and Wood (2010), J. Fluid Mech. 660, 197: a wing that turns on a spring",
     signature="the wing meets the air at smaller angles while its load is large, the more so the faster it moves",
     confused_with=("wing_pitch_amplitude", "lift_curve", "varying_coefficients"),

@@ -46,3 +46,15 @@ def test_the_rates_are_those_of_the_angle() -> None:
     for value, derivative in ((angle, rate), (rate, acceleration)):
         central = (np.roll(value, -1) - np.roll(value, 1)) / (2 * step)
         assert np.abs(central - derivative).max() < 0.02 * np.abs(derivative).max()
+
+
+def test_a_twist_without_a_solution_is_not_finite(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A wing that diverges, and another individual of the same batch that does not."""
+    monkeypatch.setattr(port, "TWIST_ROUNDS", 6)
+    model = BladeElementWing(DELFLY, effects=("elastic_twist",))
+    known = {gene.name for gene in model.genes}
+    own = {name: value for name, value in COEFFICIENTS.items() if name in known}
+    both = [genome(model, **own, **{"elastic_twist.compliance": one}) for one in (1.0, 0.01)]
+    diverging, settled = model.angles(np.array(both), FAST).pitch[:, 0]
+    assert np.isnan(diverging).all()
+    assert np.isfinite(settled).all()
