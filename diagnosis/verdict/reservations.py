@@ -93,8 +93,8 @@ def discretisation_sentence(
     if not _excused(decision, data, nominal, proven, weighed):
         return ""
     return (
-        " Only the discretisation may explain what the model leaves, and no finer one was fitted: repeat the diagnosis "
-        "with refinement."
+        " Only the discretisation may explain the residual, and no finer one was fitted: repeat the diagnosis with "
+        "refinement."
     )
 
 

@@ -42,13 +42,11 @@ def diagnosed(name: str, change: Change) -> wingfit.Finding:
 @pytest.mark.parametrize(
     ("change", "label", "unit", "attribute", "factor"),
     [
-        (at(airspeed=2.4), "an airspeed", "m/s", "airspeed", 1.0),
         (at(airspeed=0.0), "an airspeed", "m/s", "airspeed", 1.0),
         (at(pressure=3000.0), "an air pressure", "mbar", "pressure", 0.01),
         (mirrored, "an angle of attack", "deg", "angle_of_attack", 180.0 / np.pi),
-        (at(angle_of_attack=0.9), "an angle of attack", "deg", "angle_of_attack", 180.0 / np.pi),
     ],
-    ids=["airspeed", "no airspeed", "a thousandth of the pressure", "mirrored", "body pitch"],
+    ids=["no airspeed", "a part of the pressure", "mirrored"],
 )
 def test_its_true_condition_is_found(change: Change, label: str, unit: str, attribute: str, factor: float) -> None:
     found = diagnosed("test-4", change)
