@@ -196,6 +196,8 @@ def _with_condition(part: SearchState, fit: Fit, one: Recording, name: Name) -> 
     data, stated = part.data.like([one]), float(getattr(one.condition, name))
     usual = [float(getattr(other.condition, name)) for other in part.data.beat_recordings]
     size, positive = (max(map(abs, (stated, *usual))), True) if name in POSITIVE else (1.0, False)
+    if size == 0.0:  # no recording has an airspeed
+        return None
 
     def white(value: float) -> Array | None:
         """Whitened coefficients of the residual at a value; None where it cannot be simulated."""
