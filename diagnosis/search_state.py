@@ -102,6 +102,11 @@ class SearchState:
         """
         return float(np.hypot(discretisation, self.position_errors.shared if self.position_errors else 0.0))
 
+    @property
+    def proven_floor(self) -> float:
+        """The :meth:`floor` with what fits of finer discretisations have shown of their error."""
+        return self.floor(self.fitted_nominal.remaining_error)
+
     def allow_for_position_errors(self, nominal: Fit) -> bool:
         """Measure errors of rest positions at the fit ``nominal``; allow for these and those of the frame.
 

@@ -73,7 +73,7 @@ def build_finding(
     floor = state.floor(_discretisation_error(state))
     decision = judged_by_accepted_error(decide(weights), state.data, weights, floor)
     decision = partly(decision, state.data, nominal, floor)
-    certain = doubted_by_discretisation(decision, state.data, nominal, _proven(state), weights.floor)
+    certain = doubted_by_discretisation(decision, state.data, nominal, state.proven_floor, weights.floor)
     doubt = MistakeDoubt(mistakes, [one.name for one in state.suspects], state.spec.calibration.effects)
     decision = doubt.applied(certain)
     odd: tuple[OddRecording, ...] = ()
@@ -173,7 +173,7 @@ def _finding(
         summary=summary(decision, suspects, _summary_texts(data, nominal, best, located, proved))
         + ("" if data.kind == "series" else _drift_sentence(data, nominal, best))
         + remaining_sentence(data, decision, best, floor, weights.floor)
-        + discretisation_sentence(decision, data, nominal, _proven(state), weights.floor)
+        + discretisation_sentence(decision, data, nominal, state.proven_floor, weights.floor)
         + missed_sentence(data, decision, nominal, weights.floor)
         + candidate_sentence(data, decision, weights, suspects)
         + accepted_error_sentence(decided, judged_by_accepted_error(decided, data, weights, floor))
@@ -229,11 +229,6 @@ def _discretisation_error(state: SearchState) -> float:
         return state.fitted_nominal.remaining_error
     least = min(one.excess for one in state.final_weights.refits)
     return min(state.fitted_nominal.possible_error, float(np.sqrt(max(least, 0.0))))
-
-
-def _proven(state: SearchState) -> float:
-    """Return the floor (m or N) with what fits of finer discretisations have shown of the error."""
-    return state.floor(state.fitted_nominal.remaining_error)
 
 
 def _floors(state: SearchState) -> Floors:

@@ -65,11 +65,11 @@ def _by_genes(one: WhitenedData, context: FitContext, nominal: Fit) -> float | N
     if own:
         absorbed, *_ = np.linalg.lstsq(one.whitened_slopes(of_recording), one.whitened_slopes(of_model), rcond=None)
         of_model = of_model - of_recording @ absorbed
-    return float(one.weight @ np.einsum("df,fg,dg->d", of_model, _covariance(context.data, nominal), of_model))
+    return float(one.weight @ np.einsum("df,fg,dg->d", of_model, covariance_of_fit(context.data, nominal), of_model))
 
 
-def _covariance(data: WhitenedData, fit: Fit) -> Array:
-    """Return the covariance [F, F] of the genes of ``fit`` in unit coordinates."""
+def covariance_of_fit(data: WhitenedData, fit: Fit) -> Array:
+    """Return the covariance [F, F] of the genes of ``fit`` in unit coordinates, by noise and the prior alone."""
     white = data.whitened_slopes(fit.jacobian)
     weight = data.likelihood_weight(fit.coefficients)
     return np.asarray(np.linalg.inv(weight * white.T @ white + np.eye(len(fit.unit)) / PRIOR_SD**2))

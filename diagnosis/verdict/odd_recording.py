@@ -16,6 +16,7 @@ from wingfit.diagnosis.evidence.fit import FIT_ERRORS, PRIOR_SD, Fit, gauss_newt
 from wingfit.diagnosis.evidence.refit import make_refit
 from wingfit.diagnosis.finding import amount
 from wingfit.diagnosis.search_state import SearchState
+from wingfit.diagnosis.verdict.held_out import covariance_of_fit
 from wingfit.diagnosis.verdict.mistakes import LIKELY
 from wingfit.diagnosis.verdict.proof import misfit_to_floor, predicted_residuals
 from wingfit.diagnosis.verdict.reservations import CLAIMING, without_names
@@ -134,24 +135,16 @@ def _without(state: SearchState, r: int, start: Float[Array, " F"]) -> tuple[Sea
         return None
     if part.allow_for_position_errors(fit):
         fit = part.fitted_again(fit)
-    refit, floor = make_refit(part.data, fit), _floor(part)
+    refit, floor = make_refit(part.data, fit), part.proven_floor
     refuted = nominal_refuted(part.data, beyond_chance(part.data, refit), floor)
     return None if refuted or large_rest(part.data, refit, floor) or missed(part.data, refit, floor) else (part, fit)
 
 
-def _floor(state: SearchState) -> float:
-    return state.floor(state.fitted_nominal.remaining_error)
-
-
 def _by_genes(state: SearchState, r: int, part: SearchState, fit: Fit) -> float:
     """Return the mean square (m^2 or N^2) that errors of the genes of ``fit`` make in recording ``r`` (linearised)."""
-    data, slopes = state.data, part.data.whitened_slopes(fit.jacobian)
-    covariance = np.linalg.inv(
-        part.data.likelihood_weight(fit.coefficients) * slopes.T @ slopes + np.eye(len(fit.unit)) / PRIOR_SD**2
-    )
-    rows = data.recording_slices[r]
+    data, rows = state.data, state.data.recording_slices[r]
     own = state.fitted_nominal.refit.fit.jacobian[rows]
-    moved = data.weight[rows] @ np.einsum("df,fg,dg->d", own, covariance, own, optimize=True)
+    moved = data.weight[rows] @ np.einsum("df,fg,dg->d", own, covariance_of_fit(part.data, fit), own, optimize=True)
     return float(moved / data.recording_weights[r])
 
 
@@ -176,7 +169,7 @@ def _ratio(part: SearchState, fit: Fit, recording: AnyRecording) -> tuple[float,
     """Return the misfit of ``recording`` over the one to be expected, and itself (m or N); infinite if it fails."""
     one = part.data.like([recording])
     residuals, reason = predicted_residuals(one, part.context, part.position_errors, fit)
-    return (np.inf, np.inf) if reason else misfit_to_floor(one, residuals, _floor(part))
+    return (np.inf, np.inf) if reason else misfit_to_floor(one, residuals, part.proven_floor)
 
 
 def _would_fit(part: SearchState, fit: Fit, one: Recording, most: float) -> Iterator[str]:
@@ -220,22 +213,21 @@ def _with_condition(part: SearchState, fit: Fit, one: Recording, name: Name) -> 
         slope = (beside - known[value]) / (DIFFERENCE * size)
         move = -float(slope @ known[value]) / max(float(slope @ slope), 1e-300)
         after = value + float(np.clip(move, -LARGEST_STEP * size, LARGEST_STEP * size))
-        found = white(max(after, 0.0) if positive else after)
+        after = max(after, 0.0) if positive else after
+        found = white(after)
         if found is None or float(found @ found) >= float(known[value] @ known[value]):
             break
-        known[max(after, 0.0) if positive else after] = found
+        known[after] = found
     best = min(known, key=lambda one: float(known[one] @ known[one]))
     return _changed(one, name, best) if best != stated else None
 
 
 def _first_values(stated: float, usual: Sequence[float], *, positive: bool) -> list[float]:
     """Return values with which a condition is tried first: of other recordings, of another unit or sign."""
-    values = [stated, *usual]
     if positive:
-        values += [stated * factor for factor in UNITS]
-        return list(dict.fromkeys(values))
-    values += [-stated, np.radians(stated), np.degrees(stated), 0.5 * np.pi - stated]
-    return list(dict.fromkeys(one for one in values if abs(one) <= np.pi))
+        return list(dict.fromkeys([stated, *usual, *(stated * factor for factor in UNITS)]))
+    angles = [stated, *usual, -stated, np.radians(stated), np.degrees(stated), 0.5 * np.pi - stated]
+    return list(dict.fromkeys(one for one in angles if abs(one) <= np.pi))
 
 
 def _changed(one: Recording, name: Name, value: float) -> Recording:

@@ -114,6 +114,15 @@ class StationedWings:
         out *= self.alike
         return out
 
+    def normal_force(self, flow: Flow) -> Array:
+        """Force per length [sides, B, n, 8] (N/m) by circulation (fling included) and drag, along the wings' normal."""
+        friction = np.empty_like(flow.normal)
+        for k, out in enumerate(friction):
+            moving = flow.along[k], flow.normal[k], flow.speed[k]
+            stations.station_friction(*moving, self.places.chord, self.drag, out)
+        carried = (flow.circulation + self.flung) * flow.along
+        return np.asarray(self.density[:, None, None] * (carried - friction * flow.normal))
+
     def _turned(self, rate: Array) -> Array:
         """Circulation [B, n, 8] (m^2/s) at the stations by a ``rate`` [B, n] (rad/s) at the pitch station (Eq. 2)."""
         lever = 0.5 * self.places.chord**2 * self.places.twist * self.loading

@@ -158,6 +158,20 @@ def station_circulation(
                     circulation[b, t, e] += math.copysign(lift, -x * z)
 
 
+@kernel
+def station_friction(along: Array, normal: Array, speed: Array, chord: Array, drag: Array, out: Array) -> None:
+    """Set ``out`` [B, n, 8] to the viscous drag over density and speed (m^2/s), which :func:`station_forces` adds.
+
+    Armanini et al. (2016), Eq. 11; arguments as there, ``chord`` [8] in m.
+    """
+    for b in range(len(along)):
+        for t in range(along.shape[1]):
+            for e in range(STATIONS):
+                vx, vz, V = along[b, t, e], normal[b, t, e], speed[b, t, e]
+                measured = drag[b, 2] * curve_drag(_attack(vx, vz)) * V
+                out[b, t, e] = 0.5 * chord[e] * ((vx * vx * drag[b, 0] + vz * vz * drag[b, 1]) / V + measured)
+
+
 @allocating
 def station_forces(
     motion: Array, side: Side, cosine: Array, sine: Array, along: Array, normal: Array, speed: Array,

@@ -32,6 +32,7 @@ def test_it_gets_a_remark_wherever_it_is(place: int) -> None:
     misfits.insert(place, 89e-3)
     (remark,) = _outlying(rows(*misfits), "N")
     assert f"misses {'abcd'[place]} by 89 mN, and half of the others by 3 mN or less" in remark
+    assert not _outlying(rows(*misfits), "N", {"abcd"[place]}), "the summary names it"
 
 
 @pytest.mark.parametrize("misfits", [(2e-3, 3e-3, 9e-3), (0.1e-3, 0.1e-3, 9e-3), (80e-3, 82e-3, 89e-3), (2e-3, 89e-3)])

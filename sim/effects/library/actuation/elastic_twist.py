@@ -13,25 +13,10 @@ HARMONICS = 6  # of the twist; higher ones are above the resonance of a wing
 LARGEST = 1.0  # rad
 
 
-def _drag(wings: StationedWings, flow: Flow) -> Array:
-    """Return the viscous drag over the air's density, normal to the wing (m^3/s^2).
-
-    Armanini et al. (2016), Eq. 11; the curve of Dickinson, Lehmann and Sane (1999).
-    """
-    first, across = (wings.drag[:, k, None, None] for k in (0, 1))
-    drag = (first * flow.along**2 + across * flow.normal**2) * flow.normal / flow.speed
-    if wings.drag[:, 2].any():  # the measured curve of the drag
-        angle = np.degrees(np.arctan2(np.abs(flow.normal), np.abs(flow.along)))
-        measured = 1.92 - 1.55 * np.cos(np.radians(2.04 * angle - 9.82))
-        drag += wings.drag[:, 2, None, None] * measured * flow.speed * flow.normal
-    return np.asarray(0.5 * wings.places.chord * drag)
-
-
 def _vehicle(scene: VehicleScene, values: Values) -> None:
     def law(wings: StationedWings, flow: Flow) -> Array:
         chord, weight = wings.places.chord, wings.places.weight
-        normal = wings.density[:, None, None] * ((flow.circulation + wings.flung) * flow.along - _drag(wings, flow))
-        moment = -np.sum(normal.mean(axis=0) * (chord * weight), axis=2)
+        moment = -np.sum(wings.normal_force(flow).mean(axis=0) * (chord * weight), axis=2)
         unit = PRESSURE * float(np.sum(chord**2 * weight))
         return np.asarray(np.clip(values["compliance"][:, None] * moment / unit, -LARGEST, LARGEST))
 

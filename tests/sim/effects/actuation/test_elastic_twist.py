@@ -53,3 +53,17 @@ def test_a_twist_without_a_solution_is_not_finite(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(port, "TWIST_ROUNDS", 6)
     assert np.isnan(pitch(1.0)).all()
     assert np.isfinite(pitch(0.01)).all()
+
+
+def test_drag_by_the_measured_curve_twists_too() -> None:
+    model = BladeElementWing(DELFLY, terms=("steady_curves",), effects=("elastic_twist",))
+
+    def found(K_d: float, compliance: float) -> np.ndarray:
+        genes = genome(model, K_l=0.0, K_d=K_d, **{"elastic_twist.compliance": compliance})
+        return np.asarray(model.angles(genes, FAST).pitch[0, 0])
+
+    stiff = found(1.0, 0.0)
+    np.testing.assert_array_equal(found(0.0, 0.1), stiff)
+    weak, strong = (np.ptp(found(K_d, 0.02) - stiff) for K_d in (0.5, 1.0))
+    assert strong == pytest.approx(2 * weak, rel=0.1)
+    assert strong > 0.01
