@@ -178,17 +178,19 @@ class WhitenedData:
 
     @cached_property
     def drift(self) -> Float[Array, " R"]:
-        """Slow change of each recording [R] that noise does not explain, divided by its noise of a sample.
+        """Change of the beat in each recording [R] that noise does not explain, divided by its noise of a sample.
 
-        Both are root mean squares over the recording's used channels; zero where noise explains the change. Where the
-        markers share a part of the noise that is not small, that part counts as a change too.
+        Both are root mean squares over the recording's used channels; zero where noise explains the change. It is a
+        slow change, or a difference of odd and even beats. Where the markers share a part of the noise that is not
+        small, that part counts as a change too.
         """
         if self.kind == "series":
             return np.zeros(len(self.recordings))
         noise = self.noise_of_recordings
         slow = [fit.drift.size if fit.drift else 0.0 for fit in self.beat_fits]
+        odd = [fit.alternation.size if fit.alternation and fit.alternation.found else 0.0 for fit in self.beat_fits]
         found = np.maximum(
-            slow,
+            np.hypot(slow, odd),
             [
                 np.sqrt(fit.shared) * one * (fit.shared > self.policy.shared)
                 for fit, one in zip(self.beat_fits, noise, strict=True)

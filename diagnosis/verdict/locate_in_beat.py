@@ -30,9 +30,7 @@ from wingfit.diagnosis.verdict.weigh_hypotheses import only_drifts
 
 Step = tuple[float, str, Located | None]
 
-DRIFT = Where(
-    "the beat changes slowly; the mean beat fits within the noise and shows no place", None, None, None, "", ()
-)
+DRIFT = Where("beats differ; the mean beat fits within the noise and shows no place", None, None, None, "", ())
 
 
 def locate_in_beat(

@@ -17,12 +17,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy
 from numpy.polynomial import legendre
 
+from wingfit.inference.noise.change_powers import ChangePowers, compared, envelopes, waves
 from wingfit.inference.noise.drift_of_mean import MeanPowers, change_of_mean, mean_distances
 from wingfit.inference.noise.mean_beat import fourier_basis, masks_of
-from wingfit.inference.noise.slow_change import Change, independent_sources, orthonormal, rank
+from wingfit.inference.noise.slow_change import Change, orthonormal
 from wingfit.records.array_types import Array, Bool, Float, Index, Int, Mask
 
 HARMONICS = 3  # compared: those in which a wing moves most
@@ -31,7 +31,6 @@ FEWEST_OF_MEAN = 4  # with which two lines above zero show how noise rises towar
 CURVED = 4  # beats from which a curved change is found and removed, too
 WINDING = 12  # beats from which changes of higher degree are kept out of the noise
 NEAREST = 3  # spectral lines on either side of a harmonic: farther ones say less about the noise at the harmonic
-RISE = 1.5  # largest ratio of the density of noise at a harmonic to that around it that counts as usual
 
 
 @dataclass(frozen=True)
@@ -97,12 +96,12 @@ def drift_of(
             changes.append([orthonormal(one, periodic, mean, *less) for one, less in zip(new, lower, strict=True)])
         beat = orthonormal(np.hstack([one for row in changes for one in row]))
         every = np.hstack([mean, beat])
-        lines = [orthonormal(_envelopes(psi[mask], apparent[mask], k, distances), periodic, every) for k in orders]
+        lines = [orthonormal(envelopes(psi[mask], apparent[mask], k, distances), periodic, every) for k in orders]
         higher = [_slow(psi[mask], time[mask], k, degree) for k in orders for degree in _higher(beats)]
         beyond = orthonormal(np.hstack(higher), periodic, every) if higher else every[:, :0]
         values = scatter[np.ix_(mask, channels)]
         steady = values - every @ (every.T @ values)
-        parts.append(_Powers.of(values, steady, changes, lines, beyond))
+        parts.append(ChangePowers.of(values, steady, changes, lines, beyond))
         if beats < FEWEST_OF_MEAN:
             continue
         raw = [_slow(psi[mask], time[mask], k, degree) for k in orders for degree in _degrees(beats)]
@@ -110,70 +109,13 @@ def drift_of(
         slow: list[Array] = []
         for one in of_zero:
             slow.append(orthonormal(one, periodic, own, *slow))
-        waves = orthonormal(_waves(apparent[mask], mean_distances(beats)), periodic, every)
-        of_mean.append(MeanPowers.of(values, steady, slow, waves))
+        low = orthonormal(waves(apparent[mask], mean_distances(beats)), periodic, every)
+        of_mean.append(MeanPowers.of(values, steady, slow, low))
     if not parts or min(float(one.freedom.min()) for one in parts) < 1.0:
         return None
     samples = int(valid.sum())
-    changes_found = (_compared(parts, samples), change_of_mean(of_mean, samples) if of_mean else Change(0.0, 1.0, 0.0))
+    changes_found = (compared(parts, samples), change_of_mean(of_mean, samples) if of_mean else Change(0.0, 1.0, 0.0))
     return Drift(*(one if one.size >= least else replace(one, probability=1.0) for one in changes_found))
-
-
-@dataclass(frozen=True)
-class _Powers:
-    """Slow changes of D degrees (linear, curved) and noise near K harmonics, in C channels that have the same gaps.
-
-    ``slow`` [D, K, C]: sum of squares of the coefficients of slow changes; ``near`` [K, L, C]: coefficients of noise at
-    L nearby lines (:func:`_envelopes`); ``alone``: the same without changes of higher degree; ``freedom`` [D + 1, K]:
-    number of independent coefficients of the slow changes of each degree, and of the noise; ``level`` [C]: mean square
-    of the samples without slow changes.
-    """
-
-    slow: Array
-    near: Array
-    alone: Array
-    freedom: Array
-    level: Array
-
-    @classmethod
-    def of(cls, values: Array, steady: Array, changes: list[list[Array]], lines: list[Array], beyond: Array) -> _Powers:
-        """Project ``values`` [T, C], and ``steady`` [T, C] without slow changes, on bases [T, .] of each harmonic.
-
-        ``beyond`` [T, .]: basis of the changes of higher degree.
-        """
-        freedom = np.array([[rank(one) for one in row] for row in (*changes, lines)])
-        slow = np.array([[((one.T @ values) ** 2).sum(axis=0) for one in row] for row in changes])
-        near = np.array([one.T @ steady for one in lines])
-        noise = steady - beyond @ (beyond.T @ steady)
-        alone = np.array([one.T @ noise for one in lines])
-        return cls(slow, near, alone, freedom, np.maximum((steady**2).mean(axis=0), 1e-300))
-
-
-def _compared(parts: list[_Powers], samples: int) -> Change:
-    """Compare the slow changes of all channels of the ``parts`` with their noise; ``samples``: number of values.
-
-    Linear changes alone are compared, and linear and curved ones together; the less probable result counts.
-    """
-    every = (
-        (one.slow, one.near, one.alone, np.repeat(one.freedom[..., None], len(one.level), axis=-1), one.level)
-        for one in parts
-    )
-    slow, near, alone, freedom, level = (np.concatenate(found, axis=-1) for found in zip(*every, strict=True))
-    slow, of_slow = slow.cumsum(axis=0), freedom[:-1].cumsum(axis=0)
-    noise = (near**2).sum(axis=1) / freedom[-1]
-    # Each channel is divided by its size, so that a loud one does not decide alone.
-    around, lines = float((noise / level).mean()), freedom[-1].mean(axis=-1)
-    # Size and start of a beat that scatter move all harmonics of all channels at once, so these are counted together.
-    envelopes = alone.reshape(len(alone), -1, 2, len(level)) / np.sqrt(level)
-    sources = independent_sources(envelopes.transpose(1, 0, 2, 3).reshape(envelopes.shape[1], -1), lines.mean() / 2)
-    found = []
-    for power, count in zip(slow, of_slow, strict=True):
-        ratio = float((power / count / level).mean() / max(around, 1e-300))
-        chance = float(scipy.stats.f.sf(ratio / RISE, sources * count.mean() / 2, sources * lines.mean() / 2))
-        found.append((len(slow) * chance, -ratio))
-    probability, ratio = min(found)
-    beyond = float((slow[-1] - of_slow[-1] * noise).sum())
-    return Change(-ratio, min(probability, 1.0), float(np.sqrt(max(beyond, 0.0) / samples)))
 
 
 def slow_basis(
@@ -208,19 +150,3 @@ def _slow(psi: Array, time: Array, k: int, degree: int) -> Array:
     """Slow change [T, .] of harmonic ``k`` (0: of the mean): a Legendre polynomial of the ``time`` [T], -1 to 1."""
     slow = legendre.legval(time, np.eye(degree + 1)[degree])[:, None]
     return np.hstack([slow * np.cos(k * psi)[:, None], slow * np.sin(k * psi)[:, None]]) if k else slow
-
-
-def _waves(apparent: Array, distances: Array) -> Array:
-    """Cosines and sines [T, .] of the frequencies ``distances`` (in flap frequencies)."""
-    angles = 2 * np.pi * apparent[:, None] * distances
-    return np.hstack([np.cos(angles), np.sin(angles)])
-
-
-def _envelopes(psi: Array, apparent: Array, k: int, distances: Array) -> Array:
-    """Return the spectral lines at ``distances`` (in flap frequencies) on either side of harmonic ``k``, [T, .].
-
-    As changes in time of its two phases: columns in pairs, one change times the cosine, and times the sine.
-    """
-    slow = _waves(apparent, distances)[:, :, None]
-    carrier = np.stack([np.cos(k * psi), np.sin(k * psi)], axis=1)[:, None, :]
-    return np.asarray((slow * carrier).reshape(len(psi), -1))

@@ -18,10 +18,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import elliprg
 
+from wingfit.inference.noise.alternation import LINES, alternation_basis, alternation_of
 from wingfit.inference.noise.drift import Drift, drift_of, slow_basis
 from wingfit.inference.noise.mean_beat import fourier_basis, masks_of, scatter_about
 from wingfit.inference.noise.shared_pattern import shared_part
-from wingfit.inference.noise.spectrum import density_at_harmonics, lag1_autocorrelation
+from wingfit.inference.noise.slow_change import Change
+from wingfit.inference.noise.spectrum import density_at_harmonics, lag1_autocorrelation, lines_near
 from wingfit.inference.noise.stated import Stated, correlation_matrices, stated_noise
 from wingfit.records import Recording
 from wingfit.records.array_types import Array, Bool, Float, Index, Int, Mask
@@ -53,13 +55,13 @@ class HarmonicFit:
         noise: [C] standard deviation of the noise of one sample.
         lag1: correlation of the noise of successive samples, median of the channels.
         between_beats: True if the noise was estimated from differences between beats; False, for a recording of less
-            than
-        two beats, if it was estimated from the part of the spectrum above the fitted harmonics.
+            than two beats, if it was estimated from the part of the spectrum above the fitted harmonics.
         coefficients: [C, P] of the recording itself.
         drift: slow change of the beat during the recording; None for too few beats.
         shared: part of the power of the noise that is a motion that markers of tracks share (:func:`shared_part`).
         stated: the stated noise compared with what was seen; None if none is stated.
         correlation: [M, 3, 3] of the noise of each marker's coordinates, as stated; None: it is independent.
+        alternation: difference of odd and even beats; None for too few beats.
     """
 
     order: Int[Index, " P"]
@@ -76,6 +78,7 @@ class HarmonicFit:
     shared: float = 0.0
     stated: Stated | None = None
     correlation: Float[Array, "M 3 3"] | None = None
+    alternation: Change | None = None
 
     def of(self, residuals: Float[Array, "*B T C"]) -> Float[Array, "*B C P"]:
         """Fourier coefficients [..., C, P] of ``residuals`` [..., T, C] (NaN: not recorded); zero if not used."""
@@ -116,16 +119,18 @@ def harmonic_fit(recording: Recording, compared: Mask | None = None) -> Harmonic
         shared_part(scatter.values, valid, recording.values) if recording.kind == "tracks" else 0.0,
         scatter.stated,
         scatter.correlation,
+        scatter.alternation,
     )
 
 
-def drift_and_noise(recording: Recording, compared: Mask | None = None) -> tuple[Drift | None, float]:
-    """Return the drift of ``recording`` and the root mean square of the noise of its samples (m or N).
+def drift_and_noise(recording: Recording, compared: Mask | None = None) -> tuple[Drift | None, Change | None, float]:
+    """Return drift and alternation of ``recording``, and the root mean square of the noise of its samples (m or N).
 
     The same as of :func:`harmonic_fit`, for less time and memory; ``compared`` [T, C] and ValueError as there.
     """
     scatter = _Scatter.of(recording, compared)
-    return scatter.drift, float(np.sqrt(np.mean(scatter.variance[scatter.valid.any(axis=0)])))
+    noise = float(np.sqrt(np.mean(scatter.variance[scatter.valid.any(axis=0)])))
+    return scatter.drift, scatter.alternation, noise
 
 
 @one_blas_thread
@@ -160,7 +165,7 @@ class _Scatter:
     T samples, C channels, P basis functions (mean, harmonics, trends), H harmonics.
 
     Attributes:
-        values: [T, C] recorded values minus mean beat, and minus a drift that was found; zero where not valid.
+        values: [T, C] recorded values minus mean beat, drift and alternation, if found; zero where not valid.
         valid: [T, C], True for the samples used: of channels that move and have enough samples.
         basis: [T, P] basis functions at the samples.
         order: [P] harmonic of each basis function; 0 for the mean.
@@ -171,6 +176,7 @@ class _Scatter:
         (a variance) by which it is multiplied.
         variance: [C] of the noise of one sample.
         drift: slow change of the beat; None for too few beats.
+        alternation: difference of odd and even beats; None for too few beats.
         stated: the stated noise compared with what was seen; None if none is stated.
         correlation: [M, 3, 3] of the noise of each marker's coordinates, as stated; None: it is independent.
     """
@@ -185,6 +191,7 @@ class _Scatter:
     density: tuple[Array, Array]
     variance: Array
     drift: Drift | None
+    alternation: Change | None
     stated: Stated | None
     correlation: Array | None
 
@@ -207,15 +214,23 @@ class _Scatter:
         valid = valid & used
         recorded = np.where(valid, recording.values, 0.0)
         # Trends are not subtracted: they would absorb some of the noise.
-        values, fitted = scatter_about(basis[:, ~trend], recorded, valid), order[~trend]
+        columns, fitted = basis[:, ~trend], order[~trend]
+        values, spare = scatter_about(columns, recorded, valid), int(valid.sum(axis=0)[used].min())
         psi, apparent = 2 * np.pi * recording.condition.flap_frequency * recording.times, advance * number.astype(float)
-        least = LEAST_DRIFT * _ranges(recorded, valid)
-        drift, widened = drift_of(values, valid, psi, apparent, harmonics, beats, least), np.ones(harmonics + 1)
-        if drift and drift.found:  # not noise: what it is, the trends show
+        least, widened = LEAST_DRIFT * _ranges(recorded, valid), np.ones(harmonics + 1)
+        # What is found to change is not noise.
+        alternation = alternation_of(values, valid, psi, apparent, harmonics, beats, least)
+        if alternation and alternation.found:
+            both = np.hstack([columns, alternation_basis(psi, harmonics)])
+            if SPARE * both.shape[1] <= spare:
+                columns, values = both, scatter_about(both, recorded, valid)
+                widened[: LINES + 1] = _widened(recording, beats)
+        drift = drift_of(values, valid, psi, apparent, harmonics, beats, least)
+        if drift and drift.found:  # what it is, the trends show
             slow, of = slow_basis(psi, apparent, beats, harmonics)
-            columns = np.hstack([basis[:, ~trend], slow])
-            if SPARE * columns.shape[1] <= valid.sum(axis=0)[used].min():
-                widened[: of.max() + 1] = (beats - 1.0) / (beats - 1.0 - (of == 0).sum())  # noise that is removed too
+            columns = np.hstack([columns, slow])
+            if SPARE * columns.shape[1] <= spare:
+                widened[: of.max() + 1] *= (beats - 1.0) / (beats - 1.0 - (of == 0).sum())  # noise that is removed too
                 values, fitted = scatter_about(columns, recorded, valid), np.concatenate([fitted, of])
         density, scale = density_at_harmonics(values, valid, advance, number, harmonics, beats)
         density *= widened
@@ -229,8 +244,8 @@ class _Scatter:
             scale = whole * variance
         known = recording.noise_correlation if stated and stated.correlated else None
         correlation = None if known is None else correlation_matrices(known)
-        noise = density, scale
-        return cls(values, valid, basis, order, trend, beats, inner, noise, variance, drift, stated, correlation)
+        noise, changes = (density, scale), (drift, alternation)
+        return cls(values, valid, basis, order, trend, beats, inner, noise, variance, *changes, stated, correlation)
 
     @property
     def principal_variances(self) -> Float[Array, "M 3"]:
@@ -292,6 +307,15 @@ def _apparent(recording: Recording) -> tuple[float, Index]:
         )
     true = step * recording.condition.flap_frequency
     return abs(true - round(true)), np.round((times - times[0]) / step).astype(np.int64)
+
+
+def _widened(recording: Recording, beats: int) -> float:
+    """Return by how much the noise near a harmonic is underestimated without two lines half-way to its neighbours.
+
+    A strobe that sees every odd beat shows these lines elsewhere, at half the sampling rate.
+    """
+    between = round(float(np.median(np.diff(recording.times))) * recording.condition.flap_frequency)
+    return lines_near(beats) / max(lines_near(beats) - 2.0, 1.0) if between % 2 == 0 else 1.0
 
 
 def _harmonics(recording: Recording, advance: float) -> int:

@@ -93,6 +93,11 @@ def _near(lines: Array, mean: Array, k: int) -> float:
     return float(mean[near].mean()) if near.any() else float(mean.mean())
 
 
+def lines_near(beats: int) -> int:
+    """Return the number of lines over which the density at a harmonic is averaged, of whole ``beats``."""
+    return 2 * int(LOCAL * beats)
+
+
 def _first_order(lines: Array, mean: Array, advance: float, harmonics: int) -> Array:
     """Density [H + 1] at harmonics 0 .. H of first-order autoregressive plus white noise, fitted to the lines.
 

@@ -47,6 +47,14 @@ def test_a_drift_of_tracks_or_forces_is_remarked_with_its_size() -> None:
     assert drift_remark([growing_forces(0.2)], ("x", "y")) == (), "not recorded"
 
 
+def test_odd_and_even_beats_that_differ_are_remarked() -> None:
+    one = growing_forces(0.0)
+    odd = np.sign(np.sin(np.pi * F * one.times))[:, None]
+    (remark,) = drift_remark([replace(one, values=one.values * (1.0 + 0.05 * odd))])
+    assert remark.startswith(f"odd and even beats differ in '{one.name}' (by 3")
+    assert "stated twice too high" in remark
+
+
 @pytest.mark.parametrize("seed", range(5))
 def test_a_steady_beat_is_not_remarked(seed: int) -> None:
     steady = growing_tracks(0.0, seed), growing_tracks(0.0, seed, noise=0.0), growing_forces(0.0, seed)

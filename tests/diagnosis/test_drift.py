@@ -117,6 +117,23 @@ def test_a_mean_that_drifts_is_not_adequate() -> None:
     assert "its mean by 1.1" in remark
 
 
+def test_odd_and_even_beats_that_differ_are_not_adequate() -> None:
+    def alternating(frequencies: tuple[float, ...], seed: int) -> list[Recording]:
+        steady = recorded({}, seed=seed, frequencies=frequencies, frames=496)
+        odd = [np.sign(np.sin(np.pi * one.condition.flap_frequency * one.times))[:, None] for one in steady]
+        return [replace(one, values=one.values * (1.0 + 0.1 * sign)) for one, sign in zip(steady, odd, strict=True)]
+
+    *_, last = diagnose_subject(
+        PendulumRig(), "odd", alternating(FREQUENCIES, 1), alternating((1.5,), 2), DiagnosisSpec(), InProcessEvaluator()
+    )
+    finding = last.finding
+    assert finding is not None
+    assert finding.verdict == "unnamed"
+    (remark,) = [remark for remark in finding.remarks if "odd and even beats" in remark]
+    assert "check the stated frequency and the drive" in remark
+    assert "Odd and even beats differ in 4 of 4 recordings" in finding.summary
+
+
 def test_a_change_of_the_mean_counts_where_the_mean_drifts() -> None:
     """And that of the first harmonic where the beat does."""
     steady = recorded({}, seed=1, frequencies=(1.7,), frames=496)
@@ -137,7 +154,7 @@ def test_a_change_of_the_mean_counts_where_the_mean_drifts() -> None:
 def test_the_sentence_fits_the_verdict(size: float, says: str) -> None:
     """Size of the drift of one recording, in its noise."""
     drift = Drift(Change(9.0, 1e-9, 1e-3 * size), NONE) if size else None
-    fits = [SimpleNamespace(drift=one, shared=0.0) for one in (drift, None)]
+    fits = [SimpleNamespace(drift=one, shared=0.0, alternation=None) for one in (drift, None)]
     recordings = [SimpleNamespace(name=name) for name in ("a", "b")]
     every = np.array([size, 0.0])
     data = SimpleNamespace(recordings=recordings, beat_fits=fits, tolerance=1e-4, drift=every, policy=POLICY)

@@ -62,6 +62,7 @@ def test_masks_come_with_their_channels_in_the_order_of_their_values() -> None:
 def test_drift_and_noise_alone_are_those_of_the_fit() -> None:
     one = recording(5e-4 * noise(31 * 8, 0.6, 1, 6))
     one = replace(one, values=one.values + 0.01 * np.cos(2 * np.pi * one.condition.flap_frequency * one.times)[:, None])
-    fit, (drift, level) = harmonic_fit(one), drift_and_noise(one)
+    fit, (drift, alternation, level) = harmonic_fit(one), drift_and_noise(one)
     assert drift == fit.drift
+    assert alternation == fit.alternation
     assert level == pytest.approx(float(np.sqrt(np.mean(fit.noise[fit.used] ** 2))))

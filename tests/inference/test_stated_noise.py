@@ -31,7 +31,7 @@ def test_a_stated_noise_that_agrees_is_used_in_every_channel(times_true: float) 
     assert fit.stated.ratio == pytest.approx(times_true, rel=0.1)
     np.testing.assert_allclose(fit.noise[fit.used], times_true * NOISE)
     np.testing.assert_allclose(fit.variance[fit.used], times_true**2 * plain.variance[plain.used])
-    assert drift_and_noise(stated(times_true))[1] == pytest.approx(times_true * NOISE)
+    assert drift_and_noise(stated(times_true))[2] == pytest.approx(times_true * NOISE)
 
 
 def test_the_channels_keep_their_own_noise() -> None:

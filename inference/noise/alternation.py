@@ -1,0 +1,91 @@
+"""Odd and even beats that differ: found against the noise, and kept apart from it.
+
+A motion or force that repeats only every two beats has spectral lines half-way between the harmonics, at 1/2, 3/2, 5/2
+of the flap frequency. Its power there is compared with that of the nearest lines, as the power of a slow change is
+(:mod:`wingfit.inference.noise.drift`). A single line, such as the hum of the mains at 5/2 of the flap frequency, is no
+beat that alternates: the change must be seen without the strongest of its lines.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from wingfit.inference.noise.change_powers import ChangePowers, compared, envelopes
+from wingfit.inference.noise.mean_beat import fourier_basis, masks_of
+from wingfit.inference.noise.slow_change import Change, orthonormal
+from wingfit.records.array_types import Array, Bool, Float, Mask
+
+LINES = 3  # half-way between harmonics: those near the harmonics in which a wing moves most
+FEWEST_BEATS = 4  # with which lines of noise lie between a harmonic and the middle
+NEAREST = 3  # spectral lines on either side with which the power is compared
+FARTHEST = 0.3  # distance of these (flap frequencies): farther ones are near a harmonic, where a drift has its power
+CERTAIN = 1e-4  # probability of noise alone below which odd and even beats count as different
+
+
+def alternation_of(
+    scatter: Float[Array, "T C"],
+    valid: Bool[Mask, "T C"],
+    psi: Float[Array, " T"],
+    apparent: Float[Array, " T"],
+    harmonics: int,
+    beats: int,
+    least: float = 0.0,
+) -> Change | None:
+    """Compare the difference of odd and even beats with the noise near its lines; arguments as of ``drift_of``.
+
+    None with too few beats, too few harmonics for two lines, or too few samples between gaps.
+    """
+    orders = half_orders(harmonics)
+    if beats < FEWEST_BEATS or len(orders) < 2:
+        return None
+    distances = np.arange(1, min(NEAREST, int(FARTHEST * beats)) + 1) / beats
+    parts = []
+    for mask, channels in masks_of(valid):
+        if not mask.any():
+            continue
+        periodic = orthonormal(fourier_basis(psi[mask], harmonics))
+        lines = [orthonormal(_line(psi[mask], k), periodic) for k in orders]
+        every = orthonormal(np.hstack(lines))
+        around = [orthonormal(envelopes(psi[mask], apparent[mask], k, distances), periodic, every) for k in orders]
+        values = scatter[np.ix_(mask, channels)]
+        steady = values - every @ (every.T @ values)
+        parts.append(ChangePowers.of(values, steady, [lines], around, every[:, :0]))
+    if not parts or min(float(one.freedom.min()) for one in parts) < 1.0:
+        return None
+    samples = int(valid.sum())
+    found, rest = compared(parts, samples), compared(_without_strongest(parts), samples)
+    seen = found.size >= least
+    return replace(found, probability=max(found.probability, rest.probability) if seen else 1.0, certain=CERTAIN)
+
+
+def half_orders(harmonics: int) -> tuple[float, ...]:
+    """Return the orders, in flap frequencies, of the first lines half-way between the ``harmonics``."""
+    return tuple(k + 0.5 for k in range(min(LINES, harmonics)))
+
+
+def alternation_basis(psi: Float[Array, " T"], harmonics: int) -> Float[Array, "T P"]:
+    """Return the waves of odd and even beats that differ, as columns [T, P]; ``psi`` [T]: phase (rad) of the beat."""
+    return np.hstack([_line(psi, k) for k in half_orders(harmonics)])
+
+
+def alternation_words(found: Sequence[tuple[str, str]]) -> str:
+    """Return a remark on recordings in which odd and even beats differ: the name of each, and by how much."""
+    where = ", ".join(f"{name} ({size})" for name, size in found)
+    return (
+        f"odd and even beats differ in {where}: motion or force repeats only every two beats (a flap frequency that is "
+        "stated twice too high, play in the drive, a vibration at half the frequency), which a model with one beat "
+        "does not explain; check the stated frequency and the drive"
+    )
+
+
+def _line(psi: Array, order: float) -> Array:
+    return np.column_stack([np.cos(order * psi), np.sin(order * psi)])
+
+
+def _without_strongest(parts: list[ChangePowers]) -> list[ChangePowers]:
+    power = sum((one.change[0] / one.level).sum(axis=-1) for one in parts)
+    strongest = int(np.argmax(power))
+    return [one.of_harmonics([k for k in range(len(one.near)) if k != strongest]) for one in parts]

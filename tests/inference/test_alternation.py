@@ -1,0 +1,89 @@
+"""Odd and even beats that differ are found, are not taken for noise, and are not seen in noise of any colour."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from tests.inference.test_harmonic import CONDITION, noise
+from wingfit.inference.noise.harmonic import harmonic_fit
+from wingfit.records import Recording
+
+Array = npt.NDArray[np.float64]
+SIGMA = 5e-4  # m
+
+
+def recording(values: Array, whole: int) -> Recording:
+    """Tracks of 30 frames an apparent beat; between two frames are as many ``whole`` beats, and a thirtieth."""
+    times = np.asarray(np.arange(len(values)) * (whole + 1.0 / 30.0) / CONDITION.flap_frequency, np.float64)
+    return Recording(
+        "r", "vacuum_chamber", CONDITION, times, tuple(f"m{k}" for k in range(values.shape[1] // 3)), values
+    )
+
+
+def alternating(
+    beats: int, change: float, seed: int = 1, *, memory: float = 0.6, channels: int = 30, whole: int = 0
+) -> Recording:
+    """Tracks whose odd beats are larger than the mean by the fraction ``change``, and whose even ones are smaller."""
+    psi, wave = steady(beats, channels, whole)
+    sizes = 1.0 + change * np.sign(np.sin(psi / 2.0))
+    return recording(wave * sizes[:, None] + SIGMA * noise(len(psi), memory, seed, channels), whole)
+
+
+def steady(beats: int, channels: int = 30, whole: int = 0) -> tuple[Array, Array]:
+    """Phase [T] (rad), and motion [T, C] with 10 to 20 mm of the first harmonic."""
+    psi = 2.0 * np.pi * CONDITION.flap_frequency * recording(np.zeros((30 * beats, 3)), whole).times
+    size = np.linspace(0.01, 0.02, channels)
+    return psi, np.cos(psi)[:, None] * size + 0.2 * size * np.sin(2.0 * psi)[:, None]
+
+
+@pytest.mark.parametrize("beats", [4, 5, 8])
+@pytest.mark.parametrize("whole", [0, 1])
+def test_a_difference_of_odd_and_even_beats_is_found_with_its_size(beats: int, whole: int) -> None:
+    found = harmonic_fit(alternating(beats, 0.1, whole=whole)).alternation
+    assert found is not None
+    assert found.found
+    motion = float(np.sqrt(np.mean(steady(beats)[1] ** 2)))
+    assert found.size == pytest.approx(0.1 * motion, rel=0.15), "lines up to 5/2 of the flap frequency have most of it"
+
+
+@pytest.mark.parametrize("whole", [0, 1])
+def test_the_noise_is_that_of_beats_that_do_not_alternate(whole: int) -> None:
+    alike, different = (harmonic_fit(alternating(8, change, whole=whole)) for change in (0.0, 0.1))
+    assert not alike.drift or not alike.drift.found
+    assert not different.drift or not different.drift.found
+    low = alike.order <= 1
+    np.testing.assert_allclose(different.variance[:, low].mean(), alike.variance[:, low].mean(), rtol=0.3)
+
+
+@pytest.mark.parametrize("memory", [0.0, 0.6, 0.98])
+@pytest.mark.parametrize("beats", [4, 10])
+def test_noise_of_any_colour_is_no_alternation(memory: float, beats: int) -> None:
+    for seed in range(10):
+        found = harmonic_fit(alternating(beats, 0.0, seed, memory=memory)).alternation
+        assert found is not None
+        assert not found.found
+
+
+def test_beats_that_scatter_in_size_do_not_alternate() -> None:
+    psi, wave = steady(10)
+    for seed in range(10):
+        sizes = 1.0 + 0.05 * np.random.default_rng(seed).standard_normal(11)
+        beat = (psi / (2.0 * np.pi)).astype(int)
+        values = wave * sizes[beat][:, None] + 0.2 * SIGMA * noise(300, 0.0, seed, 30)
+        found = harmonic_fit(recording(values, 0)).alternation
+        assert found is not None
+        assert not found.found
+
+
+def test_a_hum_at_one_line_is_no_alternation() -> None:
+    psi, wave = steady(10)
+    hum = 2e-3 * np.cos(2.5 * psi)[:, None]
+    found = harmonic_fit(recording(wave + hum + SIGMA * noise(300, 0.3, 1, 30), 0)).alternation
+    assert found is not None
+    assert not found.found
+
+
+def test_three_beats_are_too_few() -> None:
+    assert harmonic_fit(alternating(3, 0.1)).alternation is None
