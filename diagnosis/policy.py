@@ -75,6 +75,12 @@ class Policy:
         "nominal excess",
         "recordings with a beat: most right effects leave less, and many imitations of another cause leave more",
     )
+    mechanism_left: float = _threshold(
+        0.05,
+        "nominal excess",
+        "an effect that only describes how recordings differ is no more probable than a mechanism that is like it and "
+        "leaves no more",
+    )
     imitation: float = _threshold(
         2.0, "effective samples, relative", "how steeply a hypothesis that leaves more becomes improbable"
     )

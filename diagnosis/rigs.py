@@ -258,6 +258,7 @@ def _suspect(effect: Effect, rig: Wing | Vehicle, cameras: Cameras) -> Suspect:
         signature=effect.signature,
         location_genes=location_genes,
         confused_with=effect.confused_with,
+        descriptive=effect.descriptive,
         candidate_shapes=shapes,
         positions={f"{effect.name}.{p.name}": p.positions for p in effect.size if p.positions},
     )

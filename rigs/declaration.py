@@ -64,6 +64,7 @@ class SuspectDeclaration(_Declared):
     confused_with: Annotated[list[Name], Field(max_length=MOST)] = []
     candidate_shapes: Annotated[list[Annotated[list[Number], Field(max_length=MOST)]], Field(max_length=MOST)] = []
     positions: Annotated[dict[Name, Annotated[list[Number], Field(max_length=MOST)]], Field(max_length=MOST)] = {}
+    descriptive: bool = False
 
 
 class PortDeclaration(_Declared):
@@ -159,6 +160,7 @@ def _suspect_json(suspect: Suspect) -> dict[str, Any]:
         "confused_with": list(suspect.confused_with),
         "candidate_shapes": [list(one) for one in suspect.candidate_shapes],
         "positions": {name: list(values) for name, values in suspect.positions.items()},
+        "descriptive": suspect.descriptive,
     }
 
 

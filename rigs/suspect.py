@@ -35,6 +35,8 @@ class Suspect:
             empty means that the score test spreads its own trials.
         positions: values that a size gene can have besides zero, by its name, where it is a choice rather than an
             amount (a wrong sign): a fit that ends between them is no hypothesis.
+        descriptive: whether it describes how parameters differ between recordings, but not why; then it is no more
+            probable than a mechanism that explains nearly as much.
     """
 
     name: str
@@ -49,6 +51,7 @@ class Suspect:
     confused_with: tuple[str, ...] = ()
     candidate_shapes: tuple[tuple[float, ...], ...] = ()
     positions: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    descriptive: bool = False
 
     def __post_init__(self) -> None:
         refuse_text(self, "size_genes", "confused_with")

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from wingfit.calibration.problem import compared
-from wingfit.inference.noise.alternation import alternation_words
-from wingfit.inference.noise.drift import Drift
+from wingfit.inference.noise.changes.alternation import alternation_words
+from wingfit.inference.noise.changes.drift import Drift
+from wingfit.inference.noise.changes.slow_change import Change
 from wingfit.inference.noise.harmonic import drift_and_noise, whole_markers
-from wingfit.inference.noise.slow_change import Change
 from wingfit.records import Recording
 
 LEAST = 0.1  # of the root mean square of the noise: smaller changes are not remarked

@@ -10,10 +10,10 @@ from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.finding import amount
 from wingfit.diagnosis.verdict.noise_doubt import UNEVEN, faint, noisier, quiet_noise
 from wingfit.diagnosis.verdict.weigh_hypotheses import drifts
-from wingfit.inference.noise.alternation import alternation_words
-from wingfit.inference.noise.drift import Drift
+from wingfit.inference.noise.changes.alternation import alternation_words
+from wingfit.inference.noise.changes.drift import Drift
+from wingfit.inference.noise.changes.slow_change import Change
 from wingfit.inference.noise.harmonic import still_markers
-from wingfit.inference.noise.slow_change import Change
 from wingfit.inference.noise.stated import Stated
 from wingfit.records import FrameError
 from wingfit.records.array_types import Array, Float

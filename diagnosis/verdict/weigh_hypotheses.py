@@ -30,7 +30,7 @@ from wingfit.diagnosis.evidence.refit import Refit
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.policy import POLICY, Policy
 from wingfit.diagnosis.verdict.noise_doubt import noise_may_hide, sure_error
-from wingfit.records.array_types import Array, Float
+from wingfit.records.array_types import Array, Bool, Float, Mask
 
 MANY = 3
 """So many effects together imitate almost any law: they are no more probable than one law outside the library."""
@@ -87,6 +87,7 @@ def weigh(
     weight = np.where(possible, evidence - imitates, -np.inf)
     # One whose size may be zero is no more probable than the best of the others, so that it is never named alone.
     weight[rival] = np.minimum(weight[rival], weight[~rival].max())
+    weight = _beside_mechanisms(hypotheses, weight, excess < policy.mechanism_left * excess[0])
     if data.kind != "series":
         closer = _unknown(data, tau + policy.several_left**2 * excess[0])
         several = _imitation_by_several(hypotheses, weight, unknown, closer)
@@ -105,6 +106,26 @@ def weigh(
         imitated = policy.partial_doubt * np.array([0.0, *(probabilities[1:] * partial)])
         probabilities, unknown = probabilities - imitated, unknown + float(imitated.sum())
     return HypothesisWeights(hypotheses, evidence - evidence[0], probabilities, unknown, excess, data.policy, floor)
+
+
+def _beside_mechanisms(hypotheses: Sequence[Refit], weight: Array, fits: Bool[Mask, " H"]) -> Array:
+    """Return the log weights [H], those of descriptive effects at most that of the best mechanism that they resemble.
+
+    Any law of the air makes coefficients that seem to vary with flight, and of another form than that of the library.
+    ``fits`` [H]: whether a hypothesis leaves so little that this form may be the reason.
+    """
+    found, descriptive = weight.copy(), [any(t.suspect.descriptive for t in one.trials) for one in hypotheses]
+    rivals = [j for j in range(len(weight)) if fits[j] and not descriptive[j] and np.isfinite(weight[j])]
+    for k in np.flatnonzero(descriptive).tolist():
+        mechanisms = [weight[j] for j in rivals if _are_alike(hypotheses[k], hypotheses[j])]
+        found[k] = min(weight[k], max(mechanisms, default=weight[k]))
+    return found
+
+
+def _are_alike(one: Refit, other: Refit) -> bool:
+    """Return whether an effect of ``one`` is said to be confused with one of the ``other``, or the reverse."""
+    confused, confusing = ({c for trial in some.trials for c in trial.suspect.confused_with} for some in (one, other))
+    return bool(confused & set(other.names) or confusing & set(one.names))
 
 
 def leaves_a_rest(data: WhitenedData, nominal: Refit, refit: Refit, floor: float) -> bool:

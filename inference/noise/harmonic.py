@@ -18,11 +18,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import elliprg
 
-from wingfit.inference.noise.alternation import LINES, alternation_basis, alternation_of
-from wingfit.inference.noise.drift import Drift, drift_of, slow_basis
+from wingfit.inference.noise.changes.alternation import LINES, alternation_basis, alternation_of
+from wingfit.inference.noise.changes.drift import Drift, drift_of, slow_basis
+from wingfit.inference.noise.changes.slow_change import Change
 from wingfit.inference.noise.mean_beat import fourier_basis, masks_of, scatter_about
 from wingfit.inference.noise.shared_pattern import shared_part
-from wingfit.inference.noise.slow_change import Change
 from wingfit.inference.noise.spectrum import density_at_harmonics, lag1_autocorrelation, lines_near
 from wingfit.inference.noise.stated import Stated, correlation_matrices, stated_noise
 from wingfit.records import Recording

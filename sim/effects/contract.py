@@ -122,6 +122,7 @@ class Effect:
             "observation".
         observed: kinds of recording that ``observe`` acts on.
         of_rods: whether it needs a wing with rods.
+        descriptive: whether it describes how coefficients differ between conditions, but not why.
     """
 
     name: str
@@ -144,6 +145,7 @@ class Effect:
     observe: Callable[[Sampling, Values], None] | None = None
     observed: tuple[Literal["tracks", "forces"], ...] = ()
     of_rods: bool = False
+    descriptive: bool = False
 
     def __post_init__(self) -> None:
         if self.family not in FAMILIES[self.port]:

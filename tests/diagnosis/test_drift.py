@@ -15,8 +15,8 @@ from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.policy import POLICY
 from wingfit.diagnosis.verdict.noise_remarks import drift_sentence, noise_remarks
 from wingfit.diagnosis.verdict.weigh_hypotheses import drifts
-from wingfit.inference.noise.drift import Drift
-from wingfit.inference.noise.slow_change import Change
+from wingfit.inference.noise.changes.drift import Drift
+from wingfit.inference.noise.changes.slow_change import Change
 from wingfit.records import Recording
 from wingfit.workers.in_process import InProcessEvaluator
 

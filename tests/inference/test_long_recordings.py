@@ -10,7 +10,7 @@ import pytest
 
 from tests.inference.test_harmonic import noise, recording
 from wingfit.inference.noise import spectrum
-from wingfit.inference.noise.drift import drift_of
+from wingfit.inference.noise.changes.drift import drift_of
 from wingfit.inference.noise.harmonic import drift_and_noise, harmonic_fit
 from wingfit.inference.noise.mean_beat import masks_of
 

@@ -19,13 +19,17 @@ def refit(
     family: str = "structure",
     predicted: float | None = None,
     drift: float = 1.0,
+    confused_with: tuple[str, ...] | None = None,
 ) -> Refit:
     """A refit with a residual of ``left`` noises (RMS), cross-validated to the same unless ``predicted``.
 
-    ``drift``: mean square of the slow change of the beat that it leaves.
+    ``drift``: mean square of the slow change of the beat that it leaves; ``confused_with``: makes it descriptive.
     """
+    others = {"confused_with": confused_with or (), "descriptive": confused_with is not None}
     trials = tuple(
-        SimpleNamespace(suspect=SimpleNamespace(name=n, family=family, genes=(), size_genes=()), freedom=genes)
+        SimpleNamespace(
+            suspect=SimpleNamespace(name=n, family=family, genes=(), size_genes=(), **others), freedom=genes
+        )
         for n in names
     )
     fit = SimpleNamespace(coefficients=drift)

@@ -173,6 +173,17 @@ def test_equally_good_effects_are_ambiguous() -> None:
     assert verdict(2.0, refit(0.30, ("a",)), refit(0.31, ("b",)))[0] == "ambiguous"
 
 
+@pytest.mark.parametrize(("left", "expected"), [(0.6, "ambiguous"), (1.5, "named")])
+def test_a_description_is_named_only_where_no_mechanism_like_it_leaves_nearly_as_little(
+    left: float, expected: str
+) -> None:
+    """Leaving 0.6 of 5 noises, 1.4 % of the excess, may be due to the form of the mechanism's law; 9 % is not."""
+    described, mechanism = refit(0.2, ("varying",), confused_with=("stall",)), refit(left, ("stall",))
+    assert verdict(5.0, described, mechanism)[0] == expected
+    assert verdict(5.0, described, refit(left, ("another",)))[0] == "named"
+    assert verdict(5.0, refit(0.2, ("varying",)), mechanism)[0] == "named"
+
+
 def test_the_effect_common_to_all_possible_hypotheses_is_named() -> None:
     """A second effect is uncertain but the first is not; where the first alone is not possible, none is named."""
     both = [refit(0.46, ("a",)), refit(0.30, ("a", "b"), 1)]

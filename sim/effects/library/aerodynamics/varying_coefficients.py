@@ -62,4 +62,5 @@ EFFECT = effect_of_air(
     "conditions and too large in others, with the same shape over the beat",
     confused_with=("circulation_lag", "tip_loss", "mass_offset", "dynamic_stall", "stall_vortex"),
     vehicle=_vary,
+    descriptive=True,
 )

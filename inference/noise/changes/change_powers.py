@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy
 
-from wingfit.inference.noise.slow_change import Change, independent_sources, rank
+from wingfit.inference.noise.changes.slow_change import Change, independent_sources, rank
 from wingfit.records.array_types import Array
 
 RISE = 1.5  # largest ratio of the density of noise at a harmonic to that around it that counts as usual

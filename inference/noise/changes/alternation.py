@@ -2,8 +2,8 @@
 
 A motion or force that repeats only every two beats has spectral lines half-way between the harmonics, at 1/2, 3/2, 5/2
 of the flap frequency. Its power there is compared with that of the nearest lines, as the power of a slow change is
-(:mod:`wingfit.inference.noise.drift`). A single line, such as the hum of the mains at 5/2 of the flap frequency, is no
-beat that alternates: the change must be seen without the strongest of its lines.
+(:mod:`wingfit.inference.noise.changes.drift`). A single line, such as the hum of the mains at 5/2 of the flap
+frequency, is no beat that alternates: the change must be seen without the strongest of its lines.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from wingfit.inference.noise.change_powers import ChangePowers, compared, envelopes
+from wingfit.inference.noise.changes.change_powers import ChangePowers, compared, envelopes
+from wingfit.inference.noise.changes.slow_change import Change, orthonormal
 from wingfit.inference.noise.mean_beat import fourier_basis, masks_of
-from wingfit.inference.noise.slow_change import Change, orthonormal
 from wingfit.records.array_types import Array, Bool, Float, Mask
 
 LINES = 3  # half-way between harmonics: those near the harmonics in which a wing moves most

@@ -9,7 +9,7 @@ harmonics, their two phases, and channels only as far as their noise near the ha
 size: beats that scatter in size change all of them alike.
 
 The mean of the beat is compared apart from the harmonics, because slow noise rises towards it
-(:mod:`wingfit.inference.noise.drift_of_mean`).
+(:mod:`wingfit.inference.noise.changes.drift_of_mean`).
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.polynomial import legendre
 
-from wingfit.inference.noise.change_powers import ChangePowers, compared, envelopes, waves
-from wingfit.inference.noise.drift_of_mean import MeanPowers, change_of_mean, mean_distances
+from wingfit.inference.noise.changes.change_powers import ChangePowers, compared, envelopes, waves
+from wingfit.inference.noise.changes.drift_of_mean import MeanPowers, change_of_mean, mean_distances
+from wingfit.inference.noise.changes.slow_change import Change, orthonormal
 from wingfit.inference.noise.mean_beat import fourier_basis, masks_of
-from wingfit.inference.noise.slow_change import Change, orthonormal
 from wingfit.records.array_types import Array, Bool, Float, Index, Int, Mask
 
 HARMONICS = 3  # compared: those in which a wing moves most

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from wingfit.inference.noise.slow_change import Change, independent_sources
+from wingfit.inference.noise.changes.slow_change import Change, independent_sources
 from wingfit.records.array_types import Array, Float
 
 MEAN_LINES = 12  # spectral lines above zero from which the noise is extrapolated, up to half the flap frequency
