@@ -30,30 +30,42 @@ def covariance(data: WhitenedData, fit: Fit) -> Float[Array, "F F"]:
     than its few samples show; and how far errors of the description move them that are not integrated out. The weight
     is the share of noise in what moves genes: the jackknife sees the noise too, and only its other share is added.
     """
-    white, slopes = data.whiten(fit.coefficients), data.whitened_slopes(fit.jacobian)
-    weight, recordings = data.likelihood_weight(fit.coefficients), len(data.recordings)
-    weight = min(weight, data.max_likelihood_weight)
-    prior = np.eye(len(fit.unit)) / PRIOR_SD**2
-    meat = weight * slopes.T @ slopes + prior
-    bread = np.linalg.inv(meat)
-    if _clustered(data) and recordings > 1:
-        scores = weight * np.array([slopes[part].T @ white[part] for part in data.recording_slices])
-        scores -= scores.mean(axis=0)
-        meat = meat + recordings / (recordings - 1.0) * scores.T @ scores
-    found = bread @ meat @ bread + disagreement(data, fit)
+    slopes, weight = data.whitened_slopes(fit.jacobian), _weight(data, fit)
+    known = np.linalg.inv(_information(slopes, weight))
+    found = known + disagreement(data, fit)
     if data.rigid_errors is not None:
-        moves = bread @ (weight * slopes.T @ data.whitened_slopes(data.rigid_errors))
+        moves = known @ (weight * slopes.T @ data.whitened_slopes(data.rigid_errors))
         found = found + moves @ moves.T
     return np.asarray(found)
 
 
+def _weight(data: WhitenedData, fit: Fit) -> float:
+    return min(data.likelihood_weight(fit.coefficients), data.max_likelihood_weight)
+
+
+def _information(slopes: Float[Array, "D F"], weight: float) -> Float[Array, "F F"]:
+    """Return the information [F, F] of the likelihood, with its ``weight``, and of the prior."""
+    return np.asarray(weight * slopes.T @ slopes + np.eye(slopes.shape[1]) / PRIOR_SD**2)
+
+
 def disagreement(data: WhitenedData, fit: Fit) -> Float[Array, "F F"]:
-    """Return the part of :func:`covariance` [F, F] that recordings of tracks show by their disagreement."""
-    if data.kind != "tracks" or len(data.recordings) < 2:
+    """Return the part of :func:`covariance` [F, F] that recordings show by their disagreement."""
+    if len(data.recordings) < 2 or data.kind not in ("tracks", "forces"):
         return np.zeros((len(fit.unit), len(fit.unit)))
-    weight = min(data.likelihood_weight(fit.coefficients), data.max_likelihood_weight)
-    white, slopes = data.whiten(fit.coefficients), data.whitened_slopes(fit.jacobian)
-    return (1.0 - weight) * _jackknife(data, white, slopes, weight)
+    white, slopes, weight = data.whiten(fit.coefficients), data.whitened_slopes(fit.jacobian), _weight(data, fit)
+    if data.kind == "tracks":
+        return (1.0 - weight) * _jackknife(data, white, slopes, weight)
+    return _sandwich(data, white, slopes, weight)
+
+
+def _sandwich(data: WhitenedData, white: Array, slopes: Float[Array, "D F"], weight: float) -> Float[Array, "F F"]:
+    """Return the covariance [F, F] of genes by the scatter of the recordings' scores; arguments as of `_jackknife`.
+
+    Beats of a force differ in size with all harmonics, so only whole recordings are independent.
+    """
+    scores = weight * np.array([slopes[part].T @ white[part] for part in data.recording_slices])
+    moves = (scores - scores.mean(axis=0)) @ np.linalg.inv(_information(slopes, weight))
+    return np.asarray(len(moves) / (len(moves) - 1.0) * moves.T @ moves)
 
 
 def _jackknife(data: WhitenedData, white: Array, slopes: Float[Array, "D F"], weight: float) -> Float[Array, "F F"]:
@@ -62,18 +74,12 @@ def _jackknife(data: WhitenedData, white: Array, slopes: Float[Array, "D F"], we
     ``white`` [D]: whitened residual of the fit to all recordings, with ``slopes`` and the ``weight`` of the likelihood
     (Tukey 1958; MacKinnon and White 1985, Sec. 3: it allows for what a fit absorbs).
     """
-    prior = np.eye(slopes.shape[1]) / PRIOR_SD**2
     grams = [weight * slopes[part].T @ slopes[part] for part in data.recording_slices]
     scores = [weight * slopes[part].T @ white[part] for part in data.recording_slices]
-    whole = sum(grams) + prior
+    whole = _information(slopes, weight)
     moves = np.array([np.linalg.solve(whole - gram, score) for gram, score in zip(grams, scores, strict=True)])
     moves -= moves.mean(axis=0)
     return np.asarray((len(moves) - 1.0) / len(moves) * moves.T @ moves)
-
-
-def _clustered(data: WhitenedData) -> bool:
-    """Return whether only whole recordings are independent: beats of a force differ in size with all harmonics."""
-    return any(recording.kind == "forces" for recording in data.recordings)
 
 
 def gene_values(data: WhitenedData, refit: Refit) -> tuple[GeneValue, ...]:
@@ -97,7 +103,5 @@ def freedom(data: WhitenedData, fit: Fit, variances: Float[Array, " F"]) -> Floa
     The parts of a variance that are known have infinitely many (Satterthwaite 1946).
     """
     recordings = max(len(data.recordings) - 1, 1)
-    if _clustered(data):
-        return np.full(len(variances), float(recordings))
     share = np.diag(disagreement(data, fit)) / variances
     return np.asarray(recordings / np.maximum(share, 1e-6) ** 2)
