@@ -36,7 +36,7 @@ class Suspect:
         positions: values that a size gene can have besides zero, by its name, where it is a choice rather than an
             amount (a wrong sign): a fit that ends between them is no hypothesis.
         descriptive: whether it describes how parameters differ between recordings, but not why; then it is no more
-            probable than a mechanism that explains nearly as much.
+            probable than a mechanism with which it may be confused, and which leaves little more.
     """
 
     name: str

@@ -181,22 +181,28 @@ class WhitenedData:
         """Change of the beat in each recording [R] that noise does not explain, divided by its noise of a sample.
 
         Both are root mean squares over the recording's used channels; zero where noise explains the change. It is a
-        slow change, or a difference of odd and even beats. Where the markers share a part of the noise that is not
-        small, that part counts as a change too.
+        slow change; where the markers share a part of the noise that is not small, that part counts as a change too.
         """
         if self.kind == "series":
             return np.zeros(len(self.recordings))
         noise = self.noise_of_recordings
         slow = [fit.drift.size if fit.drift else 0.0 for fit in self.beat_fits]
-        odd = [fit.alternation.size if fit.alternation and fit.alternation.found else 0.0 for fit in self.beat_fits]
         found = np.maximum(
-            np.hypot(slow, odd),
+            slow,
             [
                 np.sqrt(fit.shared) * one * (fit.shared > self.policy.shared)
                 for fit, one in zip(self.beat_fits, noise, strict=True)
             ],
         )
         return np.asarray(found / np.maximum(noise, self.tolerance))
+
+    @cached_property
+    def alternation(self) -> Float[Array, " R"]:
+        """Difference of odd and even beats in each recording [R], as of :meth:`drift`."""
+        if self.kind == "series":
+            return np.zeros(len(self.recordings))
+        found = [fit.alternation.size if fit.alternation and fit.alternation.found else 0.0 for fit in self.beat_fits]
+        return np.asarray(found / np.maximum(self.noise_of_recordings, self.tolerance))
 
     def change_of_beat(self, coefficients: Float[Array, " D"]) -> float:
         """Return the mean square beyond noise (m^2 or N^2) of a residual's linear change of mean and first harmonic.

@@ -26,7 +26,7 @@ from wingfit.diagnosis.search_state import SearchState
 from wingfit.diagnosis.subject import beat_subject
 from wingfit.diagnosis.verdict.proof import ResidualPair
 from wingfit.diagnosis.verdict.verdict import Decision, is_measurement_fault
-from wingfit.diagnosis.verdict.weigh_hypotheses import only_drifts
+from wingfit.diagnosis.verdict.weigh_hypotheses import only_changes
 
 Step = tuple[float, str, Located | None]
 
@@ -41,7 +41,7 @@ def locate_in_beat(
     ``fitted``, ``held_out``: residuals of both, in the recordings that were fitted and in those that were predicted.
     """
     subject, data, missing = beat_subject(state.subject), state.data, MissingPhysics()
-    nominal, drifting = state.fitted_nominal.refit, _only_drifts(state, decision)
+    nominal, drifting = state.fitted_nominal.refit, _only_changes(state, decision)
     if not drifting and (decision.verdict == "unnamed" or _is_load(decision, best)):
         for fraction, stage, found in _locate(state, unnamed=decision.verdict == "unnamed"):
             missing = found
@@ -62,11 +62,11 @@ def locate_in_beat(
     yield 1.0, "locating the missing physics", located
 
 
-def _only_drifts(state: SearchState, decision: Decision) -> bool:
+def _only_changes(state: SearchState, decision: Decision) -> bool:
     """Return whether only a drift speaks against the nominal model: then its misfit shows no place on the wing."""
     nominal = state.fitted_nominal
     floor = state.floor(nominal.possible_error)
-    return decision.verdict in ("unnamed", "ambiguous") and only_drifts(state.data, nominal.refit, floor)
+    return decision.verdict in ("unnamed", "ambiguous") and only_changes(state.data, nominal.refit, floor)
 
 
 def _is_load(decision: Decision, best: Refit) -> bool:

@@ -31,6 +31,7 @@ from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.policy import POLICY, Policy
 from wingfit.diagnosis.verdict.noise_doubt import noise_may_hide, sure_error
 from wingfit.records.array_types import Array, Bool, Float, Mask
+from wingfit.rigs.suspect import Suspect
 
 MANY = 3
 """So many effects together imitate almost any law: they are no more probable than one law outside the library."""
@@ -72,8 +73,8 @@ def weigh(
     evidence = _evidence(data, tau + excess, genes, effects, suspects)
     unknown = _unknown(data, tau + policy.unknown_residual**2 * excess[0])
     possible, rival = np.ones(len(hypotheses), bool), np.zeros(len(hypotheses), bool)
-    drift_alone = only_drifts(data, nominal, floor)
-    if nominal_refuted(data, beyond_chance(data, nominal), floor, error) or (drifts(data) and not drift_alone):
+    drift_alone = only_changes(data, nominal, floor)
+    if nominal_refuted(data, beyond_chance(data, nominal), floor, error) or (changes(data) and not drift_alone):
         # A hypothesis that leaves the misfit as it was explains nothing; nor does the nominal model. With few
         # recordings, one that explains most of the misfit may have little evidence; with a single experiment, nothing
         # shows that it predicts.
@@ -82,12 +83,13 @@ def weigh(
             possible[k] = hypotheses[k].predicted is not None
             rival[k] = possible[k] and absent(data, hypotheses[k])
     if drift_alone:
-        possible &= [explains_drift(data, nominal, one) for one in hypotheses]
+        possible &= [not alternates(data) and explains_drift(data, nominal, one) for one in hypotheses]
     imitates = _imitation(data, hypotheses, floor, error)
     weight = np.where(possible, evidence - imitates, -np.inf)
     # One whose size may be zero is no more probable than the best of the others, so that it is never named alone.
     weight[rival] = np.minimum(weight[rival], weight[~rival].max())
-    weight = _beside_mechanisms(hypotheses, weight, excess < policy.mechanism_left * excess[0])
+    likely = (excess < policy.mechanism_left * excess[0]) & (weight > unknown)
+    weight = _beside_mechanisms(hypotheses, weight, likely)
     if data.kind != "series":
         closer = _unknown(data, tau + policy.several_left**2 * excess[0])
         several = _imitation_by_several(hypotheses, weight, unknown, closer)
@@ -108,24 +110,31 @@ def weigh(
     return HypothesisWeights(hypotheses, evidence - evidence[0], probabilities, unknown, excess, data.policy, floor)
 
 
-def _beside_mechanisms(hypotheses: Sequence[Refit], weight: Array, fits: Bool[Mask, " H"]) -> Array:
-    """Return the log weights [H], those of descriptive effects at most that of the best mechanism that they resemble.
+def _beside_mechanisms(hypotheses: Sequence[Refit], weight: Array, likely: Bool[Mask, " H"]) -> Array:
+    """Return the log weights [H], those of descriptive effects at most that of the best mechanism that is like them.
 
     Any law of the air makes coefficients that seem to vary with flight, and of another form than that of the library.
-    ``fits`` [H]: whether a hypothesis leaves so little that this form may be the reason.
+    ``likely`` [H]: whether a hypothesis leaves so little that this form may be the reason.
     """
-    found, descriptive = weight.copy(), [any(t.suspect.descriptive for t in one.trials) for one in hypotheses]
-    rivals = [j for j in range(len(weight)) if fits[j] and not descriptive[j] and np.isfinite(weight[j])]
-    for k in np.flatnonzero(descriptive).tolist():
-        mechanisms = [weight[j] for j in rivals if _are_alike(hypotheses[k], hypotheses[j])]
+    found = weight.copy()
+    for k, one in enumerate(hypotheses):
+        described = [trial.suspect for trial in one.trials if trial.suspect.descriptive]
+        mechanisms = [
+            weight[j]
+            for j, other in enumerate(hypotheses)
+            if likely[j] and len(other.trials) <= len(one.trials) and _is_like(described, other)
+        ]
         found[k] = min(weight[k], max(mechanisms, default=weight[k]))
     return found
 
 
-def _are_alike(one: Refit, other: Refit) -> bool:
-    """Return whether an effect of ``one`` is said to be confused with one of the ``other``, or the reverse."""
-    confused, confusing = ({c for trial in some.trials for c in trial.suspect.confused_with} for some in (one, other))
-    return bool(confused & set(other.names) or confusing & set(one.names))
+def _is_like(described: Sequence[Suspect], other: Refit) -> bool:
+    """Return whether one of the ``described`` may be confused with one of ``other``, which are all mechanisms."""
+    mechanisms = [trial.suspect for trial in other.trials]
+    if any(one.descriptive for one in mechanisms):
+        return False
+    pairs = ((one, that) for one in described for that in mechanisms)
+    return any(that.name in one.confused_with or one.name in that.confused_with for one, that in pairs)
 
 
 def leaves_a_rest(data: WhitenedData, nominal: Refit, refit: Refit, floor: float) -> bool:
@@ -298,12 +307,22 @@ def drifts(data: WhitenedData) -> bool:
     return bool(np.max(data.drift) > data.policy.negligible)
 
 
-def only_drifts(data: WhitenedData, nominal: Refit, floor: float) -> bool:
-    """Return whether the beat changes slowly and the ``nominal`` model's misfit of the mean beat is within the noise.
+def alternates(data: WhitenedData) -> bool:
+    """Return whether odd and even beats differ in any recording, by more than what counts as none."""
+    return bool(np.max(data.alternation) > data.policy.negligible)
+
+
+def changes(data: WhitenedData) -> bool:
+    """Return whether the beat changes in any recording, slowly or from beat to beat."""
+    return drifts(data) or alternates(data)
+
+
+def only_changes(data: WhitenedData, nominal: Refit, floor: float) -> bool:
+    """Return whether the beat changes and the ``nominal`` model's misfit of the mean beat is within the noise.
 
     ``floor`` (m or N): discretisation error.
     """
-    if not drifts(data):
+    if not changes(data):
         return False
     return not nominal_refuted(data, data.mean_beat_excess(nominal.fit.coefficients), floor)
 
@@ -342,7 +361,7 @@ def nominal_suffices(data: WhitenedData, nominal: Refit, suspects: int, floor: f
 
     ``floor`` (m or N): discretisation error.
     """
-    if nominal_refuted(data, beyond_chance(data, nominal), floor) or drifts(data) or doubtful(data, nominal, floor):
+    if nominal_refuted(data, beyond_chance(data, nominal), floor) or changes(data) or doubtful(data, nominal, floor):
         return False
     tau = tolerated_excess(data, nominal.excess, floor)
     excess = _misfit(data, nominal, tau)

@@ -18,12 +18,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import elliprg
 
-from wingfit.inference.noise.changes.alternation import LINES, alternation_basis, alternation_of
+from wingfit.inference.noise.changes.alternation import alternation_basis, alternation_of, apparent_lines, half_orders
 from wingfit.inference.noise.changes.drift import Drift, drift_of, slow_basis
 from wingfit.inference.noise.changes.slow_change import Change
 from wingfit.inference.noise.mean_beat import fourier_basis, masks_of, scatter_about
 from wingfit.inference.noise.shared_pattern import shared_part
-from wingfit.inference.noise.spectrum import density_at_harmonics, lag1_autocorrelation, lines_near
+from wingfit.inference.noise.spectrum import density_at_harmonics, lag1_autocorrelation
 from wingfit.inference.noise.stated import Stated, correlation_matrices, stated_noise
 from wingfit.records import Recording
 from wingfit.records.array_types import Array, Bool, Float, Index, Int, Mask
@@ -219,12 +219,15 @@ class _Scatter:
         psi, apparent = 2 * np.pi * recording.condition.flap_frequency * recording.times, advance * number.astype(float)
         least, widened = LEAST_DRIFT * _ranges(recorded, valid), np.ones(harmonics + 1)
         # What is found to change is not noise.
-        alternation = alternation_of(values, valid, psi, apparent, harmonics, beats, least)
+        step = _step(recording) * recording.condition.flap_frequency
+        orders, removed = half_orders(recording.kind, harmonics, step, int(number[-1]) + 1), np.zeros(0)
+        alternation = alternation_of(values, valid, psi, apparent, harmonics, beats, orders, least)
         if alternation and alternation.found:
-            both = np.hstack([columns, alternation_basis(psi, harmonics)])
+            both = np.hstack([columns, alternation_basis(psi, orders)])
             if SPARE * both.shape[1] <= spare:
                 columns, values = both, scatter_about(both, recorded, valid)
-                widened[: LINES + 1] = _widened(recording, beats)
+                fitted = np.concatenate([fitted, np.repeat(np.array(orders).astype(np.int64), 2)])
+                removed = apparent_lines(orders, step, advance)
         drift = drift_of(values, valid, psi, apparent, harmonics, beats, least)
         if drift and drift.found:  # what it is, the trends show
             slow, of = slow_basis(psi, apparent, beats, harmonics)
@@ -232,7 +235,7 @@ class _Scatter:
             if SPARE * columns.shape[1] <= spare:
                 widened[: of.max() + 1] *= (beats - 1.0) / (beats - 1.0 - (of == 0).sum())  # noise that is removed too
                 values, fitted = scatter_about(columns, recorded, valid), np.concatenate([fitted, of])
-        density, scale = density_at_harmonics(values, valid, advance, number, harmonics, beats)
+        density, scale = density_at_harmonics(values, valid, advance, number, harmonics, beats, removed)
         density *= widened
         taken = scale * density[fitted].sum()  # power of the noise that the fit of the mean beat absorbs
         variance = ((values**2).sum(axis=0) + taken) / np.maximum(valid.sum(axis=0), 1)
@@ -298,8 +301,7 @@ def _apparent(recording: Recording) -> tuple[float, Index]:
     The index counts median sampling intervals from the first sample. A strobe slightly slower than the wing makes the
     beat appear to advance slowly. ValueError if there are fewer than two samples or their times do not increase.
     """
-    times = recording.times
-    step = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
+    times, step = recording.times, _step(recording)
     if step <= 0.0:
         raise ValueError(
             f"recording {recording.name!r} has {len(times)} samples, {step:.3g} s apart (median); a diagnosis needs a "
@@ -309,13 +311,9 @@ def _apparent(recording: Recording) -> tuple[float, Index]:
     return abs(true - round(true)), np.round((times - times[0]) / step).astype(np.int64)
 
 
-def _widened(recording: Recording, beats: int) -> float:
-    """Return by how much the noise near a harmonic is underestimated without two lines half-way to its neighbours.
-
-    A strobe that sees every odd beat shows these lines elsewhere, at half the sampling rate.
-    """
-    between = round(float(np.median(np.diff(recording.times))) * recording.condition.flap_frequency)
-    return lines_near(beats) / max(lines_near(beats) - 2.0, 1.0) if between % 2 == 0 else 1.0
+def _step(recording: Recording) -> float:
+    """Median time (s) between two samples; 0 for a single one."""
+    return float(np.median(np.diff(recording.times))) if len(recording.times) > 1 else 0.0
 
 
 def _harmonics(recording: Recording, advance: float) -> int:

@@ -16,6 +16,8 @@ LOCAL = 0.6  # multiples of the flap frequency to either side of a harmonic over
 LOWEST = 3  # lines to which the power law of slow noise is fitted
 STEEPEST = -2.0  # exponent of the power law: a random walk
 MEAN_LINE = 0.35  # effective frequency, in spectral lines, at which 1/f noise enters the estimate of the mean
+BESIDE = 0.75  # spectral lines on either side of a removed frequency that are not used
+NONE = np.zeros(0)
 MOST_LINES = 63  # between neighbouring harmonics: of longer recordings, as many are used, evenly spread
 BLOCK = 4_000_000  # products of sample and line that are in memory at a time
 FLAT = 0.002  # smallest density, relative to the largest
@@ -28,19 +30,23 @@ def density_at_harmonics(
     number: Int[Index, " T"],
     harmonics: int,
     beats: int,
+    removed: Float[Array, " L"] = NONE,
 ) -> tuple[Float[Array, " H1"], Float[Array, " C"]]:
     """Return the density [H + 1] of the noise at harmonics 0 .. H, and the scale [C] of each channel (a variance).
 
     The density is common to all channels; that of one channel is the product with its scale. ``scatter`` [T, C]: part
     of the recording that differs from beat to beat, zero where not ``valid``. ``advance``: apparent advance of the beat
     per sample, beats. ``number`` [T]: index of each sample in the regular sequence of samples. ``harmonics``: H.
-    ``beats``: whole (apparent) beats recorded. Time grows with T H, memory with T.
+    ``beats``: whole (apparent) beats recorded; ``removed``: frequencies (apparent) that the scatter does not have,
+    because what is there is no noise. Time grows with T H, memory with T.
     """
     if beats >= 2:
         count = min(beats - 1, MOST_LINES)
         parts = np.round(np.linspace(1, beats - 1, count)) / beats
         lines = (np.arange(harmonics + 1)[:, None] + parts).ravel()
         lines = lines[lines * advance < 0.5]
+        near = np.abs(lines[:, None] - removed) * beats < BESIDE
+        lines = lines[~near.any(axis=1)]
     else:
         lines = np.arange(harmonics + 1, max(int(0.5 / advance), harmonics + 1) + 1).astype(float)
     power = np.abs(_transform(scatter, advance, number, lines)) ** 2 / np.maximum(valid.sum(axis=0), 1)  # [lines, C]
@@ -91,11 +97,6 @@ def _at_rest(lines: Array, mean: Array, beats: int) -> float:
 def _near(lines: Array, mean: Array, k: int) -> float:
     near = np.abs(lines - k) <= LOCAL
     return float(mean[near].mean()) if near.any() else float(mean.mean())
-
-
-def lines_near(beats: int) -> int:
-    """Return the number of lines over which the density at a harmonic is averaged, of whole ``beats``."""
-    return 2 * int(LOCAL * beats)
 
 
 def _first_order(lines: Array, mean: Array, advance: float, harmonics: int) -> Array:

@@ -192,6 +192,11 @@ def test_a_marker_fault_is_tested_at_every_marker(wing: Dataset) -> None:
     assert suspects["lumped_mass"].candidate_shapes == ()
 
 
+def test_coefficients_that_vary_with_flight_are_the_only_description(subjects: dict[str, BeatSubject]) -> None:
+    described = {s.name for s in subjects["vehicle"].suspects if s.descriptive}
+    assert described == {"varying_coefficients"}
+
+
 def test_finer_wings_refine_both_directions_up_to_a_limit(subjects: dict[str, BeatSubject], wing: Dataset) -> None:
     divisions, subject = [], subjects["wing"]
     assert isinstance(subject, WingSubject)

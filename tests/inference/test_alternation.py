@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import numpy.typing as npt
 import pytest
@@ -38,7 +40,7 @@ def steady(beats: int, channels: int = 30, whole: int = 0) -> tuple[Array, Array
     return psi, np.cos(psi)[:, None] * size + 0.2 * size * np.sin(2.0 * psi)[:, None]
 
 
-@pytest.mark.parametrize("beats", [4, 5, 8])
+@pytest.mark.parametrize("beats", [8, 9, 16])
 @pytest.mark.parametrize("whole", [0, 1])
 def test_a_difference_of_odd_and_even_beats_is_found_with_its_size(beats: int, whole: int) -> None:
     found = harmonic_fit(alternating(beats, 0.1, whole=whole)).alternation
@@ -66,15 +68,52 @@ def test_noise_of_any_colour_is_no_alternation(memory: float, beats: int) -> Non
         assert not found.found
 
 
-def test_beats_that_scatter_in_size_do_not_alternate() -> None:
-    psi, wave = steady(10)
-    for seed in range(10):
-        sizes = 1.0 + 0.05 * np.random.default_rng(seed).standard_normal(11)
-        beat = (psi / (2.0 * np.pi)).astype(int)
-        values = wave * sizes[beat][:, None] + 0.2 * SIGMA * noise(300, 0.0, seed, 30)
+@pytest.mark.parametrize("beats", [4, 5, 6, 10])
+@pytest.mark.parametrize("channels", [3, 30])
+def test_beats_that_scatter_in_size_do_not_alternate(beats: int, channels: int) -> None:
+    (psi, wave), alternate = steady(beats, channels), 0
+    for seed in range(50):
+        sizes = 1.0 + 0.05 * np.random.default_rng(seed).standard_normal(beats + 1)
+        beat = (psi / (2.0 * np.pi) + 1e-9).astype(int)
+        values = wave * sizes[beat][:, None] + 0.2 * SIGMA * noise(len(psi), 0.0, seed, channels)
         found = harmonic_fit(recording(values, 0)).alternation
         assert found is not None
-        assert not found.found
+        alternate += found.found
+    assert alternate == 0
+
+
+@pytest.mark.parametrize("samples", [7.5, 10.5, 12.5])
+def test_high_harmonics_of_a_steady_force_are_no_alternation(samples: float) -> None:
+    """With so few samples in a beat they appear half-way between the low ones."""
+    frequency = CONDITION.flap_frequency
+    times = np.asarray(np.arange(200) / samples / frequency, np.float64)
+    psi = 2.0 * np.pi * frequency * times
+    k = np.arange(1, 14)
+    force = (0.1 / k * np.cos(k * psi[:, None] + k)).sum(axis=1)[:, None] * np.array([1.0, 0.5])
+    values = force + 1e-4 * noise(200, 0.3, 1, 2)
+    found = harmonic_fit(Recording("r", "wind_tunnel", CONDITION, times, (), values, forces=("x", "z"))).alternation
+    assert found is None or not found.found
+
+
+def test_it_is_found_beside_a_drift_and_with_gaps() -> None:
+    one = alternating(16, 0.1)
+    growing = 1.0 + 0.4 * np.linspace(-0.5, 0.5, len(one.times))[:, None]
+    values = one.values * growing
+    values[40:70, :15] = np.nan
+    found = harmonic_fit(replace(one, values=values))
+    assert found.alternation is not None
+    assert found.drift is not None
+    assert found.alternation.found
+    assert found.drift.found
+
+
+def test_slow_noise_of_the_mean_is_as_large_without_the_lines() -> None:
+    """What is removed half-way between the harmonics says nothing of the noise at frequency zero."""
+    alike, different = (harmonic_fit(alternating(10, change, memory=0.95)) for change in (0.0, 0.2))
+    assert different.alternation is not None
+    assert different.alternation.found
+    mean = alike.order == 0
+    np.testing.assert_allclose(different.variance[:, mean].mean(), alike.variance[:, mean].mean(), rtol=0.4)
 
 
 def test_a_hum_at_one_line_is_no_alternation() -> None:

@@ -14,7 +14,7 @@ from tests.rigs import oscillator
 from tests.rigs.oscillator import DRAG, GENES, PORT, RIG, simulate
 from wingfit.diagnosis.rig_check import check_rig
 from wingfit.records import Gene
-from wingfit.rigs.declaration import declaration
+from wingfit.rigs.declaration import RigDeclaration, declaration
 from wingfit.rigs.load import RigError, load_rig
 from wingfit.rigs.rig import Rig
 from wingfit.rigs.suspect import Suspect
@@ -152,3 +152,9 @@ def test_parts_of_another_type_are_refused(changes: dict[str, Any], words: str) 
 def test_a_path_is_no_rig(use: Callable[[Any], Any]) -> None:
     with pytest.raises(TypeError, match=r"rig is a str; give a wingfit\.Rig"):
         use("my_rig.py")
+
+
+def test_a_suspect_is_the_same_after_its_declaration() -> None:
+    drag = replace(DRAG, confused_with=("friction",), descriptive=True)
+    one = RigDeclaration.model_validate(declaration(replace(RIG, suspects=[drag]))).rig()
+    assert one.suspects == (drag,)

@@ -1,4 +1,4 @@
-"""What a slow change of a recording is compared with: parts of its noise, and how many sources that noise has."""
+"""What a change between the beats of a recording is compared with: parts of its noise, and how many sources it has."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _RANK = 1e-6
 
 @dataclass(frozen=True)
 class Change:
-    """A slow change: ``ratio`` of its power to that of the noise near it.
+    """A change between beats: ``ratio`` of its power to that of the noise near it.
 
     ``probability``: of such a ratio for noise alone, with a margin for noise that rises towards the change. ``size``:
     root mean square of the change beyond the noise, over all samples and channels, m or N. ``certain``: the change

@@ -43,6 +43,16 @@ def test_an_excess_below_the_noise_is_adequate() -> None:
     assert verdict(0.15, refit(0.1, ("a",)), refit(0.05, ("b",), 3)) == ("adequate", ())
 
 
+def test_no_effect_explains_that_odd_and_even_beats_differ() -> None:
+    """Not one that explains a slow drift beside it either; one that explains a misfit of the mean beat is named."""
+    stiffness = refit(0.2, ("stiffness_drift",), drift=0.01)
+    for drift in (0.0, 5.0):
+        weights = weigh(data(drift=drift, alternation=5.0), refit(1.0), [stiffness], 0.0, 40)
+        assert decide(weights).verdict == "unnamed"
+    weights = weigh(data(alternation=1.0, mean=25.0), refit(5.0), [refit(0.1, ("hinge",))], 0.0, 40)
+    assert decide(weights).named == ("hinge",)
+
+
 def test_an_effect_that_explains_the_drift_is_possible() -> None:
     """A wrong rate of the strobe shifts the phase of the beat slowly."""
     weights = weigh(data(drift=0.5), refit(0.25), [refit(0.05, ("a",), drift=0.1), refit(0.0, ("b",))], 0.0, 40)
@@ -182,6 +192,13 @@ def test_a_description_is_named_only_where_no_mechanism_like_it_leaves_nearly_as
     assert verdict(5.0, described, mechanism)[0] == expected
     assert verdict(5.0, described, refit(left, ("another",)))[0] == "named"
     assert verdict(5.0, refit(0.2, ("varying",)), mechanism)[0] == "named"
+
+
+def test_effects_with_more_genes_or_like_a_partner_alone_are_no_rivals_of_a_description() -> None:
+    described, several = refit(0.2, ("varying",), confused_with=("stall",)), refit(1.0, ("stall", "x", "y"), genes=6)
+    assert verdict(5.0, described, several)[0] == "named"
+    beside = Refit((*refit(0.0, ("x",)).trials, *described.trials), described.fit, 0.04, 0.04)
+    assert verdict(5.0, beside, refit(0.6, ("like x",)))[0] == "named"
 
 
 def test_the_effect_common_to_all_possible_hypotheses_is_named() -> None:
