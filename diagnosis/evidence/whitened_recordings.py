@@ -197,11 +197,11 @@ class WhitenedData:
         return np.asarray(found / np.maximum(noise, self.tolerance))
 
     @cached_property
-    def alternation(self) -> Float[Array, " R"]:
-        """Difference of odd and even beats in each recording [R], as of :meth:`drift`."""
+    def modulation(self) -> Float[Array, " R"]:
+        """Periodic change of the beat in each recording [R], as of :meth:`drift`."""
         if self.kind == "series":
             return np.zeros(len(self.recordings))
-        found = [fit.alternation.size if fit.alternation and fit.alternation.found else 0.0 for fit in self.beat_fits]
+        found = [fit.modulation.size if fit.modulation else 0.0 for fit in self.beat_fits]
         return np.asarray(found / np.maximum(self.noise_of_recordings, self.tolerance))
 
     def change_of_beat(self, coefficients: Float[Array, " D"]) -> float:

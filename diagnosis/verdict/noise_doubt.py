@@ -25,7 +25,7 @@ BY_CHANCE = 1e-3  # probability that noise as assumed is so much smaller than it
 def noise_may_hide(data: WhitenedData, nominal: Fit) -> bool:
     """Return whether missing physics may hide in the noise; ``nominal``: fit of the nominal model."""
     if data.kind != "series":
-        return bool(noisier(data)) or faint(data)
+        return bool(noisier(data)) or faint(data) or understated(data)
     return overstated(data, nominal) or uncertain(data, nominal) or loud(data)
 
 
@@ -43,6 +43,15 @@ def faint(data: WhitenedData) -> bool:
     Flaps of an animal differ from each other, and few of them are recorded; physics may hide in what differs.
     """
     return bool(np.median(data.uncertainty_of_beats) > FAINT)
+
+
+def understated(data: WhitenedData) -> bool:
+    """Return whether what differs between beats is several times the stated noise, in half of the recordings or more.
+
+    Something else changes from beat to beat then, unless the statement is wrong.
+    """
+    ratios = [fit.stated.ratio for fit in data.beat_fits if fit.stated]
+    return bool(ratios) and float(np.median(ratios)) < 1.0 / LOUD
 
 
 def quiet_noise(data: WhitenedData) -> float:

@@ -10,9 +10,8 @@ from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.finding import amount
 from wingfit.diagnosis.verdict.noise_doubt import UNEVEN, faint, noisier, quiet_noise
 from wingfit.diagnosis.verdict.weigh_hypotheses import drifts
-from wingfit.inference.noise.changes.alternation import alternation_words
 from wingfit.inference.noise.changes.drift import Drift
-from wingfit.inference.noise.changes.slow_change import Change
+from wingfit.inference.noise.changes.modulation import Modulation, modulation_words
 from wingfit.inference.noise.harmonic import still_markers
 from wingfit.inference.noise.stated import Stated
 from wingfit.records import FrameError
@@ -36,7 +35,7 @@ def noise_remarks(data: WhitenedData, unit: str) -> tuple[str, ...]:
             f"{', '.join(within_beats)}: fewer than two beats in the order of the frames; noise is estimated only "
             "from the residual of the beat's harmonics, and slow noise may look like misfit: record longer"
         )
-    on_changes = (*_drift_remarks(data, unit), *_alternation_remarks(data, unit), *_shared_remarks(data))
+    on_changes = (*_drift_remarks(data, unit), *_modulation_remarks(data, unit), *_shared_remarks(data))
     remarks.extend(_coarse_remarks(data))
     return (*remarks, *_stated_remarks(data), *on_changes, *_uneven_noise_remarks(data, unit), *_faint_remarks(data))
 
@@ -93,18 +92,16 @@ def _drift_remarks(data: WhitenedData, unit: str) -> tuple[str, ...]:
     return (remark,) if found else ()
 
 
-def _alternation_remarks(data: WhitenedData, unit: str) -> tuple[str, ...]:
-    """Return a remark on recordings in which odd and even beats differ; empty if there are none."""
-    found = [
-        (name, f"by {amount(one.size, unit)}, {one.ratio:.2g} times the power of noise") for name, one in _odd(data)
-    ]
-    return (alternation_words(found),) if found else ()
+def _modulation_remarks(data: WhitenedData, unit: str) -> tuple[str, ...]:
+    """Return a remark on recordings whose beats differ periodically; empty if there are none."""
+    found = [(name, one.words(amount(one.size, unit))) for name, one in _modulated(data)]
+    return (modulation_words(found),) if found else ()
 
 
-def _odd(data: WhitenedData) -> list[tuple[str, Change]]:
-    """Name and difference of the recordings in which odd and even beats differ by more than any model must explain."""
-    fits = ((one.name, fit.alternation) for one, fit in zip(data.recordings, data.beat_fits, strict=True))
-    return [(name, one) for name, one in fits if one and one.found and one.size > data.tolerance]
+def _modulated(data: WhitenedData) -> list[tuple[str, Modulation]]:
+    """Name and modulation of the recordings whose beats differ by more than any model must explain."""
+    fits = ((one.name, fit.modulation) for one, fit in zip(data.recordings, data.beat_fits, strict=True))
+    return [(name, one) for name, one in fits if one and one.size > data.tolerance]
 
 
 def _shared_remarks(data: WhitenedData) -> tuple[str, ...]:
@@ -122,7 +119,7 @@ def _shared_remarks(data: WhitenedData) -> tuple[str, ...]:
 def _shared(data: WhitenedData) -> list[tuple[str, float]]:
     """Name and shared part of the noise of recordings in which that is not small, and no other change was found."""
     fits = zip(data.recordings, data.beat_fits, strict=True)
-    known = {name for name, _ in (*_drifts(data), *_odd(data))}
+    known = {name for name, _ in (*_drifts(data), *_modulated(data))}
     return [(one.name, fit.shared) for one, fit in fits if fit.shared > data.policy.shared and one.name not in known]
 
 
@@ -192,11 +189,9 @@ def drift_sentence(data: WhitenedData, *, explained: bool) -> str:
     cause = "which may be the cause" if drifts(data) else "by too little to matter"
     seen = f" The beat changes slowly during {drifting} of {every} recordings"
     found = f"{seen}, as the added effects explain." if explained else f"{seen}: something drifts, {cause}."
-    odd = (
-        f" Odd and even beats differ in {len(_odd(data))} of {every} recordings, which no model with one beat explains."
-    )
+    periodic = f" The beats of {len(_modulated(data))} of {every} recordings differ periodically."
     more = f" The beats of {shared} of {every} recordings differ by a motion that the markers share."
-    return (found if drifting else "") + (odd if _odd(data) else "") + (more if shared else "")
+    return (found if drifting else "") + (periodic if _modulated(data) else "") + (more if shared else "")
 
 
 def _drifts(data: WhitenedData) -> list[tuple[str, Drift]]:

@@ -83,7 +83,7 @@ def weigh(
             possible[k] = hypotheses[k].predicted is not None
             rival[k] = possible[k] and absent(data, hypotheses[k])
     if drift_alone:
-        possible &= [not alternates(data) and explains_drift(data, nominal, one) for one in hypotheses]
+        possible &= [not modulated(data) and explains_drift(data, nominal, one) for one in hypotheses]
     imitates = _imitation(data, hypotheses, floor, error)
     weight = np.where(possible, evidence - imitates, -np.inf)
     # One whose size may be zero is no more probable than the best of the others, so that it is never named alone.
@@ -307,14 +307,14 @@ def drifts(data: WhitenedData) -> bool:
     return bool(np.max(data.drift) > data.policy.negligible)
 
 
-def alternates(data: WhitenedData) -> bool:
-    """Return whether odd and even beats differ in any recording, by more than what counts as none."""
-    return bool(np.max(data.alternation) > data.policy.negligible)
+def modulated(data: WhitenedData) -> bool:
+    """Return whether the beats of any recording differ periodically, by more than what counts as none."""
+    return bool(np.max(data.modulation) > data.policy.negligible)
 
 
 def changes(data: WhitenedData) -> bool:
-    """Return whether the beat changes in any recording, slowly or from beat to beat."""
-    return drifts(data) or alternates(data)
+    """Return whether the beat changes in any recording, slowly or periodically."""
+    return drifts(data) or modulated(data)
 
 
 def only_changes(data: WhitenedData, nominal: Refit, floor: float) -> bool:

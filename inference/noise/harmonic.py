@@ -18,9 +18,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import elliprg
 
-from wingfit.inference.noise.changes.alternation import alternation_basis, alternation_of, apparent_lines, half_orders
 from wingfit.inference.noise.changes.drift import Drift, drift_of, slow_basis
-from wingfit.inference.noise.changes.slow_change import Change
+from wingfit.inference.noise.changes.modulation import Modulation, Sampled, modulation_of
 from wingfit.inference.noise.mean_beat import fourier_basis, masks_of, scatter_about
 from wingfit.inference.noise.shared_pattern import shared_part
 from wingfit.inference.noise.spectrum import density_at_harmonics, lag1_autocorrelation
@@ -61,7 +60,7 @@ class HarmonicFit:
         shared: part of the power of the noise that is a motion that markers of tracks share (:func:`shared_part`).
         stated: the stated noise compared with what was seen; None if none is stated.
         correlation: [M, 3, 3] of the noise of each marker's coordinates, as stated; None: it is independent.
-        alternation: difference of odd and even beats; None for too few beats.
+        modulation: periodic change of the beat; None for too few beats.
     """
 
     order: Int[Index, " P"]
@@ -78,7 +77,7 @@ class HarmonicFit:
     shared: float = 0.0
     stated: Stated | None = None
     correlation: Float[Array, "M 3 3"] | None = None
-    alternation: Change | None = None
+    modulation: Modulation | None = None
 
     def of(self, residuals: Float[Array, "*B T C"]) -> Float[Array, "*B C P"]:
         """Fourier coefficients [..., C, P] of ``residuals`` [..., T, C] (NaN: not recorded); zero if not used."""
@@ -119,18 +118,20 @@ def harmonic_fit(recording: Recording, compared: Mask | None = None) -> Harmonic
         shared_part(scatter.values, valid, recording.values) if recording.kind == "tracks" else 0.0,
         scatter.stated,
         scatter.correlation,
-        scatter.alternation,
+        scatter.modulation,
     )
 
 
-def drift_and_noise(recording: Recording, compared: Mask | None = None) -> tuple[Drift | None, Change | None, float]:
-    """Return drift and alternation of ``recording``, and the root mean square of the noise of its samples (m or N).
+def changes_and_noise(
+    recording: Recording, compared: Mask | None = None
+) -> tuple[Drift | None, Modulation | None, float]:
+    """Return drift and modulation of ``recording``, and the root mean square of the noise of its samples (m or N).
 
     The same as of :func:`harmonic_fit`, for less time and memory; ``compared`` [T, C] and ValueError as there.
     """
     scatter = _Scatter.of(recording, compared)
     noise = float(np.sqrt(np.mean(scatter.variance[scatter.valid.any(axis=0)])))
-    return scatter.drift, scatter.alternation, noise
+    return scatter.drift, scatter.modulation, noise
 
 
 @one_blas_thread
@@ -165,7 +166,7 @@ class _Scatter:
     T samples, C channels, P basis functions (mean, harmonics, trends), H harmonics.
 
     Attributes:
-        values: [T, C] recorded values minus mean beat, drift and alternation, if found; zero where not valid.
+        values: [T, C] recorded values minus mean beat, drift and modulation, if found; zero where not valid.
         valid: [T, C], True for the samples used: of channels that move and have enough samples.
         basis: [T, P] basis functions at the samples.
         order: [P] harmonic of each basis function; 0 for the mean.
@@ -176,7 +177,7 @@ class _Scatter:
         (a variance) by which it is multiplied.
         variance: [C] of the noise of one sample.
         drift: slow change of the beat; None for too few beats.
-        alternation: difference of odd and even beats; None for too few beats.
+        modulation: periodic change of the beat; None for too few beats.
         stated: the stated noise compared with what was seen; None if none is stated.
         correlation: [M, 3, 3] of the noise of each marker's coordinates, as stated; None: it is independent.
     """
@@ -191,7 +192,7 @@ class _Scatter:
     density: tuple[Array, Array]
     variance: Array
     drift: Drift | None
-    alternation: Change | None
+    modulation: Modulation | None
     stated: Stated | None
     correlation: Array | None
 
@@ -219,15 +220,15 @@ class _Scatter:
         psi, apparent = 2 * np.pi * recording.condition.flap_frequency * recording.times, advance * number.astype(float)
         least, widened = LEAST_DRIFT * _ranges(recorded, valid), np.ones(harmonics + 1)
         # What is found to change is not noise.
-        step = _step(recording) * recording.condition.flap_frequency
-        orders, removed = half_orders(recording.kind, harmonics, step, int(number[-1]) + 1), np.zeros(0)
-        alternation = alternation_of(values, valid, psi, apparent, harmonics, beats, orders, least)
-        if alternation and alternation.found:
-            both = np.hstack([columns, alternation_basis(psi, orders)])
+        sampled = Sampled.of(recording, recorded - values, apparent, number, harmonics, beats)
+        modulation, removed = modulation_of(values, valid, sampled, least), np.zeros(0)
+        if modulation and modulation.found:
+            orders = sampled.all_orders(modulation.rate)
+            both = np.hstack([columns, sampled.waves(orders)])
             if SPARE * both.shape[1] <= spare:
                 columns, values = both, scatter_about(both, recorded, valid)
-                fitted = np.concatenate([fitted, np.repeat(np.array(orders).astype(np.int64), 2)])
-                removed = apparent_lines(orders, step, advance)
+                fitted = np.concatenate([fitted, np.repeat(np.minimum(orders, harmonics).astype(np.int64), 2)])
+                removed = sampled.appearing(orders) / advance
         drift = drift_of(values, valid, psi, apparent, harmonics, beats, least)
         if drift and drift.found:  # what it is, the trends show
             slow, of = slow_basis(psi, apparent, beats, harmonics)
@@ -247,7 +248,7 @@ class _Scatter:
             scale = whole * variance
         known = recording.noise_correlation if stated and stated.correlated else None
         correlation = None if known is None else correlation_matrices(known)
-        noise, changes = (density, scale), (drift, alternation)
+        noise, changes = (density, scale), (drift, modulation)
         return cls(values, valid, basis, order, trend, beats, inner, noise, variance, *changes, stated, correlation)
 
     @property
@@ -301,7 +302,8 @@ def _apparent(recording: Recording) -> tuple[float, Index]:
     The index counts median sampling intervals from the first sample. A strobe slightly slower than the wing makes the
     beat appear to advance slowly. ValueError if there are fewer than two samples or their times do not increase.
     """
-    times, step = recording.times, _step(recording)
+    times = recording.times
+    step = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
     if step <= 0.0:
         raise ValueError(
             f"recording {recording.name!r} has {len(times)} samples, {step:.3g} s apart (median); a diagnosis needs a "
@@ -309,11 +311,6 @@ def _apparent(recording: Recording) -> tuple[float, Index]:
         )
     true = step * recording.condition.flap_frequency
     return abs(true - round(true)), np.round((times - times[0]) / step).astype(np.int64)
-
-
-def _step(recording: Recording) -> float:
-    """Median time (s) between two samples; 0 for a single one."""
-    return float(np.median(np.diff(recording.times))) if len(recording.times) > 1 else 0.0
 
 
 def _harmonics(recording: Recording, advance: float) -> int:

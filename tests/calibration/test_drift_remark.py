@@ -51,8 +51,8 @@ def test_odd_and_even_beats_that_differ_are_remarked() -> None:
     one = growing_forces(0.0)
     odd = np.sign(np.sin(np.pi * F * one.times))[:, None]
     (remark,) = drift_remark([replace(one, values=one.values * (1.0 + 0.05 * odd))])
-    assert remark.startswith(f"odd and even beats differ in '{one.name}' (by 3")
-    assert "stated twice too high" in remark
+    assert remark.startswith(f"beats differ periodically in '{one.name}' (every 2 beats, by 3")
+    assert "stated too high" in remark
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -129,9 +129,9 @@ def test_odd_and_even_beats_that_differ_are_not_adequate() -> None:
     finding = last.finding
     assert finding is not None
     assert finding.verdict == "unnamed"
-    (remark,) = [remark for remark in finding.remarks if "odd and even beats" in remark]
+    (remark,) = [remark for remark in finding.remarks if "beats differ periodically" in remark]
     assert "check the stated frequency and the drive" in remark
-    assert "Odd and even beats differ in 4 of 4 recordings" in finding.summary
+    assert "The beats of 4 of 4 recordings differ periodically" in finding.summary
 
 
 def test_a_change_of_the_mean_counts_where_the_mean_drifts() -> None:
@@ -154,7 +154,7 @@ def test_a_change_of_the_mean_counts_where_the_mean_drifts() -> None:
 def test_the_sentence_fits_the_verdict(size: float, says: str) -> None:
     """Size of the drift of one recording, in its noise."""
     drift = Drift(Change(9.0, 1e-9, 1e-3 * size), NONE) if size else None
-    fits = [SimpleNamespace(drift=one, shared=0.0, alternation=None) for one in (drift, None)]
+    fits = [SimpleNamespace(drift=one, shared=0.0, modulation=None) for one in (drift, None)]
     recordings = [SimpleNamespace(name=name) for name in ("a", "b")]
     every = np.array([size, 0.0])
     data = SimpleNamespace(recordings=recordings, beat_fits=fits, tolerance=1e-4, drift=every, policy=POLICY)

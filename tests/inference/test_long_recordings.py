@@ -11,7 +11,7 @@ import pytest
 from tests.inference.test_harmonic import noise, recording
 from wingfit.inference.noise import spectrum
 from wingfit.inference.noise.changes.drift import drift_of
-from wingfit.inference.noise.harmonic import drift_and_noise, harmonic_fit
+from wingfit.inference.noise.harmonic import changes_and_noise, harmonic_fit
 from wingfit.inference.noise.mean_beat import masks_of
 
 
@@ -59,10 +59,10 @@ def test_masks_come_with_their_channels_in_the_order_of_their_values() -> None:
     ]
 
 
-def test_drift_and_noise_alone_are_those_of_the_fit() -> None:
+def test_changes_and_noise_alone_are_those_of_the_fit() -> None:
     one = recording(5e-4 * noise(31 * 8, 0.6, 1, 6))
     one = replace(one, values=one.values + 0.01 * np.cos(2 * np.pi * one.condition.flap_frequency * one.times)[:, None])
-    fit, (drift, alternation, level) = harmonic_fit(one), drift_and_noise(one)
+    fit, (drift, modulation, level) = harmonic_fit(one), changes_and_noise(one)
     assert drift == fit.drift
-    assert alternation == fit.alternation
+    assert modulation == fit.modulation
     assert level == pytest.approx(float(np.sqrt(np.mean(fit.noise[fit.used] ** 2))))

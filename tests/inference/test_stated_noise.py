@@ -10,7 +10,7 @@ import pytest
 from tests.diagnosis.pendulum_rig import recorded
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.verdict.noise_remarks import noise_remarks
-from wingfit.inference.noise.harmonic import drift_and_noise, harmonic_fit
+from wingfit.inference.noise.harmonic import changes_and_noise, harmonic_fit
 from wingfit.records import LowPass, Recording
 from wingfit.sim.filtering import low_passed
 
@@ -31,7 +31,7 @@ def test_a_stated_noise_that_agrees_is_used_in_every_channel(times_true: float) 
     assert fit.stated.ratio == pytest.approx(times_true, rel=0.1)
     np.testing.assert_allclose(fit.noise[fit.used], times_true * NOISE)
     np.testing.assert_allclose(fit.variance[fit.used], times_true**2 * plain.variance[plain.used])
-    assert drift_and_noise(stated(times_true))[2] == pytest.approx(times_true * NOISE)
+    assert changes_and_noise(stated(times_true))[2] == pytest.approx(times_true * NOISE)
 
 
 def test_the_channels_keep_their_own_noise() -> None:

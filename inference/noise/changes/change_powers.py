@@ -50,11 +50,12 @@ class ChangePowers:
         return replace(self, change=self.change[:, which], near=self.near[which], alone=alone, freedom=freedom)
 
 
-def compared(parts: list[ChangePowers], samples: int, sources: float | None = None) -> Change:
+def compared(parts: list[ChangePowers], samples: int, freedom_of_sizes: tuple[float, float] | None = None) -> Change:
     """Compare the changes of all channels of the ``parts`` with their noise; ``samples``: number of values.
 
     Changes of the first kind alone are compared, and with those of each further kind; the least probable result counts.
-    ``sources``: number of independent sources of the noise; None: estimated from the noise.
+    ``freedom_of_sizes``: degrees of freedom of the change and of the noise, if the noise is that beats scatter in size;
+    None: noise that differs between harmonics and channels, as far as it does.
     """
     every = (
         (one.change, one.near, one.alone, np.repeat(one.freedom[..., None], len(one.level), axis=-1), one.level)
@@ -68,11 +69,12 @@ def compared(parts: list[ChangePowers], samples: int, sources: float | None = No
     # Size and start of a beat that scatter move all harmonics of all channels at once, so these are counted together.
     around_each = alone.reshape(len(alone), -1, 2, len(level)) / np.sqrt(level)
     by_line = around_each.transpose(1, 0, 2, 3).reshape(around_each.shape[1], -1)
-    sources = sources or independent_sources(by_line, lines.mean() / 2)
+    sources = independent_sources(by_line, lines.mean() / 2)
     found = []
     for power, count in zip(change, of_change, strict=True):
         ratio = float((power / count / level).mean() / max(around, 1e-300))
-        chance = float(scipy.stats.f.sf(ratio / RISE, sources * count.mean() / 2, sources * lines.mean() / 2))
+        degrees = freedom_of_sizes or (sources * count.mean() / 2, sources * lines.mean() / 2)
+        chance = float(scipy.stats.f.sf(ratio / RISE, *degrees))
         found.append((len(change) * chance, -ratio))
     probability, ratio = min(found)
     beyond = float((change[-1] - of_change[-1] * noise).sum())

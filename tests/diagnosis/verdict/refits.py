@@ -43,7 +43,7 @@ def data(
     mean: float = 0.0,
     worst: float = 0.0,
     kind: str = "tracks",
-    alternation: float = 0.0,
+    modulation: float = 0.0,
 ) -> WhitenedData:
     """Recordings with a noise of one, of which the first has an excess of ``worst`` noises (RMS)."""
     return cast(
@@ -58,7 +58,8 @@ def data(
             kind=kind,
             policy=POLICY,
             drift=drift,
-            alternation=alternation,
+            modulation=modulation,
+            beat_fits=(),
             noise_of_recordings=np.ones(recordings),
             uncertainty_of_beats=np.zeros(recordings),
             recordings=[SimpleNamespace(name=f"r{k}") for k in range(recordings)],

@@ -37,6 +37,13 @@ def test_a_model_that_misses_one_recording_is_not_surely_adequate() -> None:
         assert nominal_suffices(one, refit(0.05), 40) == (most == 1.0)
 
 
+@pytest.mark.parametrize(("stated", "most"), [(0.1, POLICY.doubted_noise), (0.5, 1.0), (3.0, 1.0)])
+def test_a_stated_noise_far_below_what_differs_between_beats_leaves_a_doubt(stated: float, most: float) -> None:
+    one, fits = data(), [SimpleNamespace(stated=ratio) for ratio in (None, SimpleNamespace(ratio=stated))]
+    one.__dict__["beat_fits"] = fits
+    assert decide(weigh(one, refit(0.1), [], 0.0, 40)).probabilities["adequate"] == pytest.approx(most, abs=0.05)
+
+
 def test_a_misfit_that_only_an_untried_discretisation_excuses_leaves_a_doubt() -> None:
     """Tracks of a coarse wing with a floor of one noise, of which a fit of a finer one has shown a part, or nothing."""
     left, weighed = refit(0.8), 1.0
