@@ -145,4 +145,4 @@ def test_a_modulation_is_found_with_its_rate_and_is_no_noise(rate: float) -> Non
     ("rate", "words"), [(0.5, "every 2 beats"), (0.334, "every 3 beats"), (0.29, "at 0.29 of the")]
 )
 def test_the_rate_of_a_modulation_in_words(rate: float, words: str) -> None:
-    assert Modulation(Change(30.0, 1e-9, 1e-3), rate, ()).words("1 mm").startswith(f"{words}")
+    assert Modulation(Change(30.0, 1e-9, 1e-3), rate).words("1 mm").startswith(f"{words}")

@@ -46,11 +46,10 @@ ODD = 0.5  # rate of odd and even beats that differ
 
 @dataclass(frozen=True)
 class Modulation:
-    """A periodic ``change`` of the beat; its ``rate``, and the ``orders`` of its lines, in flap frequencies."""
+    """A periodic ``change`` of the beat, and its ``rate`` in flap frequencies."""
 
     change: Change
     rate: float
-    orders: tuple[float, ...]
 
     @property
     def found(self) -> bool:
@@ -145,11 +144,10 @@ def modulation_of(
     parts = list(_Part.of(scatter, valid, sampled))
     rates, found = (ODD, *_standing_out(parts, sampled)), []
     for rate in rates:
-        orders = sampled.orders(rate)
-        change = _change(parts, sampled, rate, orders, int(valid.sum()))
+        change = _change(parts, sampled, rate, int(valid.sum()))
         if change is not None:
             seen = change if change.size >= least else replace(change, probability=1.0)
-            found.append(Modulation(seen, rate, orders))
+            found.append(Modulation(seen, rate))
     return min(found, key=lambda one: one.change.probability) if found else None
 
 
@@ -216,10 +214,9 @@ def _explained(parts: list[_Part], sampled: Sampled, rate: float) -> float:
     return total
 
 
-def _change(
-    parts: list[_Part], sampled: Sampled, rate: float, orders: tuple[float, ...], samples: int
-) -> Change | None:
-    """Return the change at the lines of these ``orders``; None for fewer than two, or too few samples between gaps."""
+def _change(parts: list[_Part], sampled: Sampled, rate: float, samples: int) -> Change | None:
+    """Return the change at ``rate``; None for fewer than two lines, or too few samples between gaps."""
+    orders = sampled.orders(rate)
     if len(orders) < 2:
         return None
     distances = np.arange(1, min(NEAREST, int(FARTHEST * sampled.beats)) + 1) / sampled.beats
