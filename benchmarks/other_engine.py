@@ -37,6 +37,7 @@ from wingfit.sim.wing.flexible_wing import FlexibleWing
 SEED, NUMBER = 11, 24
 DIVISIONS = ("4", "8x1")  # of the true wing; the model has "4"
 LAWS: tuple[Law, ...] = tuple(law for law in get_args(Law) if law != "energy")  # that is the model's own
+ATTEMPTS = 4  # draws of a wing that Exudyn can integrate
 SPREAD = 1.6  # the true genes are up to this factor above or below the estimates
 TRACKING = Tracking(noise=(3e-4, 3e-4, 4e-4), beats=3)
 CONDITIONS = tuple(one for k, one in enumerate(SMALL) if k not in (4, 9))  # two are held out
@@ -157,8 +158,18 @@ def planned(seed: int, number: int) -> Trial:
 
 
 def recorded(trial: Trial) -> Dataset:
-    """Return the dataset of a trial: eight recordings, two of them held out."""
-    rng = np.random.default_rng([*trial.seed, 2])
+    """Return the dataset of a trial, drawn again up to ATTEMPTS times where Exudyn's integrator does not converge."""
+    for attempt in range(ATTEMPTS - 1):
+        try:
+            return _drawn(trial, attempt)
+        except load_exudyn().SolverError:
+            continue
+    return _drawn(trial, ATTEMPTS - 1)
+
+
+def _drawn(trial: Trial, attempt: int) -> Dataset:
+    """Return eight recordings, two of them held out."""
+    rng = np.random.default_rng([*trial.seed, 2, *([attempt] if attempt else [])])
     model = FlexibleWing(robird_wing(), trial.division)
     genome = np.array([gene.nominal * SPREAD ** rng.uniform(-1.0, 1.0) for gene in model.genes])
     recordings, held_out = [], []
