@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from wingfit.calibration.effects import absent
-from wingfit.calibration.estimates.drift_remark import drift_remark
+from wingfit.calibration.estimates.changing_beat import changing_beat_remarks
 from wingfit.calibration.estimates.uncertainty import Correlations, GeneCovariance, Standing, gene_errors
 from wingfit.calibration.evaluator import Evaluator
 from wingfit.calibration.preparation import prepare
@@ -146,7 +146,7 @@ def judge(spec: CalibrationSpec, dataset: Dataset, evaluator: Evaluator, genome:
         for recording, part in zip(dataset.recordings, both.per_recording, strict=True)
         if part.reasons[1]
     ]
-    drift = drift_remark(dataset.recordings)
+    drift = changing_beat_remarks(dataset.recordings)
     if after > CONTRADICTION * dataset.wing.span:
         remarks.append(
             f"the residual of the best genome on the fitted recordings is {after * 1e3:.3g} mm, on a wing of "

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from wingfit.calibration.effects import absent, is_measured
-from wingfit.calibration.estimates.drift_remark import drift_remark
+from wingfit.calibration.estimates.changing_beat import changing_beat_remarks
 from wingfit.calibration.estimates.likelihood import STEP, at_bounds, iterate
 from wingfit.calibration.estimates.linearised import free_genes
 from wingfit.calibration.estimates.uncertainty import IDENTIFIABLE, Standing, Uncertainty, uncertainty
@@ -103,7 +103,7 @@ def summarise_forces(
         everywhere.append(_compare(model, as_fitted(spec, recording), genomes, spec.axes))
         remarks = (*remarks, *warnings)
     misfits = [_misfit_remark(one, everywhere) for one in judged]
-    drift = drift_remark((as_fitted(spec, recording) for recording in dataset.recordings), spec.axes)
+    drift = changing_beat_remarks((as_fitted(spec, recording) for recording in dataset.recordings), spec.axes)
     apart = disagreement_remarks([one.estimate for one in judged])
     remarks = (*apart, *remarks, *(remark for remark in misfits if remark), *drift, *_filtered_before(spec, dataset))
     names = {name for one in judged for name in one.estimate.recordings}

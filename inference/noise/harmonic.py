@@ -217,10 +217,11 @@ class _Scatter:
         # Trends are not subtracted: they would absorb some of the noise.
         columns, fitted = basis[:, ~trend], order[~trend]
         values, spare = scatter_about(columns, recorded, valid), int(valid.sum(axis=0)[used].min())
-        psi, apparent = 2 * np.pi * recording.condition.flap_frequency * recording.times, advance * number.astype(float)
+        apparent = advance * number.astype(float)
         least, widened = LEAST_DRIFT * _ranges(recorded, valid), np.ones(harmonics + 1)
         # What is found to change is not noise.
         sampled = Sampled.of(recording, recorded - values, apparent, number, harmonics, beats)
+        psi = sampled.psi
         modulation, removed = modulation_of(values, valid, sampled, least), np.zeros(0)
         if modulation and modulation.found:
             orders = sampled.all_orders(modulation.rate)

@@ -9,7 +9,7 @@ import pytest
 
 from tests.calibration.test_search import SPEC, Here
 from tests.calibration.wave_forces import F, recording
-from wingfit.calibration.estimates.drift_remark import drift_remark
+from wingfit.calibration.estimates.changing_beat import changing_beat_remarks
 from wingfit.calibration.forces.estimation import summarise_forces
 from wingfit.calibration.result import ADEQUATE, judge
 from wingfit.calibration.search import CalibrationSpec, calibrate
@@ -37,20 +37,20 @@ def growing_forces(change: float, seed: int = 1) -> Recording:
 
 
 def test_a_drift_of_tracks_or_forces_is_remarked_with_its_size() -> None:
-    (remark,) = drift_remark([growing_tracks(0.0), growing_tracks(0.2)])
+    (remark,) = changing_beat_remarks([growing_tracks(0.0), growing_tracks(0.2)])
     assert remark.startswith(f"{SAYS}'long' (by 0.")
     assert " mm, " in remark
     assert "something drifts (a stiffness, a motor, a clock, a camera)" in remark
-    (remark,) = drift_remark([growing_forces(0.2)], ("x",))
+    (remark,) = changing_beat_remarks([growing_forces(0.2)], ("x",))
     assert " mN, " in remark
-    assert drift_remark([growing_forces(0.2)], ("z",)) == (), "not compared"
-    assert drift_remark([growing_forces(0.2)], ("x", "y")) == (), "not recorded"
+    assert changing_beat_remarks([growing_forces(0.2)], ("z",)) == (), "not compared"
+    assert changing_beat_remarks([growing_forces(0.2)], ("x", "y")) == (), "not recorded"
 
 
 def test_odd_and_even_beats_that_differ_are_remarked() -> None:
     one = growing_forces(0.0)
     odd = np.sign(np.sin(np.pi * F * one.times))[:, None]
-    (remark,) = drift_remark([replace(one, values=one.values * (1.0 + 0.05 * odd))])
+    (remark,) = changing_beat_remarks([replace(one, values=one.values * (1.0 + 0.05 * odd))])
     assert remark.startswith(f"beats differ periodically in '{one.name}' (every 2 beats, by 3")
     assert "stated too high" in remark
 
@@ -58,12 +58,12 @@ def test_odd_and_even_beats_that_differ_are_remarked() -> None:
 @pytest.mark.parametrize("seed", range(5))
 def test_a_steady_beat_is_not_remarked(seed: int) -> None:
     steady = growing_tracks(0.0, seed), growing_tracks(0.0, seed, noise=0.0), growing_forces(0.0, seed)
-    assert drift_remark(steady) == ()
+    assert changing_beat_remarks(steady) == ()
 
 
 def test_a_change_far_below_the_noise_and_short_recordings_are_not_remarked() -> None:
     still = replace(growing_tracks(0.2), values=np.zeros((248, 6)))
-    assert drift_remark([growing_tracks(1e-4), growing_tracks(0.2, beats=1), still]) == ()
+    assert changing_beat_remarks([growing_tracks(1e-4), growing_tracks(0.2, beats=1), still]) == ()
 
 
 def test_a_run_over_drifting_tracks_mentions_the_drift(small: tuple[Dataset, Genome]) -> None:

@@ -13,7 +13,7 @@ from wingfit.records import Recording
 LEAST = 0.1  # of the root mean square of the noise: smaller changes are not remarked
 
 
-def drift_remark(recordings: Iterable[Recording], axes: tuple[str, ...] = ()) -> tuple[str, ...]:
+def changing_beat_remarks(recordings: Iterable[Recording], axes: tuple[str, ...] = ()) -> tuple[str, ...]:
     """Return remarks on ``recordings`` in which the beat changes slowly, or differs periodically.
 
     ``axes``: force axes that are compared (:func:`wingfit.calibration.problem.compared`). Recordings with too few
