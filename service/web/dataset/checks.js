@@ -20,12 +20,14 @@ export async function showChecks(dataset, isCurrent) {
     node.replaceChildren(...those.map((one) => el("p", {}, el("strong", {}, "Likely mistake: "), `${one.where}: ${one.value}; expected ${one.expected}. Change: `, el("code", {}, one.change))));
   }
   $("checks").replaceChildren();
-  $("checks-summary").textContent = "";
+  $("checks-summary").textContent = "The checks are being fetched"; // a summary without words has no name
   try {
     const found = await get(`datasets/${part(dataset.id)}/checks`);
     if (isCurrent()) list(found);
   } catch (error) {
-    if (isCurrent()) toast(error.message);
+    if (!isCurrent()) return;
+    $("checks-summary").textContent = "The checks could not be fetched";
+    toast(error.message);
   }
 }
 
@@ -34,7 +36,6 @@ function list({ checks, carried_out: carriedOut }) {
   const found = clean < checks.length;
   $("checks-summary").textContent = !carriedOut ? "An earlier version stored this dataset, without checks"
     : found ? `The other ${plural(clean, "check")} found nothing` : `${plural(clean, "check")} found nothing`;
-  $("checks-list").classList.toggle("all-clean", carriedOut && !found);
   const after = !carriedOut ? "Upload the dataset again, to have it checked by:" : found ? "A check is left out where the mistake found makes its question meaningless. Correct it, and check again." : "";
   $("checks").replaceChildren(...(after ? [el("li", {}, after)] : []), ...checks.map((one) => el("li", {},
     el("strong", {}, one.name), one.found ? el("span", { className: "badge bad" }, `found ${one.found}`) : "", ` ${one.question}`)));

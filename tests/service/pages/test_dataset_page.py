@@ -22,7 +22,7 @@ from wingfit.service.app import create_app
 from wingfit.service.settings import Settings
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser
+    from playwright.sync_api import Browser, Route
 
 CHANGE = "dataset.yaml, recordings[2].pressure_mbar: 101.325 -> 1013.25"
 SHOWN = """document.querySelector('#drawing svg') && document.getElementById('conditions').data
@@ -169,7 +169,7 @@ def test_markers_are_drawn_where_they_were_recorded(browser: Browser, api: Api, 
         box = seen.page.locator(node).bounding_box()
         assert box is not None
         assert box["y"] + box["height"] < 900, f"{node} is on the first screen"
-    assert seen.page.inner_text("#checks-summary") == "11 checks found nothing"
+    seen.wait("document.getElementById('checks-summary').textContent === '11 checks found nothing'")
     seen.page.click("#checks-summary")
     assert seen.page.locator("#checks li").count() == 11
     _check_gaps(seen, api, dataset)
@@ -246,7 +246,7 @@ def test_exchanged_axes_are_seen_at_once(browser: Browser, api: Api, tmp_path: P
     assert seen.page.locator("#picture-note .bad-word").inner_text().endswith(" % of the span")
     assert seen.page.locator("#distances tr.far").count() == 3
     assert "the tracks are" in seen.page.inner_text("#warnings")
-    assert seen.page.inner_text("#checks-summary") == "The other 10 checks found nothing"
+    seen.wait("document.getElementById('checks-summary').textContent === 'The other 10 checks found nothing'")
     assert (seen.errors, seen.foreign) == ([], [])
     seen.page.context.close()
 
@@ -280,4 +280,18 @@ def test_forces_are_drawn_over_the_beat_and_over_time(browser: Browser, api: Api
     found = axe.run(seen.page, context="#dataset").response["violations"]
     assert [one["id"] for one in found] == []
     assert (seen.errors, seen.foreign) == ([], [])
+    seen.page.context.close()
+
+
+def test_the_list_of_checks_has_a_name_at_every_moment(browser: Browser, api: Api, tmp_path: Path) -> None:
+    """While the checks are fetched, and when they cannot be."""
+    dataset = uploaded(api, good_vehicle(), tmp_path / "named.nc")
+    seen = opened(browser, api)
+    waiting: list[Route] = []
+    seen.page.route("**/checks", lambda route: waiting.append(route))
+    seen.show(f"dataset={dataset}")
+    seen.wait(DRAWN.format("data-force-0", 1))
+    assert seen.page.inner_text("#checks-summary") == "The checks are being fetched"
+    waiting.pop().abort()
+    seen.wait("document.getElementById('checks-summary').textContent === 'The checks could not be fetched'")
     seen.page.context.close()
