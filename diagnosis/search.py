@@ -187,17 +187,13 @@ def _try_suspects(state: SearchState, suspects: Sequence[Suspect], at_least: Ref
     """Score-test ``suspects`` at the nominal fit, then refit the strongest; yields the fraction done and the stage.
 
     ``at_least``: the nominal model with a finer discretisation, where it was fitted. A suspect must fit better than it,
-    since an effect can imitate an error of the discretisation: without a suspect that is predicted to, nothing is
-    refitted, and without a refit that does, combinations are not tried.
+    since an effect can imitate an error of the discretisation: without a refit that does, combinations are not tried.
     """
     tests = score_tests(state.context, state.fitted_nominal.refit.fit, suspects)
     for k, (suspect, trials) in enumerate(tests):
         state.trials.append(trials)
         yield 0.3 * (k + 1) / len(suspects), f"score test of {suspect.name}"
-    if _suffices(state, state.fitted_nominal, len(suspects)):
-        return
-    least = min((trial.remaining_chi_squared for trials in state.trials for trial in trials), default=np.inf)
-    if at_least is None or least < state.data.chi_squared(at_least.fit.coefficients):
+    if not _suffices(state, state.fitted_nominal, len(suspects)):
         yield from _refits(state, at_least)
 
 
@@ -217,16 +213,18 @@ def _nominal_from_best(state: SearchState) -> Refit | None:
 def _refits(state: SearchState, at_least: Refit | None) -> Steps:
     """Refit suspects one at a time; if no refit explains the residual, refit from the estimates and in combinations.
 
-    If ``at_least`` is given and no single refit is clearly better than it, there are no further refits.
+    If ``at_least`` is given, and no refit is clearly better than it, combinations are not tried. Those from the
+    estimates are: what the nominal genes have absorbed, such as a heavy mass, is not seen at the nominal fit, and a
+    finer discretisation can absorb it too.
     """
     yield from _single_refits(state)
     yield 0.4, "continuing the best refits"
     if _continue_best(state):
         return
-    if at_least is not None and not any(improves(state.data, one, at_least) for one in state.refits):
-        return
     if not state.beats_unknown_law:
         yield from _refits_from_estimates(state)
+    if at_least is not None and not any(improves(state.data, one, at_least) for one in state.refits):
+        return
     if not state.beats_unknown_law:
         yield from _towards(combined_refits(state), 0.85, 0.97, COMBINED)
         yield 0.97, "continuing the best refits"
@@ -309,7 +307,7 @@ def _compete(state: SearchState, starts: Sequence[StartPoint]) -> Iterator[str]:
     if not starts or state.initial_fit is None:
         return
     policy, nominal = state.data.policy, state.fitted_nominal.refit.excess
-    best = state.by_excess[0].excess
+    best = min((one.excess for one in state.refits), default=nominal)
     by_noise = tolerated_excess(state.data, 0.0, 0.0)
     limit = max(min(policy.worth_continuing * nominal, policy.rivalry * best), by_noise)
     target = max(policy.unknown_residual**2 * nominal, by_noise)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from tests.diagnosis.pendulum_rig import GENES, SUSPECTS, PendulumRig, recorded
-from wingfit.diagnosis import DiagnosisSpec
+from wingfit.diagnosis import DiagnosisSpec, search
 from wingfit.diagnosis.combinations import smaller_refits
 from wingfit.diagnosis.diagnose import check, diagnose
 from wingfit.diagnosis.evidence.competing_fits import StartPoint
@@ -20,7 +20,7 @@ from wingfit.diagnosis.evidence.context import FitContext
 from wingfit.diagnosis.evidence.screen import Trial
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.policy import POLICY
-from wingfit.diagnosis.search import _indistinguishable, _look_alikes, _towards, run_search
+from wingfit.diagnosis.search import _indistinguishable, _look_alikes, _refits, _towards, run_search
 from wingfit.diagnosis.search_state import SearchState
 from wingfit.records import load_dataset, wing_or_vehicle
 from wingfit.workers.in_process import InProcessEvaluator
@@ -65,6 +65,34 @@ def state(*tried: Trial) -> Any:
 
 def names(start_points: Sequence[StartPoint]) -> list[tuple[str, ...]]:
     return [tuple(one.suspect.name for one in entry.trials) for entry in start_points]
+
+
+@pytest.mark.parametrize(
+    ("from_estimates", "expected"),
+    [(0.9, ["singles", "estimates"]), (0.3, ["singles", "estimates", "combinations"])],
+)
+def test_what_the_genes_have_absorbed_is_sought_before_a_finer_discretisation_takes_over(
+    monkeypatch: pytest.MonkeyPatch, from_estimates: float, expected: list[str]
+) -> None:
+    """No single refit at the nominal fit is better than the finer one; from the estimates, one may be."""
+    done: list[str] = []
+
+    def step(name: str, excess: float) -> Any:
+        def run(searched: Any) -> Iterator[Any]:
+            done.append(name)
+            searched.refits.append(refit(trial("point_mass"), excess=excess))
+            yield 0.5, name
+
+        return run
+
+    monkeypatch.setattr(search, "_single_refits", step("singles", 0.9))
+    monkeypatch.setattr(search, "_refits_from_estimates", step("estimates", from_estimates))
+    monkeypatch.setattr(search, "combined_refits", step("combinations", 0.2))
+    monkeypatch.setattr(search, "_continue_best", lambda _: False)
+    searched = state()
+    searched.beats_unknown_law = False
+    assert list(_refits(searched, refit(excess=0.7)))
+    assert done == expected
 
 
 def test_a_series_is_refitted_without_each_of_three_effects(monkeypatch: pytest.MonkeyPatch) -> None:
