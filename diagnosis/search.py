@@ -100,7 +100,7 @@ def _search_coarse_first(state: SearchState, fit: Fit, suspects: Sequence[Suspec
     nominal = choose_discretisation(state.context, fit, refine=state.spec.refine)
     if nominal.subject is not state.subject and not _suffices(state, nominal, len(suspects)):
         state.restart_from(choose_discretisation(state.context, fit, refine=False))
-        for fraction, stage in _try_suspects(state, suspects, at_least=nominal.refit):
+        for fraction, stage in _try_suspects(state, suspects):
             yield 0.3 * fraction, stage
     if not any(improves(state.data, one, nominal.refit) for one in state.refits):
         state.restart_from(nominal)
@@ -183,18 +183,14 @@ def _unconverged(weights: HypothesisWeights) -> Refit | None:
     return None
 
 
-def _try_suspects(state: SearchState, suspects: Sequence[Suspect], at_least: Refit | None = None) -> Steps:
-    """Score-test ``suspects`` at the nominal fit, then refit the strongest; yields the fraction done and the stage.
-
-    ``at_least``: the nominal model with a finer discretisation, where it was fitted. A suspect must fit better than it,
-    since an effect can imitate an error of the discretisation: without a refit that does, combinations are not tried.
-    """
+def _try_suspects(state: SearchState, suspects: Sequence[Suspect]) -> Steps:
+    """Score-test ``suspects`` at the nominal fit, then refit the strongest; yields the fraction done and the stage."""
     tests = score_tests(state.context, state.fitted_nominal.refit.fit, suspects)
     for k, (suspect, trials) in enumerate(tests):
         state.trials.append(trials)
         yield 0.3 * (k + 1) / len(suspects), f"score test of {suspect.name}"
     if not _suffices(state, state.fitted_nominal, len(suspects)):
-        yield from _refits(state, at_least)
+        yield from _refits(state)
 
 
 def _nominal_from_best(state: SearchState) -> Refit | None:
@@ -210,21 +206,14 @@ def _nominal_from_best(state: SearchState) -> Refit | None:
     return found if found is not None and improves(state.data, found, nominal) else None
 
 
-def _refits(state: SearchState, at_least: Refit | None) -> Steps:
-    """Refit suspects one at a time; if no refit explains the residual, refit from the estimates and in combinations.
-
-    If ``at_least`` is given, and no refit is clearly better than it, combinations are not tried. Those from the
-    estimates are: what the nominal genes have absorbed, such as a heavy mass, is not seen at the nominal fit, and a
-    finer discretisation can absorb it too.
-    """
+def _refits(state: SearchState) -> Steps:
+    """Refit suspects one at a time; if no refit explains the residual, refit from the estimates and in combinations."""
     yield from _single_refits(state)
     yield 0.4, "continuing the best refits"
     if _continue_best(state):
         return
     if not state.beats_unknown_law:
         yield from _refits_from_estimates(state)
-    if at_least is not None and not any(improves(state.data, one, at_least) for one in state.refits):
-        return
     if not state.beats_unknown_law:
         yield from _towards(combined_refits(state), 0.85, 0.97, COMBINED)
         yield 0.97, "continuing the best refits"

@@ -20,7 +20,7 @@ from wingfit.diagnosis.evidence.context import FitContext
 from wingfit.diagnosis.evidence.screen import Trial
 from wingfit.diagnosis.evidence.whitened_recordings import WhitenedData
 from wingfit.diagnosis.policy import POLICY
-from wingfit.diagnosis.search import _indistinguishable, _look_alikes, _refits, _towards, run_search
+from wingfit.diagnosis.search import _indistinguishable, _look_alikes, _towards, run_search
 from wingfit.diagnosis.search_state import SearchState
 from wingfit.records import load_dataset, wing_or_vehicle
 from wingfit.workers.in_process import InProcessEvaluator
@@ -67,32 +67,34 @@ def names(start_points: Sequence[StartPoint]) -> list[tuple[str, ...]]:
     return [tuple(one.suspect.name for one in entry.trials) for entry in start_points]
 
 
-@pytest.mark.parametrize(
-    ("from_estimates", "expected"),
-    [(0.9, ["singles", "estimates"]), (0.3, ["singles", "estimates", "combinations"])],
-)
-def test_what_the_genes_have_absorbed_is_sought_before_a_finer_discretisation_takes_over(
-    monkeypatch: pytest.MonkeyPatch, from_estimates: float, expected: list[str]
+def test_all_is_tried_with_the_coarse_discretisation_before_a_finer_one_takes_over(
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """No single refit at the nominal fit is better than the finer one; from the estimates, one may be."""
-    done: list[str] = []
+    """A finer discretisation may absorb what its genes have absorbed too, such as a mass: neither shows at a fit."""
+    done: list[tuple[str, str]] = []
 
-    def step(name: str, excess: float) -> Any:
-        def run(searched: Any) -> Iterator[Any]:
-            done.append(name)
-            searched.refits.append(refit(trial("point_mass"), excess=excess))
+    def step(name: str) -> Any:
+        def run(searched: SearchState) -> Iterator[Any]:
+            done.append((cast("Any", searched.subject), name))
+            searched.refits.append(refit(trial("point_mass"), excess=0.1 if name == "combinations" else 0.9))
             yield 0.5, name
 
         return run
 
-    monkeypatch.setattr(search, "_single_refits", step("singles", 0.9))
-    monkeypatch.setattr(search, "_refits_from_estimates", step("estimates", from_estimates))
-    monkeypatch.setattr(search, "combined_refits", step("combinations", 0.2))
+    def fitted(*_: Any, refine: bool) -> Any:
+        return SimpleNamespace(subject="fine" if refine else "coarse", refit=refit(excess=0.7))
+
+    monkeypatch.setattr(search, "choose_discretisation", fitted)
+    monkeypatch.setattr(search, "score_tests", lambda *_: [])
+    monkeypatch.setattr(search, "_suffices", lambda *_: False)
     monkeypatch.setattr(search, "_continue_best", lambda _: False)
-    searched = state()
-    searched.beats_unknown_law = False
-    assert list(_refits(searched, refit(excess=0.7)))
-    assert done == expected
+    monkeypatch.setattr(SearchState, "beats_unknown_law", False)
+    monkeypatch.setattr(search, "_single_refits", step("singles"))
+    monkeypatch.setattr(search, "_refits_from_estimates", step("estimates"))
+    monkeypatch.setattr(search, "combined_refits", step("combinations"))
+    searched = SearchState(FitContext(*cast("Any", ("coarse", SimpleNamespace(policy=POLICY), None))))
+    assert list(search._search_coarse_first(searched, cast("Any", None), []))
+    assert done == [("coarse", "singles"), ("coarse", "estimates"), ("coarse", "combinations")]
 
 
 def test_a_series_is_refitted_without_each_of_three_effects(monkeypatch: pytest.MonkeyPatch) -> None:
