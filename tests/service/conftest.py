@@ -110,6 +110,15 @@ class Api:
         return list(self.get(f"/v1/runs/{run_id}/history?limit=10000")["items"])
 
 
+def metrics(client: httpx.Client, method: str = "GET", **headers: str) -> httpx.Response:
+    """The answer of /v1/metrics, which on a busy machine may not be ready in time: then it is requested again."""
+    deadline = time.monotonic() + 30
+    while (answer := client.request(method, "/v1/metrics", headers=headers)).status_code == 503:
+        assert time.monotonic() < deadline, answer.text
+        time.sleep(0.2)
+    return answer
+
+
 As = Callable[[str], Api]
 
 

@@ -11,7 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 from tests.service import toy
-from tests.service.conftest import Api, As, Gate, Json, made, serving
+from tests.service.conftest import Api, As, Gate, Json, made, metrics, serving
 from wingfit.cli.main import app as commands
 from wingfit.client.client import Client, WingfitError
 from wingfit.service.app import create_app
@@ -82,7 +82,7 @@ def test_every_path_of_the_api_requires_a_key(client: httpx.Client) -> None:
 def test_metrics_need_a_key_under_every_host_name(client: httpx.Client, secrets: dict[str, str]) -> None:
     by_address = {"Host": "10.0.0.7"}
     assert client.get("/v1/metrics", headers=by_address).status_code == 401
-    assert client.get("/v1/metrics", headers=by_address | bearer(secrets["ann-reads"])).status_code == 200
+    assert metrics(client, **by_address, **bearer(secrets["ann-reads"])).status_code == 200
     assert client.get("/v1/runs", headers=by_address | bearer(secrets["ann-reads"])).status_code == 400
     assert client.get("/v1/health", headers=by_address).status_code == 200
 
@@ -138,7 +138,7 @@ def test_health_counts_the_jobs_of_all_owners(as_: As, gate: Gate) -> None:
     run = ann.submit(ann.upload()["id"])["id"]
     ann.until(run, lambda now: now["state"] == "RUNNING")
     assert bob.get("/v1/health")["runs_active"] == 1
-    assert 'wingfit_jobs{kind="run",state="RUNNING"} 1.0' in bob.client.get("/v1/metrics").text
+    assert 'wingfit_jobs{kind="run",state="RUNNING"} 1.0' in metrics(bob.client).text
     gate.let(100)
     ann.finish(run)
 

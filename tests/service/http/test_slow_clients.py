@@ -18,7 +18,7 @@ import pytest
 from starlette.types import Message, Receive, Scope, Send
 
 from tests.service import toy
-from tests.service.conftest import Api, toy_service
+from tests.service.conftest import Api, metrics, toy_service
 from tests.service.processes import ServerProcess
 from wingfit.calibration.result import Comparison
 from wingfit.calibration.search import CalibrationSpec
@@ -177,7 +177,7 @@ def large(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[Ser
 
 
 def hung_up(api: Api) -> float:
-    text = api.client.get("/v1/metrics").text
+    text = metrics(api.client).text
     return float(text.partition("\nwingfit_slow_clients_total ")[2].split()[0])
 
 

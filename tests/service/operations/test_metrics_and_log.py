@@ -14,7 +14,7 @@ import yaml
 from prometheus_client.parser import text_string_to_metric_families
 
 from tests.service import toy
-from tests.service.conftest import Api, Gate, serving
+from tests.service.conftest import Api, Gate, metrics, serving
 from tests.service.processes import ROOT, ServerProcess
 from wingfit.service.app import create_app
 from wingfit.service.operations.metrics_and_log import JsonFormatter
@@ -25,9 +25,7 @@ Samples = dict[tuple[str, tuple[tuple[str, str], ...]], float]
 
 
 def samples(client: httpx.Client) -> Samples:
-    deadline = time.monotonic() + 20
-    while (answer := client.get("/v1/metrics")).status_code == 503 and time.monotonic() < deadline:
-        time.sleep(0.2)  # on a busy machine the metrics may not be ready in time
+    answer = metrics(client)
     assert answer.headers["Content-Type"].startswith("text/plain; version=")
     families = text_string_to_metric_families(answer.text)
     return {(s.name, tuple(sorted(s.labels.items()))): s.value for family in families for s in family.samples}
