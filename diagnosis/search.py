@@ -96,7 +96,10 @@ def _suffices(state: SearchState, nominal: Nominal, suspects: int) -> bool:
 
 
 def _search_coarse_first(state: SearchState, fit: Fit, suspects: Sequence[Suspect]) -> Steps:
-    """Test suspects at the nominal ``fit``, or with a finer discretisation if that fits better than all suspects."""
+    """Test suspects at the nominal ``fit``, or with a finer discretisation if that fits better than all suspects.
+
+    The coarse one is first, since a finer one can absorb what a suspect does.
+    """
     nominal = choose_discretisation(state.context, fit, refine=state.spec.refine)
     if nominal.subject is not state.subject and not _suffices(state, nominal, len(suspects)):
         state.restart_from(choose_discretisation(state.context, fit, refine=False))

@@ -70,7 +70,7 @@ def names(start_points: Sequence[StartPoint]) -> list[tuple[str, ...]]:
 def test_all_is_tried_with_the_coarse_discretisation_before_a_finer_one_takes_over(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """A finer discretisation may absorb what its genes have absorbed too, such as a mass: neither shows at a fit."""
+    """A finer one may absorb a mass, and no score test shows what the genes of the coarse one have absorbed."""
     done: list[tuple[str, str]] = []
 
     def step(name: str) -> Any:
