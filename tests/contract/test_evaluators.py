@@ -268,7 +268,7 @@ if __name__ == "__main__":
     began = time.monotonic()
     evaluator.close()
     evaluator.close()
-    thread.join(10)
+    thread.join(60)
     # The work itself takes 400 / 8 * 3 * 0.5 s / 2 = 37.5 s.
     print("alive" if thread.is_alive() else "ended", time.monotonic() - began < 30)
     call()

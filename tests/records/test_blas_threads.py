@@ -62,16 +62,16 @@ def test_the_last_thread_to_leave_restores() -> None:
     def other() -> None:
         with one_blas_thread:
             entered.set()
-            assert left.wait(10)
+            assert left.wait(60)
             seen.append(threads())
 
     thread = threading.Thread(target=other)
     with one_blas_thread:
         thread.start()
-        assert entered.wait(10)
+        assert entered.wait(60)
     assert threads() == {1}  # the other one is still inside
     left.set()
-    thread.join(10)
+    thread.join(60)
     assert seen == [{1}]
     assert threads() == {2}
 

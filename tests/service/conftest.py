@@ -76,7 +76,7 @@ class Api:
         assert answer.status_code == 202, answer.text
         return dict(answer.json())
 
-    def until(self, run_id: str, condition: Callable[[Json], bool], seconds: float = 20.0) -> Json:
+    def until(self, run_id: str, condition: Callable[[Json], bool], seconds: float = 60.0) -> Json:
         return self._until(lambda: self.run(run_id), condition, seconds)
 
     @staticmethod
@@ -97,13 +97,13 @@ class Api:
     def diagnosis(self, diagnosis_id: str) -> Json:
         return self.get(f"/v1/diagnoses/{diagnosis_id}")
 
-    def until_diagnosis(self, diagnosis_id: str, condition: Callable[[Json], bool], seconds: float = 20.0) -> Json:
+    def until_diagnosis(self, diagnosis_id: str, condition: Callable[[Json], bool], seconds: float = 60.0) -> Json:
         return self._until(lambda: self.diagnosis(diagnosis_id), condition, seconds)
 
-    def diagnosed(self, diagnosis_id: str, seconds: float = 20.0) -> Json:
+    def diagnosed(self, diagnosis_id: str, seconds: float = 60.0) -> Json:
         return self.until_diagnosis(diagnosis_id, lambda diagnosis: diagnosis["state"] in FINAL, seconds)
 
-    def finish(self, run_id: str, seconds: float = 20.0) -> Json:
+    def finish(self, run_id: str, seconds: float = 60.0) -> Json:
         return self.until(run_id, lambda run: run["state"] in FINAL, seconds)
 
     def history(self, run_id: str) -> list[Json]:

@@ -109,7 +109,7 @@ class Job:
 
     def assert_nothing_left(self) -> None:
         """No process is left; Ray's need some seconds to notice that their node has stopped."""
-        deadline = time.monotonic() + 20.0
+        deadline = time.monotonic() + 60
         while (left := marked(self.mark)) and time.monotonic() < deadline:
             time.sleep(0.2)
         assert left == {}

@@ -39,7 +39,7 @@ class Watcher:
                 self.events.append(event)
 
     def until(self, count: int) -> None:
-        deadline = time.monotonic() + 10
+        deadline = time.monotonic() + 60
         while len(self.events) < count:
             assert time.monotonic() < deadline, self.events
             time.sleep(0.01)

@@ -142,7 +142,7 @@ def test_an_old_file_that_takes_long_holds_up_no_other_dataset_and_is_given_up_o
     def slow(_: bytes, label: str, __: object) -> NoReturn:
         tried.append(label)
         began.set()
-        assert go_on.wait(20)
+        assert go_on.wait(60)
         raise fail(label, None, "it is damaged")
 
     with toy_service(settings.data) as (service, api):
@@ -152,7 +152,7 @@ def test_an_old_file_that_takes_long_holds_up_no_other_dataset_and_is_given_up_o
     monkeypatch.setattr("wingfit.service.datasets.parsed_datasets.convert_netcdf", slow)
     with toy_service(settings.data) as (service, _), ThreadPoolExecutor(1) as other:
         waiting = other.submit(service.datasets.get, old)
-        assert began.wait(20)
+        assert began.wait(60)
         assert service.datasets.get(new).name == falcon_dataset(12).name
         go_on.set()
         with pytest.raises(DatasetError, match="it is damaged"):

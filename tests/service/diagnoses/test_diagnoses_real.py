@@ -64,7 +64,7 @@ def test_a_diagnosis_is_cancelled_in_the_middle_of_a_step(tmp_path: Path) -> Non
         assert client.post(f"/v1/diagnoses/{one}/cancel").json()["pending_action"] == "CANCEL"
         before = api.diagnosis(one)["steps"]
         slow.go_on.set()
-        done = api.diagnosed(one, 30.0)
+        done = api.diagnosed(one, 120.0)
         assert (done["state"], done["steps"], done["error"]) == ("CANCELLED", before, None)
         assert slow.batches == 1
 

@@ -33,7 +33,7 @@ class HeldEngine(toy.ToyEngine):
         self, spec: CalibrationSpec, dataset: Dataset, genome: Mapping[str, float], recording: str
     ) -> Comparison:
         self.entered.release()
-        assert self.go.wait(20)
+        assert self.go.wait(60)
         return super().compare(spec, dataset, genome, recording)
 
 
@@ -68,7 +68,7 @@ class HeldReader(toy.ToyEngine):
 
     def load(self, data: bytes, filename: str) -> Dataset:
         self.entered.release()
-        assert self.go.wait(20)
+        assert self.go.wait(60)
         return super().load(data, filename)
 
 

@@ -97,8 +97,8 @@ def test_sigterm_does_not_wait_for_a_long_generation(tmp_path: Path) -> None:
         first.api.until(run, lambda r: r["state"] == "RUNNING")
         began = time.monotonic()
         first.process.send_signal(signal.SIGTERM)
-        assert first.process.wait(20) == 0
-        assert time.monotonic() - began < 10
+        assert first.process.wait(60) == 0
+        assert time.monotonic() - began < 30
     with server(tmp_path / "data", "0") as second:
         assert second.api.finish(run)["state"] == "SUCCEEDED"
 
@@ -138,7 +138,7 @@ def test_a_second_server_on_the_same_folder_is_refused(tmp_path: Path) -> None:
         second = server(tmp_path / "data")
         with pytest.raises(AssertionError, match="another wingfit server"):
             second.__enter__()
-        assert second.process.wait(10) == 1
+        assert second.process.wait(60) == 1
         assert f"process {first.process.pid}" in second.log
         assert "Traceback" not in second.log
         assert first.api.get("/v1/health")["status"] == "ok"
@@ -162,7 +162,7 @@ def test_a_port_in_use_is_refused(tmp_path: Path) -> None:
         second.client.base_url = "http://127.0.0.1:1"
         with pytest.raises(AssertionError, match="set WINGFIT_PORT"):
             second.__enter__()
-        assert second.process.wait(10) == 1
+        assert second.process.wait(60) == 1
 
 
 def _watch(one: ServerProcess, run: str, lines: list[str]) -> None:
@@ -181,7 +181,7 @@ def test_a_run_that_takes_the_server_down_is_given_up_and_its_neighbour_is_not(t
         with server(data, "0.3") as again:
             deaths += 1
             try:
-                run = again.api.until(guilty, lambda r: r["state"] == "FAILED", 5.0)
+                run = again.api.until(guilty, lambda r: r["state"] == "FAILED", 60.0)
             except (httpx.TransportError, AssertionError):
                 assert again.process.wait(30) == -signal.SIGKILL
                 continue

@@ -73,7 +73,7 @@ def _hung(client: httpx.Client, hanging: Hanging) -> tuple[Api, str]:
     """The API, and a run whose worker hangs."""
     api = Api(client)
     run: str = api.submit(api.upload()["id"])["id"]
-    assert hanging.called.wait(10)
+    assert hanging.called.wait(60)
     return api, run
 
 

@@ -32,7 +32,7 @@ def every_thread_held(api: Api, monkeypatch: pytest.MonkeyPatch) -> Iterator[Non
 
     def held(*given: object) -> None:  # noqa: ARG001
         entered.release()
-        assert go.wait(20)
+        assert go.wait(60)
 
     monkeypatch.setattr(toy.ToyEngine, "check", held)
     body = {"dataset_id": api.upload()["id"]}
@@ -53,7 +53,7 @@ def silent_database(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
     @contextmanager
     def held(database: Database) -> Iterator[object]:
-        assert go.wait(20)
+        assert go.wait(60)
         with look(database) as found:
             yield found
 
@@ -67,7 +67,7 @@ def test_health_does_not_wait_for_the_threads_of_requests_or_for_the_database(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with toy_service(tmp_path) as (_, api):
-        api._until(lambda: api.get("/v1/health"), lambda now: now["status"] == "ok", 5.0)
+        api._until(lambda: api.get("/v1/health"), lambda now: now["status"] == "ok", 60.0)
         with every_thread_held(api, monkeypatch):
             for path in ("/v1/health", "/v1/ready", "/v1/metrics"):
                 answer, seconds = timed(api.client, path)
@@ -87,7 +87,7 @@ def test_health_does_not_wait_for_the_threads_of_requests_or_for_the_database(
                 assert "the database does not answer" in answer.json()["detail"]
                 answer, _ = timed(api.client, "/v1/metrics")
                 assert "wingfit_database_up 0.0" in answer.text
-        api._until(lambda: api.get("/v1/health"), lambda now: now["status"] == "ok", 5.0)
+        api._until(lambda: api.get("/v1/health"), lambda now: now["status"] == "ok", 60.0)
         assert "wingfit_database_up 1.0" in api.client.get("/v1/metrics").text
 
 

@@ -82,7 +82,7 @@ def test_not_ready_while_no_worker_lives(tmp_path: Path) -> None:
     app = create_app(Settings(data=tmp_path), engine=toy.ToyEngine(), make_evaluator=lambda: evaluator)
     with serving(app) as client:
         api = Api(client)
-        Api._until(lambda: api.get("/v1/health"), lambda health: health["status"] == "ok", 5.0)
+        Api._until(lambda: api.get("/v1/health"), lambda health: health["status"] == "ok", 60.0)
         evaluator.standing = Standing(0, 1, 2, 1)
         answer = client.get("/v1/ready")
         assert (answer.status_code, "there is no worker" in answer.json()["detail"]) == (503, True)
@@ -127,7 +127,7 @@ def test_the_example_alerts_use_existing_metrics(api: Api) -> None:
 
 
 def test_ready(api: Api) -> None:
-    Api._until(lambda: api.get("/v1/health"), lambda health: health["status"] == "ok", 5.0)
+    Api._until(lambda: api.get("/v1/health"), lambda health: health["status"] == "ok", 60.0)
     assert api.get("/v1/ready")["status"] == "ok"
 
 

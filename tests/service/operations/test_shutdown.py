@@ -28,7 +28,7 @@ def stuck(data: Path, part: str, give_up: float = NEVER, kill: float = NEVER) ->
 
 
 def until_it_hangs(server: ServerProcess, times: int = 1) -> None:
-    deadline = time.monotonic() + 20
+    deadline = time.monotonic() + 60
     while server.log.count("HANGS") < times:
         assert time.monotonic() < deadline, server.log
         time.sleep(0.02)
@@ -115,7 +115,7 @@ def test_an_ordinary_stop_is_quick_and_the_watchdog_ends_with_the_server(
         assert stopped(server, 15, number) == (0 if number == signal.SIGTERM else -number)
         assert time.monotonic() - began < 10
         assert "WARNING" not in server.log
-        deadline = time.monotonic() + 10
+        deadline = time.monotonic() + 60
         while Path(f"/proc/{watchdog}").exists():
             assert time.monotonic() < deadline
             time.sleep(0.01)

@@ -95,7 +95,7 @@ class Seen:
                 return False
             raise
 
-    def wait(self, condition: str, seconds: float = 15.0) -> None:
+    def wait(self, condition: str, seconds: float = 60.0) -> None:
         # Polled from here: Playwright's own polling needs eval in the page, which the content policy rightly forbids.
         deadline = time.monotonic() + seconds
         while not self._holds(condition):

@@ -145,6 +145,8 @@ def test_it_waits_for_a_driver_and_survives_the_death_of_either_side(tmp_path: P
         taken = 0
         while taken < 40:  # a driver that returns some results, and vanishes with others
             work = api.client.post(f"/v1/drive/{one}/work", json={"driver": "one", "limit": 3, "wait_s": 5}).json()
+            if not work["simulations"]:  # a busy machine had none ready in time
+                continue
             taken += len(work["simulations"])
             results = [_result(call) for call in work["simulations"][: 3 if taken < 40 else 1]]
             assert api.client.post(f"/v1/drive/{one}/results", json={"driver": "one", "results": results}).json() == {
@@ -160,7 +162,7 @@ def test_it_waits_for_a_driver_and_survives_the_death_of_either_side(tmp_path: P
 
 def drive_here(api: Api, kind: str, job: str, until: Callable[[Json], bool]) -> None:
     """Simulate for a job until its answer is as wanted."""
-    deadline = time.monotonic() + 20.0
+    deadline = time.monotonic() + 60
     while not until(api.get(f"/v1/{kind}/{job}")):
         assert time.monotonic() < deadline
         work = api.client.post(f"/v1/drive/{job}/work", json={"driver": "here", "limit": 50, "wait_s": 0.1}).json()

@@ -68,7 +68,7 @@ def driven(folder: Path) -> Iterator[Driving]:
         yield driving
     finally:
         over.set()
-        thread.join(10.0)
+        thread.join(60)
         database.close()
 
 

@@ -232,7 +232,7 @@ def test_only_what_simulates_takes_its_turn(tmp_path: Path) -> None:
             self, spec: CalibrationSpec, dataset: Dataset, genome: Mapping[str, float], recording: str
         ) -> Comparison:
             entered.set()
-            assert go.wait(20)
+            assert go.wait(60)
             return super().compare(spec, dataset, genome, recording)
 
     app = create_app(Settings(data=tmp_path), engine=Held(), make_evaluator=toy.NoEvaluator)
@@ -241,7 +241,7 @@ def test_only_what_simulates_takes_its_turn(tmp_path: Path) -> None:
         run = api.finish(api.submit(api.upload()["id"])["id"])["id"]
         held = pool.submit(exported, api, f"runs/{run}", "netcdf")
         try:
-            assert entered.wait(20)
+            assert entered.wait(60)
             with httpx.Client(base_url=client.base_url, timeout=20) as other:
                 busy = other.get(f"/v1/runs/{run}/export?format=netcdf")
                 assert (busy.status_code, busy.json()["type"]) == (503, "urn:wingfit:problem:busy")
