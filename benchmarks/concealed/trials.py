@@ -163,7 +163,10 @@ EVERY_VEHICLE = (
     "rotational_circulation", "viscous", "balance_drift", "clock_offset", "scale_error", "axis_sign", "axis_swap",
     "unit_error", "phase_reference",
 )  # fmt: skip
-LATER = ("lift_curve", "leading_edge_suction", "axis_scale", "wing_mass_error", "elastic_twist")
+LATER = (
+    "lift_curve", "leading_edge_suction", "axis_scale", "wing_mass_error", "elastic_twist", "wing_length_error",
+    "wing_chord_error",
+)  # fmt: skip
 """Effects of vehicles that came after trials were run: theirs come last, so that the others of a seed stay the same."""
 LEFT_OUT = {
     "clap_and_peel": FLING, "inertial": "inertial", "added_mass": "added_mass", "effective_chord": "effective_chord",

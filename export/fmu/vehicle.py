@@ -73,7 +73,7 @@ def _parts(direct: DirectVehicle, correction: Correction) -> Parts:
     single = np.array([scene.density[0]])
     return Parts(
         board=np.zeros(places.BOARD), fixed=_fixed(direct), flap=_pairs(scene.flap[0]), pitch=_pairs(followed),
-        rates=np.ascontiguousarray(rates), r=model._span[0].copy(), chord=chord.copy(),
+        rates=np.ascontiguousarray(rates), r=model._span[0] * scene.length[0], chord=scene.chord[:, None] * chord,
         mass=np.ascontiguousarray(scene.mass_factor[:, None] * mass), density=single, carried=scene.carried.copy(),
         loading=np.ascontiguousarray(scene.loading[:, : len(chord)]), laws=direct.laws, nodes=correction.nodes,
         barycentric=correction.barycentric, counts=correction.counts, table=correction.table,
@@ -99,7 +99,7 @@ def _fixed(direct: DirectVehicle) -> Array:
     vehicle, motion, pitch = model.vehicle, scene.setting.motion, scene.setting.motion.pitch
     r, width = model._span[0], model._span[3]
     found, reach = np.zeros(FIXED), motion.pitch_station * vehicle.span
-    found[[step.THICKNESS, step.WIDTH, step.POINT]] = vehicle.thickness, width, ADDED_MASS_POINT
+    found[[step.THICKNESS, step.WIDTH, step.POINT]] = vehicle.thickness, width * scene.length[0], ADDED_MASS_POINT
     found[[step.TWIST, step.TWIST_STEP, step.ROOT]] = r[0] / reach, width / reach, motion.root_pitch
     found[[step.DIHEDRAL_COSINE, step.DIHEDRAL_SINE]] = np.cos(vehicle.dihedral), np.sin(vehicle.dihedral)
     found[[step.MIRRORED, step.PRINTED]] = mirrored(vehicle), float(vehicle.velocities == "printed")

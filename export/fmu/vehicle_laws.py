@@ -20,7 +20,7 @@ from wingfit.sim.vehicle.blade_element_wing import _COEFFICIENTS, _ROWS, BladeEl
 from wingfit.sim.vehicle.elements import CURVE_ROWS, ROWS
 
 _CLOSE = 1e-9  # relative
-_FIXED = ("flap", "density", "mass_factor", "loading", "fling", "together", "carried")
+_FIXED = ("flap", "density", "mass_factor", "loading", "fling", "together", "carried", "length", "chord")
 
 
 class DirectVehicle:

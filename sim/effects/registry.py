@@ -13,7 +13,7 @@ FILES = (
     # changes of the springs before effects in proportion to their stiffness
     ("structure", "stiffness_drift damage cubic_stiffness rod_slip hysteresis viscoelastic tether cable"),
     ("inertia", "lumped_mass mass_offset"),
-    ("terms", "inertial wing_acceleration wing_mass_error"),
+    ("terms", "inertial wing_acceleration wing_mass_error wing_length_error wing_chord_error"),
     ("actuation", "stroke_amplitude stroke_bias drive_harmonics phase_lag_error"),
     ("actuation", "wing_pitch_zero wing_pitch_amplitude wing_pitch_phase elastic_twist"),
     ("actuation", "hinge_tilt hinge_offset compliant_drive backlash"),

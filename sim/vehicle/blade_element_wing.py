@@ -272,13 +272,14 @@ class BladeElementWing:
         found = np.zeros((len(scene), len(ROWS) + curves, 2, n // LANES, LANES))
         rows = scene.rows(first)
         rows[:, PEELED] = scene.apart(rows)
-        masses, loading = scene.mass_factor[:, None] * mass, scene.loading[:, : len(r)].copy()
+        chords, masses = scene.chord[:, None] * chord, scene.mass_factor[:, None] * mass
+        loading = scene.loading[:, : len(r)].copy()
         grouped = rows.reshape(*rows.shape[:2], -1, LANES)
         for side in scene.each_side(rows):
             air = (scene.density.copy(), scene.carried.copy())
-            wing_forces(grouped, side, r, chord, masses, *air, loading, constants, found)
+            wing_forces(grouped, side, r, chords, masses, *air, loading, constants, found)
         each = found.reshape(len(found), -1, 2, n)
-        each *= mirrored(vehicle)
+        each *= (mirrored(vehicle) * scene.length)[:, None, None, None]
         peel = scene.angles.peel[:, None] * ("clap_and_peel" in self.terms)
         out = np.empty((len(each), len(self._active), 2, n))
         for k, name in enumerate(self._active):

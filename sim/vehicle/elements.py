@@ -92,7 +92,7 @@ def _element_forces(
     """Add to ``out`` [7, 2, n / W, W] the forces (N, body x and z) of one wing at n instants, in the order of ROWS.
 
     ``motion`` [14, n / W, W]: rows FLAP_RATE to DOWNWARD; ``rho``: density of the air, kg/m^3; ``carried``,
-    ``mass`` [E] and ``loading`` [E]: of this individual; others as in :func:`wing_forces`.
+    ``chord`` [E], ``mass`` [E] and ``loading`` [E]: of this individual; others as in :func:`wing_forces`.
     """
     dr, d = constants.width, constants.point
     m11 = 0.25 * math.pi * rho * carried * constants.thickness**2  # Eq. 10
@@ -205,15 +205,15 @@ def wing_forces(
     """Add the forces of one wing of each of B individuals to ``out`` [B, 7 or 9, 2, n / W, W] along body x and z, N.
 
     ``motion`` [B, 14, n / W, W]: rows FLAP_RATE to DOWNWARD; ``r`` [E]: distances of E elements from the flapping axis
-    in equal steps, m; ``chord`` [E], m; ``mass`` [B, E] of the wing per length, kg/m; ``density`` [B] of the air,
+    in equal steps, m; ``chord`` [B, E], m; ``mass`` [B, E] of the wing per length, kg/m; ``density`` [B] of the air,
     kg/m^3; ``carried`` [B]: factor on the mass of the air that it accelerates; ``loading`` [B, E]: factor on the
     circulation. ``out`` is in the order of ROWS, then of CURVE_ROWS if it has
     9 rows.
     """
     for b in range(len(motion)):
-        _element_forces(motion[b], side, r, chord, mass[b], density[b], carried[b], loading[b], constants, out[b])
+        _element_forces(motion[b], side, r, chord[b], mass[b], density[b], carried[b], loading[b], constants, out[b])
         if out.shape[1] > len(ROWS):
-            _curve_forces(motion[b], side, r, chord, density[b], loading[b], constants, out[b, len(ROWS) :])
+            _curve_forces(motion[b], side, r, chord[b], density[b], loading[b], constants, out[b, len(ROWS) :])
 
 
 @allocating

@@ -38,7 +38,8 @@ class StationedWings:
     """Wings of B individuals with prescribed motion, at eight stations and n instants (Armanini et al. 2016).
 
     Attributes:
-        places: the stations.
+        places: the stations as described.
+        chord: [B, 8], m.
         sides: for each side that is computed (lower, upper), the motion [B, 14, n] of its wings (rows as in
             :mod:`wingfit.sim.vehicle.elements`) and the stream relative to them.
         turning: [B, n], rad/s: C_R theta_w' of Eq. 2 at the pitch station, for a wing without another one near it.
@@ -51,6 +52,7 @@ class StationedWings:
     """
 
     places: Stations
+    chord: Array
     sides: tuple[tuple[Array, Side], ...]
     turning: Array
     fling: Array
@@ -107,10 +109,10 @@ class StationedWings:
     def forces(self, flow: Flow) -> Array:
         """Circulatory (fling included) and viscous forces [B, 2, n] (N) of all wings in ``flow`` along body x and z."""
         out = np.zeros((len(self.turning), 2, self.turning.shape[1]))
-        circulation = flow.circulation + self.flung
+        circulation, weight = flow.circulation + self.flung, self.places.weight
         for k, (rows, side) in enumerate(self.sides):
             moving = (flow.along[k], flow.normal[k], flow.speed[k], circulation[k])
-            stations.station_forces(rows, side, *self.turns, *moving, self.places, self.density, self.drag, out)
+            stations.station_forces(rows, side, *self.turns, *moving, weight, self.chord, self.density, self.drag, out)
         out *= self.alike
         return out
 
@@ -119,20 +121,20 @@ class StationedWings:
         friction = np.empty_like(flow.normal)
         for k, out in enumerate(friction):
             moving = flow.along[k], flow.normal[k], flow.speed[k]
-            stations.station_friction(*moving, self.places.chord, self.drag, out)
+            stations.station_friction(*moving, self.chord, self.drag, out)
         carried = (flow.circulation + self.flung) * flow.along
         return np.asarray(self.density[:, None, None] * (carried - friction * flow.normal))
 
     def _turned(self, rate: Array) -> Array:
         """Circulation [B, n, 8] (m^2/s) at the stations by a ``rate`` [B, n] (rad/s) at the pitch station (Eq. 2)."""
-        lever = 0.5 * self.places.chord**2 * self.places.twist * self.loading
+        lever = 0.5 * self.chord**2 * self.places.twist * self.loading
         return np.asarray(rate[:, :, None] * lever[:, None])
 
     def circulation(self, along: Array, normal: Array) -> tuple[Array, Array]:
         """Speed (m/s) and quasi-steady circulation (m^2/s) at velocities ``along`` and ``normal`` (m/s), as in Flow."""
         places, speed, found = self.places, np.empty_like(along), np.empty_like(along)
         for k in range(len(self.sides)):
-            velocity, wing = (along[k], normal[k]), (places.twist, places.chord, self.loading)
+            velocity, wing = (along[k], normal[k]), (places.twist, self.chord, self.loading)
             stations.station_circulation(*velocity, self.turning, self.lift, *wing, speed[k], found[k])
         return speed, found
 

@@ -99,8 +99,8 @@ def steady_attachment(
 ) -> None:
     """Set ``out`` to the attached fraction of the chord 1 / (1 + exp((alpha - tau_2 c alpha' / V - angle) / width)).
 
-    alpha is the angle of attack (rad, folded into 0 to pi / 2), alpha' its rate (rad/s), c the ``chord`` [8] (m) and V
-    the ``speed``. ``along``, ``normal`` (velocity along the chord and normal to it), ``speed`` (m/s) and ``out``
+    alpha is the angle of attack (rad, folded into 0 to pi / 2), alpha' its rate (rad/s), c the ``chord`` [B, 8] (m) and
+    V the ``speed``. ``along``, ``normal`` (velocity along the chord and normal to it), ``speed`` (m/s) and ``out``
     [sides, B, n, 8]; ``stall`` [B, 3]: angle and width (rad), and tau_2 in chords travelled; ``step`` between instants
     in s.
     """
@@ -112,7 +112,7 @@ def steady_attachment(
             for t in range(n):
                 before, after = t - 1 if t else n - 1, t + 1 if t + 1 < n else 0
                 for g in range(GROUPS):
-                    lead = load1(chord, g) * (advance * 0.5 / step)
+                    lead = load1(chord[b], g) * (advance * 0.5 / step)
                     vx, vz, v = load(x, t, g), load(z, t, g), load(V, t, g)
                     rise, gain = load(z, after, g) - load(z, before, g), load(x, after, g) - load(x, before, g)
                     turned = vx * rise - vz * gain

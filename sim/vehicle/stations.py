@@ -140,13 +140,13 @@ def station_circulation(
     ``along`` and ``normal`` [B, n, 8]: the wing's velocity through the air along its chord and normal to it, m/s;
     ``turning`` [B, n]: C_R theta_w' at the pitch station, or the term that replaces it in Eq. 2, rad/s; ``coefficient``
     [B, 2]: C_l of the sine law and the factor on the measured lift curve; ``twist`` [8]: fractions of ``turning``;
-    ``chord`` [8], m; ``loading`` [B, 8]: factor on the circulation.
+    ``chord`` [B, 8], m; ``loading`` [B, 8]: factor on the circulation.
     """
     for b in range(len(along)):
         C_l, K_l = coefficient[b, 0], coefficient[b, 1]
         for t in range(along.shape[1]):
             for g in range(GROUPS):
-                c, vx, vz = load1(chord, g), load(along[b], t, g), load(normal[b], t, g)
+                c, vx, vz = load1(chord[b], g), load(along[b], t, g), load(normal[b], t, g)
                 V = root(vx * vx + vz * vz + STILL)
                 gamma = c * 0.5 * (c * load1(twist, g) * turning[b, t] - vx * vz / V * (2.0 * C_l))
                 store(speed[b], t, g, V)
@@ -154,7 +154,7 @@ def station_circulation(
             if K_l != 0.0:
                 for e in range(STATIONS):
                     x, z = along[b, t, e], normal[b, t, e]
-                    lift = 0.5 * chord[e] * speed[b, t, e] * K_l * curve_lift(_attack(x, z)) * loading[b, e]
+                    lift = 0.5 * chord[b, e] * speed[b, t, e] * K_l * curve_lift(_attack(x, z)) * loading[b, e]
                     circulation[b, t, e] += math.copysign(lift, -x * z)
 
 
@@ -162,27 +162,27 @@ def station_circulation(
 def station_friction(along: Array, normal: Array, speed: Array, chord: Array, drag: Array, out: Array) -> None:
     """Set ``out`` [B, n, 8] to the viscous drag over density and speed (m^2/s), which :func:`station_forces` adds.
 
-    Armanini et al. (2016), Eq. 11; arguments as there, ``chord`` [8] in m.
+    Armanini et al. (2016), Eq. 11; arguments as there.
     """
     for b in range(len(along)):
         for t in range(along.shape[1]):
             for e in range(STATIONS):
                 vx, vz, V = along[b, t, e], normal[b, t, e], speed[b, t, e]
                 measured = drag[b, 2] * curve_drag(_attack(vx, vz)) * V
-                out[b, t, e] = 0.5 * chord[e] * ((vx * vx * drag[b, 0] + vz * vz * drag[b, 1]) / V + measured)
+                out[b, t, e] = 0.5 * chord[b, e] * ((vx * vx * drag[b, 0] + vz * vz * drag[b, 1]) / V + measured)
 
 
 @allocating
 def station_forces(
     motion: Array, side: Side, cosine: Array, sine: Array, along: Array, normal: Array, speed: Array,
-    circulation: Array, places: Stations, density: Array, drag: Array, out: Array,
+    circulation: Array, weight: Array, chord: Array, density: Array, drag: Array, out: Array,
 ) -> None:  # fmt: skip
     """Add the circulatory and viscous forces of one wing (N) to ``out`` [B, 2, n] along body x and z (Eqs. 8, 11, 15).
 
     ``cosine`` and ``sine`` (of the wing's pitch), ``along`` and ``normal`` (the wing's velocity through the air along
     its chord and normal to it, m/s), ``speed`` (m/s) and ``circulation`` (m^2/s): [B, n, 8]. ``motion`` [B, 14, n]:
-    rows as in :mod:`wingfit.sim.vehicle.elements`; ``density`` [B] of the air, kg/m^3; ``drag`` [B, 3]: C_D0, C_Dpi2
-    and the factor on the measured drag curve.
+    rows as in :mod:`wingfit.sim.vehicle.elements`; ``weight`` [8] along the span, m; ``chord`` [B, 8], m; ``density``
+    [B] of the air, kg/m^3; ``drag`` [B, 3]: C_D0, C_Dpi2 and the factor on the measured drag curve.
     """
     part = np.empty((2, STATIONS))
     curve = np.empty(STATIONS)
@@ -192,15 +192,15 @@ def station_forces(
             if K_d != 0.0:
                 for e in range(STATIONS):
                     angle = _attack(along[b, t, e], normal[b, t, e])
-                    curve[e] = 0.5 * K_d * places.chord[e] * curve_drag(angle)
+                    curve[e] = 0.5 * K_d * chord[b, e] * curve_drag(angle)
             for g in range(GROUPS):
-                chord, weight = load1(places.chord, g), load1(places.weight, g) * density[b]
+                c, each = load1(chord[b], g), load1(weight, g) * density[b]
                 ct, st = load(cosine[b], t, g), load(sine[b], t, g)
                 vx, vz, V = load(along[b], t, g), load(normal[b], t, g), load(speed[b], t, g)
-                gamma = load(circulation[b], t, g) * weight
-                friction = chord * weight * (vx * vx * C_D0 + vz * vz * C_D90) * 0.5 / V
+                gamma = load(circulation[b], t, g) * each
+                friction = c * each * (vx * vx * C_D0 + vz * vz * C_D90) * 0.5 / V
                 if K_d != 0.0:
-                    friction += load1(curve, g) * weight * V
+                    friction += load1(curve, g) * each * V
                 ub, wb = vx * st + vz * ct, vx * ct - vz * st
                 store(part, 0, g, gamma * wb - friction * ub)
                 store(part, 1, g, -(gamma * ub) - friction * wb)

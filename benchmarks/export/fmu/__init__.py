@@ -22,7 +22,10 @@ from wingfit.records import Condition
 # Effects of a wing that act together, and those of a vehicle: at once, and with a memory of the flow.
 WING_EFFECTS = ("viscoelastic", "hysteresis", "compliant_drive", "added_mass", "circulation_lag", "tip_loss")
 MORE_EFFECTS = ("rod_slip", "cable", "backlash", "clap_and_peel", "wake_capture", "induced_inflow", "hinge_tilt")
-VEHICLE_EFFECTS = ("clap_and_peel", "varying_coefficients", "stroke_amplitude", "airspeed_error", "wing_pitch_phase")
+VEHICLE_EFFECTS = (
+    "clap_and_peel", "varying_coefficients", "stroke_amplitude", "airspeed_error", "wing_pitch_phase",
+    "wing_length_error", "wing_chord_error",
+)  # fmt: skip
 MEMORY_EFFECTS = ("circulation_lag", "body_drag", "induced_inflow")
 SLOPES = {"C_l": (-0.15, -0.5), "C_r": (0.02, 0.05)}
 

@@ -37,11 +37,11 @@ class Parts(NamedTuple):
 
     ``flap`` and ``pitch`` [K + 1, 2]: Fourier series of the flap angle, and of the angle that the pitch follows: that
     flap angle, late by the error of its phase, or the pitch itself. ``rates`` [2, n]: the first two derivatives of that
-    angle by phase, at n instants. ``r``, ``chord`` [E] (m), ``mass`` [1, E] (kg/m), ``density`` [1], ``carried`` [1],
-    ``loading`` [1, E]: as of :func:`wingfit.sim.vehicle.elements.wing_forces`. ``laws`` [WEIGHTS, LAW]. ``nodes`` [3,
-    M], with ``counts`` [3] used in each row, and ``barycentric`` [3, M]: nodes of flap frequency, airspeed and pitch,
-    with their weights, between which ``table`` [M1, M2, M3, n, 2], a correction of the force (N), is interpolated. It
-    is empty if there is none. ``rows`` and ``found``: scratch.
+    angle by phase, at n instants. ``r`` [E], ``chord`` [1, E] (m), ``mass`` [1, E] (kg/m), ``density`` [1], ``carried``
+    [1], ``loading`` [1, E]: as of :func:`wingfit.sim.vehicle.elements.wing_forces`. ``laws`` [WEIGHTS, LAW]. ``nodes``
+    [3, M], with ``counts`` [3] used in each row, and ``barycentric`` [3, M]: nodes of flap frequency, airspeed and
+    pitch, with their weights, between which ``table`` [M1, M2, M3, n, 2], a correction of the force (N), is
+    interpolated. It is empty if there is none. ``rows`` and ``found``: scratch.
     """
 
     board: Array

@@ -12,7 +12,7 @@ import numpy as np
 from wingfit.records import Condition, Vehicle, WingMotion
 from wingfit.records.array_types import Array, Complex
 from wingfit.sim.atmosphere import density
-from wingfit.sim.vehicle.elements import PEELED, PITCH_RATE, PROJECTION, Side
+from wingfit.sim.vehicle.elements import FLAP_ACCELERATION, FLAP_RATE, PEELED, PITCH_RATE, PROJECTION, Side
 from wingfit.sim.vehicle.flow import Flow, StationedWings
 from wingfit.sim.vehicle.motion import Angles, PitchError, angles_of, flap_series
 from wingfit.sim.vehicle.rows import mirrored, motion_rows, set_side, uppers
@@ -85,7 +85,8 @@ class VehicleScene:
         airspeed: [B], m/s.
         incidence: [B], rad: angle between the stream and the body (body pitch in level flight).
         density: [B] of the air, kg/m^3.
-        mass_factor: [B], factor on the mass of the wings.
+        mass_factor: [B], factor on the mass of the wings per length.
+        length, chord: [B], factors on radius and width of the wings' elements, and on their chord.
         inflow: [B, n], m/s: added to the stream along body x over the beat.
         loading: [B, E + 8]: factor on the circulation at the E elements, then at the eight stations.
         fling: [B]: coefficient C of an additional circulation 1/2 C c^2 (-theta_w') while the wings peel apart (chord
@@ -106,6 +107,8 @@ class VehicleScene:
     incidence: Array
     density: Array
     mass_factor: Array
+    length: Array
+    chord: Array
     inflow: Array
     loading: Array
     fling: Array
@@ -132,8 +135,8 @@ class VehicleScene:
         one, none = np.ones(count), np.zeros(count)
         return cls(
             setting=setting, genes=genes, flap=flap, airspeed=airspeed, incidence=incidence, density=rho,
-            mass_factor=one, inflow=inflow, loading=loading, fling=none, added=added, together=together, carried=one,
-            pitch=PitchError(none, none, none),
+            mass_factor=one, length=one, chord=one, inflow=inflow, loading=loading, fling=none, added=added,
+            together=together, carried=one, pitch=PitchError(none, none, none),
         )  # fmt: skip
 
     def __len__(self) -> int:
@@ -214,6 +217,11 @@ class VehicleScene:
         """The eight stations along each wing at which effects of the flow act."""
         return stations(self.setting.vehicle, self.setting.motion)
 
+    @property
+    def chords(self) -> Array:
+        """Chords [B, 8] at the stations, m."""
+        return np.asarray(self.chord[:, None] * self.stations.chord)
+
     def load(self, law: Callable[[Array], Array]) -> None:
         """Multiply the circulation by ``law``, a factor [B, m] at m distances (m) from the flapping axis."""
         self.loading *= law(np.concatenate([self.setting.r, self.stations.r]))
@@ -232,7 +240,7 @@ class VehicleScene:
         loading = self.loading[:, -STATIONS:].copy()
         turning, fling = self._turning()
         return StationedWings(
-            self.stations, sides, turning, fling, loading, self.density.copy(), lift, drag, mirrored(own)
+            self.stations, self.chords, sides, turning, fling, loading, self.density.copy(), lift, drag, mirrored(own)
         )
 
     @cached_property
@@ -256,7 +264,7 @@ class VehicleScene:
         """Return the sum over eight stations [B, n] of ``values`` [B, n, 8] times ``weight`` [8]."""
         out = np.empty(values.shape[:2])
         span_sums(values, weight, out)
-        return out
+        return np.asarray(self.length[:, None] * out)
 
     def push(self, x: Array, z: Array) -> None:
         """Add a force (N) of every wing to the vehicle.
@@ -285,7 +293,7 @@ class VehicleScene:
         """
         (cosine, sine), places, (rows, _) = self.wings.turns, self.stations, self.wings.sides[0]
         factor = self.apart(rows) ** 2 * rows[:, PITCH_RATE] * (0.25 * np.pi * self.carried * self.density)[:, None]
-        force = factor[:, :, None] * air * places.chord**2 * places.twist
+        force = factor[:, :, None] * air * self.chords[:, None] ** 2 * places.twist
         along, normal = self._share("inertial") * force * cosine, self._share("added_mass") * force * sine
         x, z = along * sine + normal * cosine, along * cosine - normal * sine
         self.push(self.over_span(x, places.weight), self.over_span(z, places.weight))
@@ -302,7 +310,9 @@ class VehicleScene:
 
         The first element has the fraction ``half_step`` of the twist at the pitch station.
         """
-        return motion_rows(self.angles, self.forward(self.inflow), self.setting.motion.root_pitch, half_step)
+        rows = motion_rows(self.angles, self.forward(self.inflow), self.setting.motion.root_pitch, half_step)
+        rows[:, [FLAP_RATE, FLAP_ACCELERATION]] *= self.length[:, None, None]
+        return rows
 
     def apart(self, rows: Array) -> Array:
         """Return the part [B, n] of the chord that carries added mass, from the motion ``rows`` [B, 14, n]."""
@@ -322,7 +332,8 @@ class VehicleScene:
         """Return the forces [B, 2, n] (N, body x and z) that effects add: directly, and by changing the flow."""
         if self._base is None:
             return self.added
-        return np.asarray(self.added + (self.wings.forces(self.flow) - self._base))
+        changed = self.wings.forces(self.flow) - self._base
+        return np.asarray(self.added + self.length[:, None, None] * changed)
 
     def forward(self, inflow: Array) -> Array:
         """Return the speed of the stream [B, n] (m/s) along body x, including an ``inflow`` [B, n] (m/s)."""

@@ -37,7 +37,8 @@ NEW = (
     "stroke_bias", "wing_pitch_zero", "wing_pitch_amplitude", "wing_pitch_phase", "elastic_twist", "body_pitch_error",
     "residual_air", "downwash", "wake_tip_loss", "translation", "rotational_circulation", "viscous", "zero_lift_angle",
     "lift_curve", "leading_edge_suction", "stall_vortex", "varying_coefficients", "inertial", "wing_acceleration",
-    "added_mass", "added_mass_error", "wing_mass_error", "effective_chord", "mass_offset", "body_drag", "tail_lift",
+    "added_mass", "added_mass_error", "wing_mass_error", "wing_length_error", "wing_chord_error", "effective_chord",
+    "mass_offset", "body_drag", "tail_lift",
 )  # fmt: skip
 ALONE = {"rotational_circulation": "rotation"}  # other names of the terms that the library's effects are
 # Genes of the library's effects whose meaning differs from the law's, at the values that come nearest.
@@ -49,6 +50,8 @@ NEAREST: dict[str, Genes] = {
     "lift_curve": lambda p: {"fourth": p["strength"]},
     "leading_edge_suction": lambda p: {"change": 0.8 * p["strength"]},
     "added_mass_error": lambda p: {"part": p["strength"]},
+    "wing_length_error": lambda p: {"part": p["strength"]},
+    "wing_chord_error": lambda p: {"part": p["strength"]},
     "body_drag": lambda p: {"area": p["strength"], "slender": 1.0},
     "tail_lift": lambda p: {"constant": 0.0, "slope": p["strength"]},
     "varying_coefficients": lambda p: {

@@ -12,7 +12,7 @@ from wingfit.export.calibrated_model import CalibratedModel
 from wingfit.export.fmu import NotExportedError, write_fmu
 from wingfit.export.fmu.package import c_compiler
 
-EFFECTS = ("clap_and_peel", "varying_coefficients", "airspeed_error")
+EFFECTS = ("clap_and_peel", "varying_coefficients", "airspeed_error", "wing_length_error", "wing_chord_error")
 
 
 def _written(model: CalibratedModel, folder: Path) -> Path:

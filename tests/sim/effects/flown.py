@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -16,10 +17,21 @@ from wingfit.sim.vehicle.blade_element_wing import BladeElementWing
 from wingfit.sim.vehicle.terms import chosen
 
 Array = npt.NDArray[np.float64]
+Values = dict[str, Any]
 
 FAST = recording(12.5, 2.0, math.radians(30.0))
 FOURIER = replace(
     DELFLY.motion, pitch=FourierPitch(1.5, (0.1, 0.05), (-0.7, 0.02)), flap=FourierFlap(0.3, (-0.34,), (0.05,))
+)
+# Effects of the flow at the stations, whose memory is measured in chords, and of the wing's inertia.
+BESIDE: tuple[Values, ...] = (
+    {},
+    {"circulation_lag__share": 0.5},
+    {"stall_vortex__share": 0.5},
+    {"elastic_twist__compliance": 0.1},
+    {"wake_capture__share": 0.3},
+    {"leading_edge_suction__change": 0.5},
+    {"mass_offset__distance": 0.005, "wing_acceleration__share": 1.0},
 )
 
 

@@ -116,7 +116,7 @@ def turning_flow(n: int) -> tuple[Array, Array, Array]:
 def test_attachment_at_rest() -> None:
     """1 / (1 + exp((alpha - angle) / width)), in the four quadrants."""
     along, normal, speed = turning_flow(400)
-    out, chord = np.empty_like(speed), np.full(8, 0.05)
+    out, chord = np.empty_like(speed), np.full((1, 8), 0.05)
     alpha = np.arctan2(np.abs(normal), np.abs(along))
     for width in (0.02, 0.1, 0.3):
         steady_attachment(along, normal, speed, chord, np.array([[0.4, width, 0.0]]), STEP, out)
@@ -125,7 +125,7 @@ def test_attachment_at_rest() -> None:
 
 def test_attachment_comes_late_where_the_angle_rises() -> None:
     along, normal, speed = turning_flow(4000)
-    out, chord = np.empty_like(speed), np.full(8, 0.05)
+    out, chord = np.empty_like(speed), np.full((1, 8), 0.05)
     alpha = np.arctan2(np.abs(normal), np.abs(along))
     rate = (np.roll(alpha, -1, axis=2) - np.roll(alpha, 1, axis=2)) / (2 * STEP)
     smooth = np.abs(np.roll(rate, -1, axis=2) - np.roll(rate, 1, axis=2)) < 0.1 * np.abs(rate).max()  # not at a fold

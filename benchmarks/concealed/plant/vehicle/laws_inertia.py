@@ -1,7 +1,8 @@
-"""Hidden changes of the inertia of a vehicle's wings and of the air that they accelerate."""
+"""Hidden errors of the described size of a vehicle's wings, and of their inertia and the air that they accelerate."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -11,6 +12,23 @@ from benchmarks.concealed.plant.vehicle.flow import Array, Complex, Flow, mass_p
 from wingfit.records import Vehicle
 
 _NEAR = 2.0  # relative error of the added mass of wings that touch, over that one chord apart
+
+
+def resized(vehicle: Vehicle, hidden: Concealed) -> Vehicle:
+    """The ``vehicle`` with wings of another size than described, of the same mass.
+
+    A longer wing is stretched towards its tip, where it becomes longer by the whole fraction; a broader one is broader
+    by a third more than the fraction at the root, and by a third less at the tip.
+    """
+    longer, broader = strength(hidden, "wing_length_error"), strength(hidden, "wing_chord_error")
+    if not longer and not broader:
+        return vehicle
+    places = [(s, s.r / vehicle.span) for s in vehicle.stations]
+    wing = [
+        replace(s, r=s.r * (1.0 + longer * part), chord=s.chord * (1.0 + broader * (4.0 - 2.0 * part) / 3.0))
+        for s, part in places
+    ]
+    return replace(vehicle, stations=tuple(wing))
 
 
 def moved_air(flow: Flow, vehicle: Vehicle, mass: Array, hidden: Concealed) -> Array:
@@ -96,6 +114,18 @@ INERTIA = (
         source="Armanini et al. (2016), Eqs. 12-14: wings that were weighed wrongly, thicker at the root",
         both_signs=True,
         values=lambda p: {"wing_mass_error.part": p["strength"]},
+    ),
+    _listed(
+        "wing_length_error",
+        typical=0.05,
+        source="Armanini et al. (2016), Eqs. 1 and 18: the outer part of a wing that is longer than it was measured",
+        both_signs=True,
+    ),
+    _listed(
+        "wing_chord_error",
+        typical=0.1,
+        source="Armanini et al. (2016), Eqs. 2, 3, 10 and 11: an outline that is wrong, most at the root",
+        both_signs=True,
     ),
     _listed(
         "effective_chord",

@@ -26,7 +26,7 @@ from benchmarks.concealed.plant.vehicle.laws_circulation import (
     varied,
     wake_tip,
 )
-from benchmarks.concealed.plant.vehicle.laws_inertia import moved_air, wing_inertia, wing_mass
+from benchmarks.concealed.plant.vehicle.laws_inertia import moved_air, resized, wing_inertia, wing_mass
 from benchmarks.concealed.plant.vehicle.laws_motion import flapped, pitched, yielded
 from benchmarks.concealed.plant.vehicle.laws_stream import deflected, disc_inflow, flown
 from wingfit.records import Condition, FourierFlap, FourierPitch, SplitCycleFlap, Vehicle
@@ -81,7 +81,7 @@ def simulate(
     check_known(hidden, LAWS)
     if vehicle.velocities != "mirrored":
         raise ValueError(f"vehicle {vehicle.name!r} has printed velocities; this plant supports mirrored ones only")
-    air = flown(condition, hidden)
+    air, vehicle = flown(condition, hidden), resized(vehicle, hidden)
     if strength(hidden, "varying_coefficients"):
         coefficients = varied(coefficients, condition, hidden["varying_coefficients"])
     inflow = twist = None

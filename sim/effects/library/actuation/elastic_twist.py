@@ -15,9 +15,9 @@ LARGEST = 1.0  # rad
 
 def _vehicle(scene: VehicleScene, values: Values) -> None:
     def law(wings: StationedWings, flow: Flow) -> Array:
-        chord, weight = wings.places.chord, wings.places.weight
-        moment = -np.sum(wings.normal_force(flow).mean(axis=0) * (chord * weight), axis=2)
-        unit = PRESSURE * float(np.sum(chord**2 * weight))
+        chord, weight = wings.chord, wings.places.weight
+        moment = -np.sum(wings.normal_force(flow).mean(axis=0) * (chord * weight)[:, None], axis=2)
+        unit = PRESSURE * np.sum(chord**2 * weight, axis=1)[:, None]
         return np.asarray(np.clip(values["compliance"][:, None] * moment / unit, -LARGEST, LARGEST))
 
     scene.twist(law, HARMONICS)

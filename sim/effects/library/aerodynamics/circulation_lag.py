@@ -34,7 +34,7 @@ def _lag(scene: VehicleScene, values: Values) -> None:
     rate are the effect's parameters.
     """
     flow = scene.flow
-    per_metre = values["rate"][:, None] * (2.0 / scene.stations.chord)
+    per_metre = values["rate"][:, None] * (2.0 / scene.chords)
     share, quasi_steady = values["share"][:, None, None], flow.circulation
     delayed = quasi_steady * (1.0 - share * sum(DEFICIT))
     for a, b in zip(DEFICIT, RATE, strict=True):

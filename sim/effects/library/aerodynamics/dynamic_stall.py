@@ -33,7 +33,7 @@ def _stall(scene: VehicleScene, values: Values) -> None:
 
 def attached_fraction(scene: VehicleScene, values: Values) -> Array:
     """Return X [sides, B, n, 8] of :func:`_stall`."""
-    flow, chord = scene.flow, scene.stations.chord
+    flow, chord = scene.flow, scene.chords
     stall = np.stack([values["angle"], values["width"], values["advance"]], axis=1)
     steady = np.empty_like(flow.speed)
     steady_attachment(flow.along, flow.normal, flow.speed, chord, stall, scene.step, steady)

@@ -14,7 +14,7 @@ def _shed(scene: VehicleScene, values: Values) -> None:
     y' = Delta' - V / (chords c) y, where Delta is the circulation that separation has taken; y is thus Delta less its
     value delayed by ``chords``.
     """
-    flow, chord = scene.flow, scene.stations.chord
+    flow, chord = scene.flow, scene.chords
     before = flow.circulation.copy()
     separate(attached_fraction(scene, values), values["share"], scene.wings.rotation, flow.circulation)
     lost = before - flow.circulation

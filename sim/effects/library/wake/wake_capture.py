@@ -30,9 +30,9 @@ def _meet_wake(scene: VehicleScene, values: Values) -> None:
     motion, moves at share (w - u) while the wing slows down, and at share w after the reversal. The memory decays with
     the chords travelled, so that it lasts through the reversal, where the wing hardly moves.
     """
-    flow, places = scene.flow, scene.stations
-    own = np.broadcast_to(scene.angles.flap[:, 1, :, None] * places.r, flow.speed.shape).copy()
-    air = scene.follow(1.0 / (values["chords"][:, None] * places.chord), own)
+    flow, r = scene.flow, scene.length[:, None, None] * scene.stations.r
+    own = np.broadcast_to(scene.angles.flap[:, 1, :, None] * r, flow.speed.shape).copy()
+    air = scene.follow(1.0 / (values["chords"][:, None] * scene.chords), own)
     overtake(own, values["share"], air)
     scene.wings.gust(flow, air)
 
