@@ -218,6 +218,11 @@ class VehicleScene:
         return stations(self.setting.vehicle, self.setting.motion)
 
     @property
+    def span(self) -> Array:
+        """Length [B] of a wing, m."""
+        return np.asarray(self.length * self.setting.vehicle.span)
+
+    @property
     def chords(self) -> Array:
         """Chords [B, 8] at the stations, m."""
         return np.asarray(self.chord[:, None] * self.stations.chord)

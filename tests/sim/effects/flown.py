@@ -23,7 +23,7 @@ FAST = recording(12.5, 2.0, math.radians(30.0))
 FOURIER = replace(
     DELFLY.motion, pitch=FourierPitch(1.5, (0.1, 0.05), (-0.7, 0.02)), flap=FourierFlap(0.3, (-0.34,), (0.05,))
 )
-# Effects of the flow at the stations, whose memory is measured in chords, and of the wing's inertia.
+# Effects of the flow at the stations, whose memory is measured in chords, of the wake, and of the wing's inertia.
 BESIDE: tuple[Values, ...] = (
     {},
     {"circulation_lag__share": 0.5},
@@ -31,6 +31,10 @@ BESIDE: tuple[Values, ...] = (
     {"elastic_twist__compliance": 0.1},
     {"wake_capture__share": 0.3},
     {"leading_edge_suction__change": 0.5},
+    {"tip_loss__spacing": 0.03},
+    {"wake_tip_loss__share": 1.0},
+    {"induced_inflow__share": 1.0, "induced_inflow__outward": 0.5},
+    {"downwash__share": 1.0},
     {"mass_offset__distance": 0.005, "wing_acceleration__share": 1.0},
 )
 

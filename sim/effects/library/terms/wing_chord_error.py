@@ -13,7 +13,7 @@ def _vehicle(scene: VehicleScene, values: Values) -> None:
 EFFECT = effect_of_air(
     name="wing_chord_error",
     title="Error of the wings' chord",
-    size=(Parameter("part", "1", -0.6, 1.0, 0.1, "relative error of the chord; positive if the wings are broader"),),
+    size=(Parameter("part", "1", -0.6, 1.5, 0.1, "relative error of the chord; positive if the wings are broader"),),
     law="c' = (1 + part) c",
     source="Armanini et al. (2016), Eqs. 2, 3, 10 and 11",
     signature="forces by pitching and by acceleration grow with the square of the chord, all others in proportion",

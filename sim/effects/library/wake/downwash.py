@@ -15,7 +15,7 @@ def _deflect(scene: VehicleScene, values: Values) -> None:
     b is the span of the wings that carry one vortex system: both of a pair, or a single wing.
     """
     flow, wings = scene.flow, scene.wings
-    span = scene.setting.vehicle.span * mirrored(scene.setting.vehicle)
+    span = scene.span * mirrored(scene.setting.vehicle)
     per = (values["share"] / (2.0 * span))[:, None, None]
     x, z = flow.along / flow.speed, flow.normal / flow.speed
     _, start = wings.circulation(flow.along, flow.normal)

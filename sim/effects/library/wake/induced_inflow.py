@@ -24,7 +24,7 @@ def apparent_mass(density: Array, area: Array) -> Array:
     return np.asarray(8.0 / 3.0 * density * (area / np.pi) ** 1.5)
 
 
-def swept_area(span: float, stroke: Array, wings: int) -> Array:
+def swept_area(span: float | Array, stroke: Array, wings: int) -> Array:
     """Return the area (m^2) that ``wings`` of ``span`` (m) sweep by a ``stroke`` (rad) in all (Ellington 1984, III)."""
     return np.asarray(span**2 * np.minimum(0.5 * wings * stroke, np.pi))
 
@@ -39,8 +39,8 @@ def _induce(scene: VehicleScene, values: Values) -> None:
     of added mass.
     """
     vehicle, wings = scene.setting.vehicle, scene.wings.every(2)
-    flap, share = scene.angles.flap[:, 0], values["share"][:, None]
-    area = swept_area(vehicle.span, flap.max(axis=1) - flap.min(axis=1), vehicle.wings)
+    flap, share = scene.angles.flap[:, 0], (values["share"] * scene.length)[:, None]
+    area = swept_area(scene.span, flap.max(axis=1) - flap.min(axis=1), vehicle.wings)
     flux, mass = 2.0 * scene.density * area, apparent_mass(scene.density, area) * values["inertia"]
     stream = scene.airspeed[:, None] * np.stack([np.cos(scene.incidence), np.sin(scene.incidence)], axis=1)
     met = scene.forward(scene.inflow)[:, ::2]

@@ -51,7 +51,7 @@ def _wing(scene: WingScene, values: Values) -> None:
 
 def _vehicle(scene: VehicleScene, values: Values) -> None:
     span = scene.setting.vehicle.span
-    scene.load(lambda r: prandtl(span - r, values["spacing"][:, None]))
+    scene.load(lambda r: prandtl(scene.length[:, None] * (span - r), values["spacing"][:, None]))
 
 
 EFFECT = effect_of_air(

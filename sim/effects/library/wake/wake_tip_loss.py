@@ -29,11 +29,11 @@ def _vehicle(scene: VehicleScene, values: Values) -> None:
     """Take the weight as thrust; a wake that does not move away would be at the wing, so that no lift is left."""
     vehicle, air = scene.setting.vehicle, scene.setting.condition
     flap = scene.angles.flap[:, 0]
-    area = swept_area(vehicle.span, flap.max(axis=1) - flap.min(axis=1), vehicle.wings)
+    area = swept_area(scene.span, flap.max(axis=1) - flap.min(axis=1), vehicle.wings)
     ratio = vehicle.mass * STANDARD_GRAVITY / (2.0 * np.maximum(scene.density, 1e-9) * area)
     axial, across = scene.airspeed * np.cos(scene.incidence), scene.airspeed * np.sin(scene.incidence)
     spacing = values["share"] * np.maximum(wake_speed(axial, across, ratio), 0.0) / (2.0 * air.flap_frequency)
-    scene.load(lambda r: prandtl(vehicle.span - r, np.maximum(spacing, 1e-9)[:, None]))
+    scene.load(lambda r: prandtl(scene.length[:, None] * (vehicle.span - r), np.maximum(spacing, 1e-9)[:, None]))
 
 
 EFFECT = effect_of_air(
