@@ -7,8 +7,6 @@ them is a false alarm.
 
 from __future__ import annotations
 
-import argparse
-import json
 import math
 import re
 import time
@@ -19,6 +17,7 @@ from typing import Any
 import numpy as np
 
 import wingfit
+from benchmarks.mistakes.command import command
 from benchmarks.mistakes.good import Good, vehicles
 from wingfit.records import Condition, Dataset, Recording
 
@@ -50,14 +49,7 @@ MISTAKES: Mapping[str, Change] = {
 
 def main() -> None:
     """Run the benchmark as the command line requests."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.mistakes.odd", description=__doc__)
-    parser.add_argument("--json", action="store_true", help="print one JSON object as the last line")
-    parser.add_argument("--seed", type=int, default=SEED, help="of the datasets")
-    parser.add_argument("--datasets", type=int, default=DATASETS, help="number of datasets")
-    arguments = parser.parse_args()
-    answer = run(print, arguments.seed, arguments.datasets)
-    if arguments.json:
-        print(json.dumps(answer))
+    command("odd", __doc__, run, SEED, DATASETS)
 
 
 def run(say: Callable[[str], None], seed: int = SEED, datasets: int = DATASETS) -> dict[str, Any]:

@@ -40,6 +40,7 @@ class StationedWings:
     Attributes:
         places: the stations as described.
         chord: [B, 8], m.
+        length: [B], factor on the length of the wings, which the rows of ``sides`` have already.
         sides: for each side that is computed (lower, upper), the motion [B, 14, n] of its wings (rows as in
             :mod:`wingfit.sim.vehicle.elements`) and the stream relative to them.
         turning: [B, n], rad/s: C_R theta_w' of Eq. 2 at the pitch station, for a wing without another one near it.
@@ -53,6 +54,7 @@ class StationedWings:
 
     places: Stations
     chord: Array
+    length: Array
     sides: tuple[tuple[Array, Side], ...]
     turning: Array
     fling: Array
@@ -113,7 +115,7 @@ class StationedWings:
         for k, (rows, side) in enumerate(self.sides):
             moving = (flow.along[k], flow.normal[k], flow.speed[k], circulation[k])
             stations.station_forces(rows, side, *self.turns, *moving, weight, self.chord, self.density, self.drag, out)
-        out *= self.alike
+        out *= (self.alike * self.length)[:, None, None]
         return out
 
     def normal_force(self, flow: Flow) -> Array:

@@ -245,7 +245,17 @@ class VehicleScene:
         loading = self.loading[:, -STATIONS:].copy()
         turning, fling = self._turning()
         return StationedWings(
-            self.stations, self.chords, sides, turning, fling, loading, self.density.copy(), lift, drag, mirrored(own)
+            self.stations,
+            self.chords,
+            self.length,
+            sides,
+            turning,
+            fling,
+            loading,
+            self.density.copy(),
+            lift,
+            drag,
+            mirrored(own),
         )
 
     @cached_property
@@ -337,8 +347,7 @@ class VehicleScene:
         """Return the forces [B, 2, n] (N, body x and z) that effects add: directly, and by changing the flow."""
         if self._base is None:
             return self.added
-        changed = self.wings.forces(self.flow) - self._base
-        return np.asarray(self.added + self.length[:, None, None] * changed)
+        return np.asarray(self.added + (self.wings.forces(self.flow) - self._base))
 
     def forward(self, inflow: Array) -> Array:
         """Return the speed of the stream [B, n] (m/s) along body x, including an ``inflow`` [B, n] (m/s)."""

@@ -51,6 +51,15 @@ def flown(
     return np.asarray(model.beat([genome(model, **(own | named))], rec)[0])
 
 
+def check_outline(effect: str, side: str, part: float, beside: Values) -> None:
+    """Forces with an ``effect`` of size ``part`` are those of a vehicle whose stations have another ``side``."""
+    stations = (replace(one, **{side: (1.0 + part) * getattr(one, side)}) for one in DELFLY.stations)
+    other, size = replace(DELFLY, stations=tuple(stations)), Values({f"{effect}__part": part})
+    found = flown(DELFLY, FAST, **(size | beside))
+    np.testing.assert_allclose(found, flown(other, FAST, **beside), atol=1e-14)
+    assert np.sqrt(np.mean((found - flown(DELFLY, FAST, **beside)) ** 2)) > 1e-3
+
+
 def without(*names: str) -> tuple[str, ...]:
     """Terms of the nominal model but ``names``."""
     return chosen("proposed", names)

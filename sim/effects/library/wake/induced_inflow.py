@@ -39,7 +39,7 @@ def _induce(scene: VehicleScene, values: Values) -> None:
     of added mass.
     """
     vehicle, wings = scene.setting.vehicle, scene.wings.every(2)
-    flap, share = scene.angles.flap[:, 0], (values["share"] * scene.length)[:, None]
+    flap, share = scene.angles.flap[:, 0], values["share"][:, None]
     area = swept_area(scene.span, flap.max(axis=1) - flap.min(axis=1), vehicle.wings)
     flux, mass = 2.0 * scene.density * area, apparent_mass(scene.density, area) * values["inertia"]
     stream = scene.airspeed[:, None] * np.stack([np.cos(scene.incidence), np.sin(scene.incidence)], axis=1)
