@@ -61,6 +61,8 @@ def _module(module: str, words: list[str]) -> str:
     path = Path(spec.origin)
     sources = path.parent.glob("*.py") if path.name == "__init__.py" else [path]
     text = "\n".join(source.read_text(encoding="utf-8") for source in sources)
+    for shared in re.findall(r"^from (benchmarks\.\w+\.command) import", text, re.MULTILINE):
+        text += Path(ROOT, *shared.split(".")).with_suffix(".py").read_text(encoding="utf-8")
     if module.startswith("benchmarks."):
         text += '"--json"'
     missing = [word for word in words if word.startswith("--") and f'"{word}"' not in text]

@@ -19,7 +19,7 @@ from wingfit.service.app import create_app
 from wingfit.service.auth import keys
 from wingfit.service.settings import Settings
 
-MOST_SECONDS = 5.0
+MOST_SECONDS = 60.0  # on a busy machine
 
 
 class Watcher:
@@ -72,7 +72,10 @@ def key_of(api: Api) -> str:
 
 
 @pytest.mark.parametrize("kind", ["runs", "diagnoses"])
-def test_streams_of_a_revoked_key_end_and_others_miss_nothing(as_: As, gate: Gate, kind: str) -> None:
+def test_streams_of_a_revoked_key_end_and_others_miss_nothing(
+    as_: As, gate: Gate, kind: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("wingfit.service.http.events.HEARTBEAT_SECONDS", 1000.0)  # not at the next heartbeat: at once
     ann, reads, admin = as_("ann"), as_("ann-reads"), as_("admin")
     dataset = ann.upload()["id"]
     job = (ann.submit(dataset) if kind == "runs" else ann.diagnose(dataset))["id"]
@@ -82,14 +85,12 @@ def test_streams_of_a_revoked_key_end_and_others_miss_nothing(as_: As, gate: Gat
     gate.let(2)
     for one in (*revoked, *others):
         one.until(3)
-    began = time.monotonic()
     assert admin.client.delete(f"/v1/keys/{key_of(reads)}").status_code == 200
     assert all(one.ended(MOST_SECONDS) for one in revoked)
-    assert time.monotonic() - began < MOST_SECONDS
     seen = [len(one.events) for one in revoked]
     assert not any(one.ended(0.3) for one in others)
     gate.let(100)
-    assert all(one.ended(10.0) for one in others)
+    assert all(one.ended(MOST_SECONDS) for one in others)
     for one in others:
         steps = [data["sequence"] for _, name, data in one.events if name != "state"]
         assert steps == list(range(1, len(steps) + 1))
@@ -131,5 +132,5 @@ def test_a_new_key_ends_no_stream(as_: As, gate: Gate) -> None:
     assert admin.client.post("/v1/keys", json={"name": "new"}).status_code == 201
     assert not watching.ended(0.3)
     gate.let(100)
-    assert watching.ended(10.0)
+    assert watching.ended(MOST_SECONDS)
     assert watching.events[-1][2]["state"] == "SUCCEEDED"
