@@ -5,7 +5,7 @@ The filter is a Butterworth filter that runs forwards and backwards in time, so 
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
@@ -58,36 +58,57 @@ def low_passed(recording: Recording, low_pass: LowPass) -> Recording:
             f"recording {recording.name!r} has {gaps} missing values, but a filter needs all; "
             "fill the gaps, cut the recording, or calibrate without one (low-pass 0: --low-pass-hz 0)"
         )
-    sections = _sections(low_pass, sampling_rate(recording), f"recording {recording.name!r}")
-    # The padding must be longer than the impulse response of the filter.
-    pad = min(len(recording.times) - 1, int(3 * low_pass.order * sampling_rate(recording) / low_pass.cutoff))
-    frequency, rate = recording.condition.flap_frequency, sampling_rate(recording)
-    beat, filtered = _mean_beat(recording, low_pass, rate)
-    rest = scipy.signal.sosfiltfilt(sections, recording.values - beat, axis=0, padlen=pad)
-    values = np.ascontiguousarray(filtered + rest)
-    if len(values) * frequency >= MIN_BEATS_TO_TRIM * rate:
-        lost = round(min(END_PERIODS / low_pass.cutoff, 1.0 / frequency) * rate)
-        values[:lost] = values[len(values) - lost :] = np.nan
-    noise = recording.standard_deviation
+    values = Filter.of(recording, low_pass)(recording.values)
+    rate, noise = sampling_rate(recording), recording.standard_deviation
     if noise is not None:
         noise = noise * np.sqrt(np.mean(gain(low_pass, rate, np.linspace(0.0, 0.5, 4096, endpoint=False) * rate) ** 2))
     return replace(recording, values=values, low_pass=low_pass, standard_deviation=noise)
 
 
-def _mean_beat(recording: Recording, low_pass: LowPass, rate: float) -> tuple[Array, Array]:
-    """Return the mean beat [T, C] of ``recording``, and the same after the filter, which is exact up to both ends.
+@dataclass(frozen=True, eq=False)
+class Filter:
+    """A low-pass for whatever is sampled at the T instants of one recording.
 
-    The filter then has no transient but that of the rest, which is small.
+    The mean beat is filtered exactly, up to both ends; only the rest, which is small, has a transient there.
+
+    Attributes:
+        sections: of the Butterworth filter, in second order.
+        pad: samples by which the rest is continued at either end.
+        lost: samples at either end that become NaN.
+        waves: mean, cosines and sines of the harmonics of the mean beat [T, R].
+        kept: gain at each of these [R].
     """
-    frequency = recording.condition.flap_frequency
-    most = min(BEAT_BANDWIDTH * low_pass.cutoff, MOST_OF_RATE * rate) / frequency
-    k = np.arange(max(int(most), 1) + 1)
-    phase = 2.0 * np.pi * frequency * (recording.times - recording.times[0])
-    waves = np.exp(1j * phase[:, None] * k)
-    columns = np.hstack([waves.real, waves[:, 1:].imag])
-    fitted = np.linalg.lstsq(columns, recording.values, rcond=None)[0]
-    kept = gain(low_pass, rate, k * frequency)
-    return columns @ fitted, columns @ (np.concatenate([kept, kept[1:]])[:, None] * fitted)
+
+    sections: Array
+    pad: int
+    lost: int
+    waves: Array
+    kept: Array
+
+    @classmethod
+    def of(cls, recording: Recording, low_pass: LowPass) -> Filter:
+        """Prepare ``low_pass`` for ``recording``; ValueError as in :func:`low_passed`, but for missing values."""
+        rate, frequency, count = sampling_rate(recording), recording.condition.flap_frequency, len(recording.times)
+        sections = _sections(low_pass, rate, f"recording {recording.name!r}")
+        # The padding must be longer than the impulse response of the filter.
+        pad = min(count - 1, int(3 * low_pass.order * rate / low_pass.cutoff))
+        trimmed = count * frequency >= MIN_BEATS_TO_TRIM * rate
+        lost = round(min(END_PERIODS / low_pass.cutoff, 1.0 / frequency) * rate) if trimmed else 0
+        most = min(BEAT_BANDWIDTH * low_pass.cutoff, MOST_OF_RATE * rate) / frequency
+        k = np.arange(max(int(most), 1) + 1)
+        phase = 2.0 * np.pi * frequency * (recording.times - recording.times[0])
+        waves = np.exp(1j * phase[:, None] * k)
+        kept = gain(low_pass, rate, k * frequency)
+        columns = np.hstack([waves.real, waves[:, 1:].imag])
+        return cls(sections, pad, lost, columns, np.concatenate([kept, kept[1:]]))
+
+    def __call__(self, values: Array) -> Array:
+        """Return ``values`` [T, C] filtered."""
+        mean = np.linalg.lstsq(self.waves, values, rcond=None)[0]
+        rest = scipy.signal.sosfiltfilt(self.sections, values - self.waves @ mean, axis=0, padlen=self.pad)
+        passed = np.ascontiguousarray(self.waves @ (self.kept[:, None] * mean) + rest)
+        passed[: self.lost] = passed[len(passed) - self.lost :] = np.nan
+        return passed
 
 
 def gain(low_pass: LowPass, rate: float, frequency: ArrayLike) -> Array:

@@ -14,7 +14,7 @@ import numpy as np
 from wingfit.records.array_types import Array
 from wingfit.sim.kernels import LANES
 from wingfit.sim.kernels.jit import allocating, inlined, kernel
-from wingfit.sim.kernels.lanes.vector import Vector, load, load3, root, store3
+from wingfit.sim.kernels.lanes.vector import Vector, load, load1, load3, root, store1, store3
 
 ROWS = ("inertial", "translation", "rotation", "added_mass", "viscous_0", "viscous_90", "wing_acceleration")
 CURVE_ROWS = ("lift_curve", "drag_curve")
@@ -36,6 +36,7 @@ CURVE_ROWS = ("lift_curve", "drag_curve")
 ) = range(14)
 STILL = 1e-30  # m^2/s^2, avoids division by zero without flow
 CHUNK = 80
+TOGETHER = 4  # vectors of instants that synthesise keeps in registers
 DEGREE = math.pi / 180
 
 
@@ -218,19 +219,27 @@ def wing_forces(
 
 @allocating
 def synthesise(basis: Array, series: Array, out: Array) -> None:
-    """Set ``out`` [B, T, A] to the sum over k of ``series`` [B, A, K] times ``basis`` [K, T], in the order of k."""
-    K, T = basis.shape
-    total = np.empty(CHUNK)
-    for start in range(0, T, CHUNK):
-        size = min(CHUNK, T - start)
+    """Set ``out`` [B, T, A] to the sum over k of ``series`` [B, A, K] times ``basis``, in the order of k.
+
+    ``basis`` [K, G, W]: K functions at G W instants, of which the first T count; G is a multiple of TOGETHER.
+    """
+    nothing, total = np.zeros((1, LANES)), np.empty((TOGETHER, LANES))
+    for g in range(0, basis.shape[1], TOGETHER):
+        start = g * LANES
         for b in range(series.shape[0]):
             for a in range(series.shape[1]):
-                total[:] = 0.0
-                for k in range(K):
-                    for t in range(size):
-                        total[t] += series[b, a, k] * basis[k, start + t]
-                for t in range(size):
-                    out[b, start + t, a] = total[t]
+                x0 = load1(nothing, 0)
+                x1, x2, x3 = x0, x0, x0
+                for k in range(len(basis)):
+                    weight = series[b, a, k]
+                    x0 += load(basis, k, g) * weight
+                    x1 += load(basis, k, g + 1) * weight
+                    x2 += load(basis, k, g + 2) * weight
+                    x3 += load(basis, k, g + 3) * weight
+                for row, x in ((0, x0), (1, x1), (2, x2), (3, x3)):
+                    store1(total, row, x)
+                for t in range(min(TOGETHER * LANES, out.shape[1] - start)):
+                    out[b, start + t, a] = total[t // LANES, t % LANES]
 
 
 @allocating

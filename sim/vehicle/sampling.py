@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 
 from wingfit.records import LowPass, Recording
 from wingfit.records.array_types import Array, Index
-from wingfit.sim.filtering import gain, low_passed, sampling_rate
+from wingfit.sim.filtering import Filter, gain, sampling_rate
+from wingfit.sim.kernels import LANES
+from wingfit.sim.vehicle.elements import TOGETHER
 
 _NEGLIGIBLE = 1e-9  # gain below which a harmonic is omitted
 _LARGE = 2**18  # numbers; of larger bases only the last one is cached
+_LONG = 2**13  # instants; of the filters of longer recordings only the last one is cached
 
 
 def series_of(forces: Array, harmonics: int, recording: Recording) -> Array:
@@ -33,9 +35,10 @@ def phases(recording: Recording, times: Array) -> Array:
 
 
 def basis_of(recording: Recording, harmonics: int) -> tuple[Array, Index]:
-    """Cosines, then sines, of the harmonics that the recording's low-pass passes, at its T instants: [R, T].
+    """Cosines, then sines, of the harmonics that the recording's low-pass passes, at its T instants: [R, G, W].
 
-    The second array [R] holds the index of the coefficient of each of these R rows in the result of :func:`series_of`.
+    They are followed by zeros, as :func:`synthesise` needs it. The second array [R] holds the index of the coefficient
+    of each of these R rows in the result of :func:`series_of`.
     """
     k = np.arange(harmonics + 1)
     if recording.low_pass:
@@ -47,7 +50,8 @@ def basis_of(recording: Recording, harmonics: int) -> tuple[Array, Index]:
 
 def _basis(recording: Recording, count: int) -> Array:
     angles = np.arange(count)[:, None] * phases(recording, recording.times)
-    return np.concatenate([np.cos(angles), np.sin(angles[1:])])
+    basis, size = np.concatenate([np.cos(angles), np.sin(angles[1:])]), TOGETHER * LANES
+    return np.pad(basis, ((0, 0), (0, -basis.shape[1] % size))).reshape(len(basis), -1, LANES)
 
 
 # A search compares with one recording after the other, and again: without these, half of its time goes into cosines
@@ -68,7 +72,12 @@ def passed(added: Array, recording: Recording) -> Array:
 
     They stay unfiltered near the ends of a recording, where the low-pass gives no values.
     """
-    if recording.low_pass is None or not added.any():
+    if recording.low_pass is None or not added.any() or not np.isfinite(added).all():
         return added
-    values = low_passed(replace(recording, values=added, low_pass=None), recording.low_pass).values
+    prepared = _last_filter if len(recording.times) > _LONG else _recent_filter
+    values = prepared(recording, recording.low_pass)(added)
     return np.where(np.isfinite(values), values, added)
+
+
+_recent_filter = lru_cache(maxsize=16)(Filter.of)
+_last_filter = lru_cache(maxsize=1)(Filter.of)
