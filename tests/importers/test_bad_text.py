@@ -150,12 +150,12 @@ def test_a_file_that_is_too_large_is_refused_before_it_is_read(tmp_path: Path) -
 
 
 def test_what_a_hostile_text_can_cost_is_limited() -> None:
-    started = time.monotonic()
+    started = time.process_time()
     assert "at most 20000 cells" in refused("a," * 400_000)
     assert "characters" in refused(table() + " " * 2_000_000 + ",1\n")
     assert "no columns of markers" in refused("_" * 100_000 + "x," + "-" * 100_000 + "\n1,2\n")
     assert "stray quotes" in refused(table() + '"' + "1\n" * 200_000)
-    assert time.monotonic() - started < 5
+    assert time.process_time() - started < 5
 
 
 def test_sizes_are_limited(monkeypatch: pytest.MonkeyPatch) -> None:

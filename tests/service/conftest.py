@@ -41,7 +41,7 @@ class Gate:
         self.open = threading.Semaphore(0)
 
     def __call__(self, done: int) -> None:  # noqa: ARG002
-        assert self.open.acquire(timeout=20)
+        assert self.open.acquire(timeout=60)
 
     def let(self, generations: int) -> None:
         self.open.release(generations)
@@ -112,7 +112,7 @@ class Api:
 
 def metrics(client: httpx.Client, method: str = "GET", **headers: str) -> httpx.Response:
     """The answer of /v1/metrics, which on a busy machine may not be ready in time: then it is requested again."""
-    deadline = time.monotonic() + 30
+    deadline = time.monotonic() + 60
     while (answer := client.request(method, "/v1/metrics", headers=headers)).status_code == 503:
         assert time.monotonic() < deadline, answer.text
         time.sleep(0.2)
@@ -136,14 +136,14 @@ def serving(app: FastAPI) -> Iterator[httpx.Client]:
         time.sleep(0.005)
     port = server.servers[0].sockets[0].getsockname()[1]
     try:
-        with httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=20.0) as client:
+        with httpx.Client(base_url=f"http://127.0.0.1:{port}", timeout=60.0) as client:
             yield client
     finally:
         service = getattr(app.state, "service", None)
         if service is not None:
             service.begin_stop()
         server.should_exit = True
-        thread.join(15.0)
+        thread.join(60.0)
         assert not thread.is_alive(), "the server does not stop"
 
 
@@ -246,7 +246,7 @@ def as_(client: httpx.Client, secrets: dict[str, str]) -> Iterator[As]:
 
     def api(name: str) -> Api:
         headers = {"Authorization": f"Bearer {secrets[name]}"}
-        opened.append(httpx.Client(base_url=client.base_url, headers=headers, timeout=20.0))
+        opened.append(httpx.Client(base_url=client.base_url, headers=headers, timeout=60.0))
         return Api(opened[-1])
 
     yield api

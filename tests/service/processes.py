@@ -88,7 +88,7 @@ class ServerProcess:
         self._forked = module[0].startswith("tests.") if forked is None else forked
         self._env = {**os.environ, "WINGFIT_DATA": str(data), "WINGFIT_PORT": str(self.port), **(env or {})}
         self.process: subprocess.Popen[bytes] | ForkedProcess
-        self.client = httpx.Client(base_url=f"http://127.0.0.1:{self.port}", timeout=30.0)
+        self.client = httpx.Client(base_url=f"http://127.0.0.1:{self.port}", timeout=60.0)
         self.api = Api(self.client)
 
     def __enter__(self) -> Self:

@@ -53,11 +53,11 @@ class Driver:
             if line.startswith(ANSWER):
                 answer: str = json.loads(line.removeprefix(ANSWER))
                 return answer
-        raise AssertionError(f"the driver ended with {self._process.wait(10)}")
+        raise AssertionError(f"the driver ended with {self._process.wait(60)}")
 
     def end(self) -> None:
         self._process.kill()
-        self._process.communicate(timeout=10.0)
+        self._process.communicate(timeout=60.0)
 
 
 def wait_for(what: Callable[[], object], seconds: float, while_running: tuple[Node, ...] = ()) -> bool:

@@ -119,7 +119,7 @@ def test_a_dead_worker_is_not_counted_as_living(tmp_path: Path) -> None:
         pids = [int(note.name) for note in tmp_path.iterdir()]
         assert evaluator.standing == Standing(2)
         os.kill(pids[0], signal.SIGKILL)
-        deadline = time.monotonic() + 5
+        deadline = time.monotonic() + 60
         while evaluator.standing.workers == 2 and time.monotonic() < deadline:
             time.sleep(0.01)
         assert evaluator.standing == Standing(1)
@@ -195,10 +195,10 @@ print(guardian._process.pid)
 )
 def test_the_guardian_kills_its_parent_only_if_it_hangs(what: str, silence: float, limit: float, ends: int) -> None:
     command = [sys.executable, "-c", GUARDED, what, str(silence), str(limit)]
-    done = subprocess.run(command, timeout=20, check=False, env=environment(), capture_output=True, text=True)
+    done = subprocess.run(command, timeout=60, check=False, env=environment(), capture_output=True, text=True)
     assert done.returncode == ends, done.stderr
     if not ends:  # and ends with it
-        deadline = time.monotonic() + 5
+        deadline = time.monotonic() + 60
         while Path(f"/proc/{done.stdout.strip()}").exists() and time.monotonic() < deadline:
             time.sleep(0.05)
         assert not Path(f"/proc/{done.stdout.strip()}").exists()

@@ -238,7 +238,7 @@ def test_many_who_need_one_dataset_have_it_loaded_once(tmp_path: Path) -> None:
         loads.clear()
 
         def check(_: int) -> int:
-            return httpx.post(f"{client.base_url}/v1/runs?validate_only=true", json=body, timeout=20).status_code
+            return httpx.post(f"{client.base_url}/v1/runs?validate_only=true", json=body, timeout=60).status_code
 
         with ThreadPoolExecutor(6) as pool:
             assert list(pool.map(check, range(6))) == [200] * 6

@@ -88,9 +88,9 @@ def test_one_that_makes_the_library_loop_hurts_nobody_else(
             assert api.client.get(f"/v1/datasets/{dataset}").status_code == 200
             assert api.upload()["id"]
             assert _upload(api, netcdf).status_code == 201
-            assert time.monotonic() - before < 15
+            assert time.monotonic() - before < 60
         refused = hostile.result()
-        assert time.monotonic() - began < 20
+        assert time.monotonic() - began < 120
     assert refused.status_code == 422
     assert "processor time" in refused.json()["errors"][0]["message"]
     assert refused.json()["errors"][0]["where"] == "wing.nc"

@@ -45,15 +45,15 @@ def test_reading_goes_on_while_simulations_wait(tmp_path: Path) -> None:
         api.finish(run)
 
         def simulate(_: int) -> int:
-            with httpx.Client(base_url=client.base_url, timeout=30) as one:
+            with httpx.Client(base_url=client.base_url, timeout=90) as one:
                 return one.get(f"/v1/runs/{run}/comparison").status_code
 
         with ThreadPoolExecutor(crowd) as pool:
             asked = [pool.submit(simulate, k) for k in range(crowd)]
             for _ in range(SIMULATIONS):
-                assert engine.entered.acquire(timeout=20)
+                assert engine.entered.acquire(timeout=60)
             for _ in range(20):
-                assert client.get("/v1/runs", timeout=5).status_code == 200
+                assert client.get("/v1/runs", timeout=60).status_code == 200
             assert not engine.entered.acquire(timeout=0.2)  # no more at once
             engine.go.set()
             assert {one.result() for one in asked} == {200}
@@ -77,15 +77,15 @@ def test_few_uploads_are_read_concurrently(tmp_path: Path) -> None:
     with serving(create_app(Settings(data=tmp_path), engine=engine, make_evaluator=toy.NoEvaluator)) as client:
 
         def upload(_: int) -> int:
-            with httpx.Client(base_url=client.base_url, timeout=30) as one:
+            with httpx.Client(base_url=client.base_url, timeout=90) as one:
                 return one.post("/v1/datasets", files={"file": ("a.zip", toy.archive())}).status_code
 
         with ThreadPoolExecutor(crowd) as pool:
             asked = [pool.submit(upload, k) for k in range(crowd)]
             for _ in range(UPLOADS):
-                assert engine.entered.acquire(timeout=20)
+                assert engine.entered.acquire(timeout=60)
             assert not engine.entered.acquire(timeout=0.2)  # no more at once
-            assert client.get("/v1/datasets", timeout=5).status_code == 200
+            assert client.get("/v1/datasets", timeout=60).status_code == 200
             engine.go.set()
             assert {one.result() for one in asked} == {201}
 

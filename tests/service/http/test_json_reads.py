@@ -127,7 +127,7 @@ KEYS = {"admin": ["admin"], "ann": ["read", "write"], "bob": ["read", "write"]}
 
 
 def with_key(client: httpx.Client, secret: str) -> httpx.Client:
-    return httpx.Client(base_url=client.base_url, headers={"Authorization": f"Bearer {secret}"}, timeout=20.0)
+    return httpx.Client(base_url=client.base_url, headers={"Authorization": f"Bearer {secret}"}, timeout=60.0)
 
 
 def test_a_write_is_visible_in_the_next_read(used: Used) -> None:

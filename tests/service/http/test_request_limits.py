@@ -52,7 +52,7 @@ def test_probes_are_answered_by_any_name(client: httpx.Client, host: str) -> Non
 
 def test_a_probe_without_a_host_is_answered(client: httpx.Client) -> None:
     """As some load balancers send it."""
-    with socket.create_connection(("127.0.0.1", client.base_url.port), timeout=10.0) as plain:
+    with socket.create_connection(("127.0.0.1", client.base_url.port), timeout=60.0) as plain:
         plain.sendall(b"GET /v1/health HTTP/1.0\r\n\r\n")
         assert plain.recv(1000).split(b"\r\n")[0] == b"HTTP/1.1 200 OK"
 
@@ -115,12 +115,12 @@ def test_every_answer_carries_the_security_headers(client: httpx.Client, path: s
 
 def test_a_request_whose_head_does_not_end_is_refused_and_the_next_ones_are_not(tmp_path: Path) -> None:
     with ServerProcess(tmp_path / "data", ("tests.service.toy_server", "0")) as server:
-        with socket.create_connection(("127.0.0.1", server.port), timeout=10.0) as endless:
+        with socket.create_connection(("127.0.0.1", server.port), timeout=60.0) as endless:
             endless.sendall(b"GET /v1/health HTTP/1.1\r\nHost: localhost\r\nX-Long: ")
             endless.sendall(b"x" * (HEAD_LIMIT + 1))
             assert endless.recv(1000).startswith(b"HTTP/1.1 400 ")
         assert server.client.request("X" * 100, "/v1/runs").json()["type"] == "urn:wingfit:problem:not-http"
-        with socket.create_connection(("127.0.0.1", server.port), timeout=10.0) as trailing:
+        with socket.create_connection(("127.0.0.1", server.port), timeout=60.0) as trailing:
             trailing.sendall(
                 b"POST /v1/runs HTTP/1.1\r\nHost: localhost\r\nTransfer-Encoding: chunked\r\n\r\n2\r\n{}\r\n0\r\n"
             )
@@ -140,7 +140,7 @@ def test_a_body_is_never_taken_for_a_request(client: httpx.Client, upgrade: str)
     """Also where the client asks for an upgrade, which the server does not support."""
     host = f"Host: 127.0.0.1:{client.base_url.port}\r\n"
     hidden = f"GET /v1/runs HTTP/1.1\r\n{host}\r\n"
-    with socket.create_connection(("127.0.0.1", client.base_url.port), timeout=10.0) as plain:
+    with socket.create_connection(("127.0.0.1", client.base_url.port), timeout=60.0) as plain:
         plain.sendall(
             f"POST /v1/runs HTTP/1.1\r\n{host}{upgrade}Content-Length: {len(hidden)}\r\n\r\n{hidden}".encode()
         )

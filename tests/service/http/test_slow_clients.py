@@ -59,8 +59,9 @@ def eventually(condition: Callable[[], bool], seconds: float) -> None:
 
 def quick(client: httpx.Client, path: str) -> None:
     began = time.monotonic()
-    assert client.get(path, timeout=10).status_code == 200
-    assert time.monotonic() - began < 5.0
+    assert client.get(path, timeout=60).status_code == 200
+    # Until then, clients that do not read are connected.
+    assert time.monotonic() - began < header_limits.SLOW_SECONDS
 
 
 # -- backups ---------------------------------------------------------------------------------------------------
@@ -149,7 +150,7 @@ def test_slow_readers_of_simulations_do_not_keep_others_from_simulating(
         path = f"/v1/runs/{run}/comparison"
         for one in [crowd.enter_context(reader(port_of(api.client), path)) for _ in range(SIMULATIONS)]:
             assert status(one) == 200
-        assert len(api.client.get(path, timeout=10).content) > 4 * MIB
+        assert len(api.client.get(path, timeout=60).content) > 4 * MIB
 
 
 # -- the slowest client that is waited for ------------------------------------------------------------------------

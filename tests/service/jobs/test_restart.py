@@ -81,9 +81,9 @@ def test_sigterm_stops_within_seconds_and_leaves_runs_to_be_resumed(
         time.sleep(0.2)
         began = time.monotonic()
         first.process.send_signal(signal.SIGTERM)
-        assert first.process.wait(15) == 0
-        assert time.monotonic() - began < 6
-        watching.join(5)
+        assert first.process.wait(60) == 0
+        assert time.monotonic() - began < 30
+        watching.join(60)
         assert "event: generation" in lines
         assert "Traceback" not in first.log
     with server(data) as second:

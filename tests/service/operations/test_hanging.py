@@ -83,8 +83,8 @@ def test_a_cancelled_run_ends_though_its_worker_hangs(settings: Settings, hangin
         api, run = _hung(client, hanging)
         began = time.monotonic()
         api.control(run, "cancel")
-        assert api.finish(run, 10.0)["state"] == "CANCELLED"
-        assert time.monotonic() - began < 10
+        assert api.finish(run, 30.0)["state"] == "CANCELLED"
+        assert time.monotonic() - began < 30
         assert not hanging.over.is_set()
         assert hanging.told(), "what no worker has begun is not worth computing"
 
@@ -94,7 +94,7 @@ def test_the_service_stops_at_once_though_a_worker_hangs(settings: Settings, han
     with serving(app) as client:
         _, run = _hung(client, hanging)
         began = time.monotonic()
-    assert time.monotonic() - began < 10
+    assert time.monotonic() - began < 30
     with serving(create_app(settings, engine=toy.ToyEngine(), make_evaluator=toy.NoEvaluator)) as client:
         assert Api(client).finish(run)["state"] == "SUCCEEDED"
 

@@ -67,7 +67,7 @@ def test_hanging_parts_do_not_delay_the_stop(tmp_path: Path) -> None:
         body = {"dataset_id": server.api.run(run)["dataset_id"], "seed": STUCK_SEED}
 
         def submit(_: int) -> None:
-            answer = httpx.post(f"{server.client.base_url}/v1/runs", json=body, timeout=30)
+            answer = httpx.post(f"{server.client.base_url}/v1/runs", json=body, timeout=90)
             assert (answer.status_code, answer.json()["type"]) == (503, "urn:wingfit:problem:stopping")
             assert int(answer.headers["Retry-After"]) > 0
 
@@ -112,8 +112,8 @@ def test_an_ordinary_stop_is_quick_and_the_watchdog_ends_with_the_server(
         server.api.finish(server.api.submit(server.api.upload()["id"])["id"])
         assert watchdog_of(server) == watchdog
         began = time.monotonic()
-        assert stopped(server, 15, number) == (0 if number == signal.SIGTERM else -number)
-        assert time.monotonic() - began < 10
+        assert stopped(server, 60, number) == (0 if number == signal.SIGTERM else -number)
+        assert time.monotonic() - began < 30
         assert "WARNING" not in server.log
         deadline = time.monotonic() + 60
         while Path(f"/proc/{watchdog}").exists():
