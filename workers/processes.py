@@ -28,7 +28,7 @@ from wingfit.calibration.problem import Misfit, Problem
 from wingfit.workers.errors import EvaluationInterruptedError, EvaluatorClosedError, WorkerLostError
 from wingfit.workers.recent import Recent
 from wingfit.workers.running_evaluator import Interrupted, RunningEvaluator
-from wingfit.workers.share import PROBLEMS_KEPT, Task, child_environment, lower_priority
+from wingfit.workers.share import PROBLEMS_KEPT, Task, child_environment, lower_priority, received
 from wingfit.workers.watch import ATTEMPTS, START_SECONDS, STARTS, Expectation, Standing, Tally
 
 COLLECTED_SECONDS = 1.0  # after which an exit code that another thread collects is not waited for
@@ -279,8 +279,7 @@ def _serve(connection: Connection) -> None:
 def _attempt(connection: Connection, problems: Recent[Problem], key: str, task: Task, residuals: bool) -> Answer:
     def fetch() -> Problem:
         connection.send(("need problem", None))
-        problem: Problem = connection.recv()
-        return problem
+        return received(connection.recv())
 
     try:
         problem = problems.use(key, fetch)

@@ -22,7 +22,7 @@ from wingfit.workers.ray_batches import Batch, Batches, Cluster
 from wingfit.workers.ray_connection import Connection, ray
 from wingfit.workers.recent import Recent
 from wingfit.workers.running_evaluator import Interrupted, RunningEvaluator
-from wingfit.workers.share import PROBLEMS_KEPT, Task, lower_priority
+from wingfit.workers.share import PROBLEMS_KEPT, Task, lower_priority, received
 from wingfit.workers.watch import START_SECONDS, Expectation, Standing, Tally
 
 LOG = logging.getLogger("wingfit.workers")
@@ -118,6 +118,11 @@ def _count_workers() -> int:
     return int(ray.cluster_resources().get("CPU", 0))
 
 
+def _fetched(reference: Any) -> Problem:
+    """The problem in the cluster's memory; its bytes come from the process that owns this worker."""
+    return received(pickle.loads(ray.get(reference, timeout=START_SECONDS)))  # noqa: S301
+
+
 _problems = Recent[Problem](PROBLEMS_KEPT)
 _guardian: list[Guardian] = []
 
@@ -135,8 +140,7 @@ def _run_tasks(
         _guardian.append(Guardian())
     # The inner limit gives an error message; the outer one is for a hung worker.
     with _guardian[0].watching(2 * START_SECONDS):
-        # The bytes come from the process that owns this worker.
-        problem = _problems.use(key, lambda: pickle.loads(ray.get(reference[0], timeout=START_SECONDS)))  # noqa: S301
+        problem = _problems.use(key, lambda: _fetched(reference[0]))
     done: list[tuple[Misfit, float]] = []
     for task in tasks:
         began = time.monotonic()

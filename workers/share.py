@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
+import pickle
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from weakref import WeakValueDictionary
 
 import numpy as np
 import numpy.typing as npt
 
 from wingfit.calibration.evaluator import Unit, run_unit
 from wingfit.calibration.problem import Misfit, Problem
+from wingfit.records import AnyRecording
 
 NICENESS = 10
 PROBLEMS_KEPT = 8
 THREAD_SETTINGS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 _environment = threading.Lock()
+_received: WeakValueDictionary[bytes, AnyRecording] = WeakValueDictionary()
 
 
 @contextmanager
@@ -47,6 +52,16 @@ def lower_priority() -> None:
     this = threading.get_native_id()
     with suppress(OSError):  # on systems that know no niceness of threads
         os.setpriority(os.PRIO_PROCESS, this, max(NICENESS, os.getpriority(os.PRIO_PROCESS, this)))
+
+
+def received(problem: Problem) -> Problem:
+    """Return ``problem``, which another process sent, with the recordings of earlier problems where they are equal.
+
+    So what models compute once for a recording, such as its low-pass, is not computed again for each problem.
+    """
+    digests = (hashlib.sha256(pickle.dumps(one, pickle.HIGHEST_PROTOCOL)).digest() for one in problem.recordings)
+    known = (_received.setdefault(digest, one) for digest, one in zip(digests, problem.recordings, strict=True))
+    return replace(problem, recordings=tuple(known))
 
 
 @dataclass(frozen=True)
