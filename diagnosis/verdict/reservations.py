@@ -204,12 +204,14 @@ def doubted_by_held_out(
     """Return ``decision`` with less certainty where held-out recordings contradict it.
 
     A model that they refute (``refuted``) is not adequate. One that does not predict them otherwise is adequate with a
-    limited probability (`Policy.doubted_noise`). Effects with which they are predicted no better are not named, and
-    those with which recordings with a beat are not predicted either have one as well (`Policy.partial_doubt`).
+    limited probability (`Policy.doubted_noise`). Effects with which they are predicted no better are not named. Where
+    recordings with a beat are not predicted with the effects either, those have a limited probability as well
+    (`Policy.partial_doubt`), and several of which each may be the cause are not named: that one of them is right, is
+    then improbable.
     """
     if refuted and decision.verdict == "adequate":
         return replace(_at_most(decision, 0.0), verdict="unnamed", named=(), alternatives=())
-    if _useless(decision, proved):
+    if _useless(decision, proved) or _no_alternative(decision, proved, data):
         return without_names(decision)
     if _unpredicted(decision, proved, data):
         adequate = decision.verdict == "adequate"
@@ -231,6 +233,11 @@ def held_out_sentence(before: Decision, proved: Proof | None, data: WhitenedData
             " It is not named, because with it the held-out recordings are predicted no better: their misfit is "
             f"{proved.before.value:.3g} times the floor before, and {proved.after.value:.3g} after."
         )
+    if _no_alternative(before, proved, data):
+        return (
+            " None is named, because the most probable one does not predict the held-out recordings: their misfit is "
+            f"{proved.before.value:.3g} times the floor before, and {proved.after.value:.3g} after."
+        )
     if not _unpredicted(before, proved, data):
         return ""
     if before.verdict == "adequate":
@@ -250,6 +257,11 @@ def _unpredicted(decision: Decision, proved: Proof | None, data: WhitenedData) -
         return False
     misfit = proved.before if decision.verdict == "adequate" else proved.after
     return (misfit.value if misfit.low is None else misfit.low) > data.policy.unpredicted
+
+
+def _no_alternative(decision: Decision, proved: Proof | None, data: WhitenedData) -> bool:
+    """Return whether effects that recordings cannot distinguish do not predict what is held out."""
+    return decision.verdict == "ambiguous" and _unpredicted(decision, proved, data)
 
 
 def _useless(decision: Decision, proved: Proof | None) -> bool:

@@ -104,6 +104,18 @@ def test_effects_that_do_not_predict_are_named_with_limited_certainty() -> None:
     assert held_out_sentence(before, near, data("forces")) == ""
 
 
+def test_alternatives_that_do_not_predict_are_not_named() -> None:
+    """As a swept wing, which in some ways looks like a delay of the clock or of a filter."""
+    before, far, near = decision("ambiguous"), proof(15.0, 7.5, improved=True), proof(15.0, 1.9, improved=True)
+    after = doubted_by_held_out(before, far, data("forces"))
+    assert (after.verdict, after.named, after.alternatives) == ("unnamed", (), ())
+    assert after.probabilities["unnamed"] == pytest.approx(1.0)
+    assert held_out_sentence(before, far, data("forces")).endswith("15 times the floor before, and 7.5 after.")
+    assert doubted_by_held_out(before, near, data("forces")) == before
+    assert doubted_by_held_out(before, far, data("series")) == before
+    assert held_out_sentence(before, near, data("forces")) == ""
+
+
 def test_a_recording_that_an_adequate_model_misses_is_stated() -> None:
     """Mains hum at a harmonic of one recording's beat is noise in the others."""
     hum = data("forces")
