@@ -165,7 +165,7 @@ EVERY_VEHICLE = (
 )  # fmt: skip
 LATER = (
     "lift_curve", "leading_edge_suction", "axis_scale", "wing_mass_error", "elastic_twist", "wing_length_error",
-    "wing_chord_error",
+    "wing_chord_error", "pitch_axis_error",
 )  # fmt: skip
 """Effects of vehicles that came after trials were run: theirs come last, so that the others of a seed stay the same."""
 LEFT_OUT = {

@@ -20,7 +20,7 @@ FILES = (
     # each acts on the result of those before: stream, coefficients of the angle of attack, circulation, wake
     ("stream", "residual_air airspeed_error body_pitch_convention body_pitch_error body_drag tail_lift"),
     ("aerodynamics", "added_mass"),
-    ("terms", "added_mass_error effective_chord translation viscous"),
+    ("terms", "added_mass_error pitch_axis_error effective_chord translation viscous"),
     (
         "aerodynamics",
         "zero_lift_angle lift_curve leading_edge_vortex viscous_drag plate_drag dynamic_stall stall_vortex "

@@ -38,7 +38,7 @@ NEW = (
     "residual_air", "downwash", "wake_tip_loss", "translation", "rotational_circulation", "viscous", "zero_lift_angle",
     "lift_curve", "leading_edge_suction", "stall_vortex", "varying_coefficients", "inertial", "wing_acceleration",
     "added_mass", "added_mass_error", "wing_mass_error", "wing_length_error", "wing_chord_error", "effective_chord",
-    "mass_offset", "body_drag", "tail_lift",
+    "pitch_axis_error", "mass_offset", "body_drag", "tail_lift",
 )  # fmt: skip
 ALONE = {"rotational_circulation": "rotation"}  # other names of the terms that the library's effects are
 # Genes of the library's effects whose meaning differs from the law's, at the values that come nearest.
@@ -52,6 +52,7 @@ NEAREST: dict[str, Genes] = {
     "added_mass_error": lambda p: {"part": p["strength"]},
     "wing_length_error": lambda p: {"part": p["strength"]},
     "wing_chord_error": lambda p: {"part": p["strength"]},
+    "pitch_axis_error": lambda p: {"chords": p["strength"]},
     "body_drag": lambda p: {"area": p["strength"], "slender": 1.0},
     "tail_lift": lambda p: {"constant": 0.0, "slope": p["strength"]},
     "varying_coefficients": lambda p: {

@@ -31,6 +31,11 @@ def resized(vehicle: Vehicle, hidden: Concealed) -> Vehicle:
     return replace(vehicle, stations=tuple(wing))
 
 
+def further_aft(flow: Flow, vehicle: Vehicle, hidden: Concealed) -> Array:
+    """Distances [E] (m) by which the wing lies further behind its axis of pitch than described, the same everywhere."""
+    return np.full(flow.chord.shape, strength(hidden, "pitch_axis_error") * mean_chord(vehicle))
+
+
 def moved_air(flow: Flow, vehicle: Vehicle, mass: Array, hidden: Concealed) -> Array:
     """Added mass [n, E] (kg/m) across the chord with its hidden changes, for that of the nominal model, ``mass``.
 
@@ -125,6 +130,12 @@ INERTIA = (
         "wing_chord_error",
         typical=0.1,
         source="Armanini et al. (2016), Eqs. 2, 3, 10 and 11: an outline that is wrong, most at the root",
+        both_signs=True,
+    ),
+    _listed(
+        "pitch_axis_error",
+        typical=0.05,
+        source="Sedov (1965): the air meets a plate that turns about an axis further ahead at other velocities",
         both_signs=True,
     ),
     _listed(

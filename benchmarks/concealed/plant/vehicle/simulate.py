@@ -26,7 +26,7 @@ from benchmarks.concealed.plant.vehicle.laws_circulation import (
     varied,
     wake_tip,
 )
-from benchmarks.concealed.plant.vehicle.laws_inertia import moved_air, resized, wing_inertia, wing_mass
+from benchmarks.concealed.plant.vehicle.laws_inertia import further_aft, moved_air, resized, wing_inertia, wing_mass
 from benchmarks.concealed.plant.vehicle.laws_motion import flapped, pitched, yielded
 from benchmarks.concealed.plant.vehicle.laws_stream import deflected, disc_inflow, flown
 from wingfit.records import Condition, FourierFlap, FourierPitch, SplitCycleFlap, Vehicle
@@ -268,7 +268,7 @@ def _element_forces(
     """
     rho, chord = flow.rho, flow.chord
     met = flow.own if inflow is None else flow.own + inflow[:, None] * flow.r / flow.span
-    stream = flow.turned(met)
+    stream = flow.turned(met) - 1j * further_aft(flow, vehicle, hidden) * flow.turn
     for name, gust in GUSTS.items():
         if strength(hidden, name):
             met = met + gust(flow, hidden[name])
@@ -303,7 +303,7 @@ def _circulation(
     """
     half = 0.5 * flow.chord**2 * flow.turn
     turning = (coefficients["C_r"] if "rotation" in terms else 0.0) + strength(hidden, "rotational_circulation")
-    rotation = turning * (0.75 - vehicle.pitch_axis) * half
+    rotation = turning * (0.75 - vehicle.pitch_axis + further_aft(flow, vehicle, hidden) / flow.chord) * half
     gamma = rotation + _translation(flow, coefficients, hidden, terms)
     for name, law in CIRCULATION.items():
         if strength(hidden, name):
@@ -345,7 +345,8 @@ def _inertia(flow: Flow, stream: Complex, vehicle: Vehicle, hidden: Concealed, t
     across = moved_air(flow, vehicle, np.pi / 4 * rho * (chord * peeled) ** 2, hidden)
     inertial, moved = (float(name in terms) + strength(hidden, name) for name in ("inertial", "added_mass"))
     turning = mass * (own.imag - 1j * own.real) + across * stream.imag - 1j * along * stream.real
-    rate = flow.turned(flow.own_rate) - 1j * flow.turn * stream - 0.5j * chord * flow.turn_rate
+    behind = 0.5 * chord + further_aft(flow, vehicle, hidden)
+    rate = flow.turned(flow.own_rate) - 1j * flow.turn * stream - 1j * behind * flow.turn_rate
     force = inertial * flow.turn * turning - moved * (along * rate.real + 1j * across * rate.imag)
     return np.asarray(force + wing_inertia(flow, own, vehicle, hidden))
 
@@ -384,8 +385,7 @@ def _inflow(
 
     The actuator disc is as large as the area that the wings sweep. ValueError if it does not converge.
     """
-    p = hidden["induced_inflow"]
-    swept, v = _swept(vehicle), np.zeros(_COARSE)
+    p, swept, v = hidden["induced_inflow"], _swept(vehicle), np.zeros(_COARSE)
     for _ in range(_ROUNDS):
         thrust = _forces(vehicle, coefficients, air, hidden, terms, _COARSE, v, twist)[1]
         change = 0.5 * (disc_inflow(thrust, swept, air, density(air), p) - v)
