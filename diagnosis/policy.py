@@ -67,7 +67,7 @@ class Policy:
         2.0,
         "floor",
         "lower end of the held-out misfit from which a model does not predict; of effects named with more, one in six "
-        "was wrong, and of alternatives that could not be distinguished, all",
+        "was wrong",
     )
     least_evidence: float = _threshold(2.0, "evidence", "no effect is searched for, or added to the model, for less")
     most_left: float = _threshold(

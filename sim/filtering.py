@@ -94,8 +94,7 @@ class Filter:
         pad = min(count - 1, int(3 * low_pass.order * rate / low_pass.cutoff))
         trimmed = count * frequency >= MIN_BEATS_TO_TRIM * rate
         lost = round(min(END_PERIODS / low_pass.cutoff, 1.0 / frequency) * rate) if trimmed else 0
-        most = min(BEAT_BANDWIDTH * low_pass.cutoff, MOST_OF_RATE * rate) / frequency
-        k = np.arange(max(int(most), 1) + 1)
+        k = np.arange(beat_harmonics(recording, low_pass) + 1)
         phase = 2.0 * np.pi * frequency * (recording.times - recording.times[0])
         waves = np.exp(1j * phase[:, None] * k)
         kept = gain(low_pass, rate, k * frequency)
@@ -109,6 +108,12 @@ class Filter:
         passed = np.ascontiguousarray(self.waves @ (self.kept[:, None] * mean) + rest)
         passed[: self.lost] = passed[len(passed) - self.lost :] = np.nan
         return passed
+
+
+def beat_harmonics(recording: Recording, low_pass: LowPass) -> int:
+    """Number of harmonics of the flap frequency in the mean beat of ``recording`` that ``low_pass`` filters."""
+    most = min(BEAT_BANDWIDTH * low_pass.cutoff, MOST_OF_RATE * sampling_rate(recording))
+    return max(int(most / recording.condition.flap_frequency), 1)
 
 
 def gain(low_pass: LowPass, rate: float, frequency: ArrayLike) -> Array:

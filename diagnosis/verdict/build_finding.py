@@ -48,6 +48,7 @@ from wingfit.diagnosis.verdict.reservations import (
     noise_sentence,
     partly,
     remaining_sentence,
+    unpredicted,
 )
 from wingfit.diagnosis.verdict.series_remarks import series_remarks
 from wingfit.diagnosis.verdict.verdict import Decision, decide, hypotheses, summary
@@ -92,6 +93,7 @@ def build_finding(
         and validation is not None
         and held_out_refutes(state.context, best.fit, validation, state.floor(_discretisation_error(state)))
     )
+    none_predicts = validation is not None and _none_predicts(state, decision, best, held_out, validation)
     located: Located | None = None
     for fraction, stage, found in _locate(state, decision, best, own, validation, refuted=refuted):
         located = found
@@ -104,9 +106,33 @@ def build_finding(
         for part, ranked in advise(state.context, state.final_weights, floor, rest=rest):
             advice = ranked
             yield 0.75 + 0.2 * part, "comparing what to record next", None
-    finding = _finding(state, name, decision, best, own, validation, advice, located, odd, named, refuted=refuted)
+    finding = _finding(
+        state, name, decision, best, own, validation, advice, located, odd, named, refuted=refuted,
+        none_predicts=none_predicts,
+    )  # fmt: skip
     finding = replace(finding, remarks=(*finding.remarks, *failed))
     yield 1.0, "done", doubt.stated(finding, certain, decision)
+
+
+def _none_predicts(
+    state: SearchState, decision: Decision, best: Refit, held_out: Sequence[AnyRecording], validation: ResidualPair
+) -> bool:
+    """Return whether none of the effects that recordings cannot distinguish predicts what is held out.
+
+    ``validation``: the prediction by the nominal model and by ``best``, one of them.
+    """
+    data, nominal, floor = state.data, state.fitted_nominal.refit, state.floor(_discretisation_error(state))
+
+    def missed(predicted: ResidualPair | None) -> bool:
+        proved = predicted and proof(predicted, floor, data.unit, effects_added=True)
+        return not proved or unpredicted(decision, proved, data)
+
+    if decision.verdict != "ambiguous" or not missed(validation):
+        return False
+    possible = {frozenset(one) for one in decision.alternatives} - {frozenset(best.names)}
+    others = (one for one in state.final_weights.refits if frozenset(one.names) in possible)
+    errors = state.position_errors
+    return all(missed(predict_held_out(held_out, state.context, errors, nominal.fit, one.fit)[0]) for one in others)
 
 
 def _locate(
@@ -153,6 +179,7 @@ def _finding(
     named: tuple[str, ...],
     *,
     refuted: bool,
+    none_predicts: bool,
 ) -> Finding:
     subject, data, weights = state.subject, state.data, state.final_weights
     nominal, floor, unit = state.fitted_nominal.refit, state.floor(_discretisation_error(state)), state.data.unit
@@ -161,7 +188,7 @@ def _finding(
     if validation is not None:
         rows += recording_misfits(validation, held_out=True, floor=floor)
         proved = proof(validation, floor, unit, effects_added=bool(best.names))
-        decision = doubted_by_held_out(decision, proved, data, refuted=refuted)
+        decision = doubted_by_held_out(decision, proved, data, refuted=refuted, none_predicts=none_predicts)
     suspects, genes = {suspect.name: suspect for suspect in subject.suspects}, gene_values(data, best)
     weights = replace(weights, refits=tuple(best if one.names == best.names else one for one in weights.refits))
     return Finding(
@@ -179,7 +206,7 @@ def _finding(
         + accepted_error_sentence(decided, judged_by_accepted_error(decided, data, weights, floor))
         + accepted_sentence(data, decision, nominal, floor)
         + noise_sentence(data, decision, nominal)
-        + held_out_sentence(first, proved, data, refuted=refuted)
+        + held_out_sentence(first, proved, data, refuted=refuted, none_predicts=none_predicts)
         + odd_sentences(odd, unit, withheld=bool(named) and not first.named),
         probabilities=decision.probabilities,
         named=decision.named,

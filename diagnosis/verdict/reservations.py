@@ -199,27 +199,36 @@ def accepted_error_sentence(before: Decision, after: Decision) -> str:
 
 
 def doubted_by_held_out(
-    decision: Decision, proved: Proof | None, data: WhitenedData, *, refuted: bool = False
+    decision: Decision, proved: Proof | None, data: WhitenedData, *, refuted: bool = False, none_predicts: bool = False
 ) -> Decision:
     """Return ``decision`` with less certainty where held-out recordings contradict it.
 
     A model that they refute (``refuted``) is not adequate. One that does not predict them otherwise is adequate with a
     limited probability (`Policy.doubted_noise`). Effects with which they are predicted no better are not named. Where
     recordings with a beat are not predicted with the effects either, those have a limited probability as well
-    (`Policy.partial_doubt`), and several of which each may be the cause are not named: that one of them is right, is
-    then improbable.
+    (`Policy.partial_doubt`). Several of which each may be the cause are then not named, provided that none of them
+    predicts (``none_predicts``).
     """
     if refuted and decision.verdict == "adequate":
         return replace(_at_most(decision, 0.0), verdict="unnamed", named=(), alternatives=())
-    if _useless(decision, proved) or _no_alternative(decision, proved, data):
+    if _useless(decision, proved):
         return without_names(decision)
-    if _unpredicted(decision, proved, data):
+    if none_predicts:
+        return without_names(decision, 1.0 - data.policy.partial_doubt)
+    if unpredicted(decision, proved, data):
         adequate = decision.verdict == "adequate"
         return _at_most(decision, data.policy.doubted_noise if adequate else 1.0 - data.policy.partial_doubt)
     return decision
 
 
-def held_out_sentence(before: Decision, proved: Proof | None, data: WhitenedData, *, refuted: bool = False) -> str:
+def held_out_sentence(
+    before: Decision,
+    proved: Proof | None,
+    data: WhitenedData,
+    *,
+    refuted: bool = False,
+    none_predicts: bool = False,
+) -> str:
     """Return a sentence on held-out recordings that contradict ``before``, the decision without them; else empty."""
     if proved is None:
         return ""
@@ -233,12 +242,12 @@ def held_out_sentence(before: Decision, proved: Proof | None, data: WhitenedData
             " It is not named, because with it the held-out recordings are predicted no better: their misfit is "
             f"{proved.before.value:.3g} times the floor before, and {proved.after.value:.3g} after."
         )
-    if _no_alternative(before, proved, data):
+    if none_predicts:
         return (
-            " None is named, because the most probable one does not predict the held-out recordings: their misfit is "
-            f"{proved.before.value:.3g} times the floor before, and {proved.after.value:.3g} after."
+            " Effects that could be the cause are not named, because none of them predicts the held-out recordings: "
+            f"with the most probable one their misfit is {proved.after.value:.3g} times the floor."
         )
-    if not _unpredicted(before, proved, data):
+    if not unpredicted(before, proved, data):
         return ""
     if before.verdict == "adequate":
         return (
@@ -248,7 +257,7 @@ def held_out_sentence(before: Decision, proved: Proof | None, data: WhitenedData
     return " But held-out recordings are still missed: what is named may be wrong, or only a part."
 
 
-def _unpredicted(decision: Decision, proved: Proof | None, data: WhitenedData) -> bool:
+def unpredicted(decision: Decision, proved: Proof | None, data: WhitenedData) -> bool:
     """Return whether an adequate model, or one with effects that may be the cause, does not predict what is held out.
 
     Effects in series are not judged: no trials show how often they are wrong then.
@@ -257,11 +266,6 @@ def _unpredicted(decision: Decision, proved: Proof | None, data: WhitenedData) -
         return False
     misfit = proved.before if decision.verdict == "adequate" else proved.after
     return (misfit.value if misfit.low is None else misfit.low) > data.policy.unpredicted
-
-
-def _no_alternative(decision: Decision, proved: Proof | None, data: WhitenedData) -> bool:
-    """Return whether effects that recordings cannot distinguish do not predict what is held out."""
-    return decision.verdict == "ambiguous" and _unpredicted(decision, proved, data)
 
 
 def _useless(decision: Decision, proved: Proof | None) -> bool:

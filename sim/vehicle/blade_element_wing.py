@@ -184,7 +184,7 @@ class BladeElementWing:
         The force of the vehicle is the sum over the rows of weights times forces, plus the added forces.
         """
         scene = self._changed_scene(effects, batch, recording)
-        return self._weights(scene.genes, len(batch)), self._wings(scene), scene.finish()
+        return self._weights(scene.genes, len(batch), scene.behind), self._wings(scene), scene.finish()
 
     def _changed_scene(self, effects: tuple[Effect, ...], batch: Array, recording: Recording) -> VehicleScene:
         """The scene of the individuals in ``batch`` [B, G] with all changes by ``effects``."""
@@ -213,11 +213,14 @@ class BladeElementWing:
         """Values [B] in ``batch`` [B, G] by name of the gene, for the genes called ``names``, in the model's order."""
         return {gene.name: batch[:, k] for k, gene in enumerate(self.genes) if gene.name in names}
 
-    def _weights(self, coefficients: Mapping[str, Array], count: int) -> Array:
-        """Factors [count, rows] by which the forces of each active term are multiplied; see :meth:`_rows`."""
+    def _weights(self, coefficients: Mapping[str, Array], count: int, behind: ArrayLike = 0.0) -> Array:
+        """Factors [count, rows] by which the forces of each active term are multiplied; see :meth:`_rows`.
+
+        ``behind`` [count]: as of a scene.
+        """
         zero, one = np.zeros(count), np.ones(count)
         scale = {row: coefficients.get(name, zero) if name else one for row, (_, name) in _ROWS.items()}
-        scale["rotation"] = scale["rotation"] * (ROTATION_POINT - self.vehicle.pitch_axis)
+        scale["rotation"] = scale["rotation"] * (ROTATION_POINT - self.vehicle.pitch_axis + np.asarray(behind))
         scale["clap_and_peel"] = -scale["clap_and_peel"]  # theta_fling' = -theta_w'
         return np.stack([scale[row] for row in self._active], axis=1)
 
@@ -286,7 +289,7 @@ class BladeElementWing:
             factor = {"rotation": 1.0 - peel, "clap_and_peel": peel}.get(name)
             row = each[:, _INDEX[name]]
             out[:, k] = row if factor is None else row * factor
-        turning = ROTATION_POINT - vehicle.pitch_axis
+        turning = scene.lever[:, None, None]
         for name, gene in scene.included.items():
             row = each[:, ROWS.index(name)] * scene.genes[gene][:, None, None]
             scene.added += row * (turning * (1.0 - peel)) if name == "rotation" else row

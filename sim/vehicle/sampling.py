@@ -8,13 +8,12 @@ import numpy as np
 
 from wingfit.records import LowPass, Recording
 from wingfit.records.array_types import Array, Index
-from wingfit.sim.filtering import Filter, gain, sampling_rate
+from wingfit.sim.filtering import Filter, beat_harmonics, gain, sampling_rate
 from wingfit.sim.kernels import LANES
 from wingfit.sim.vehicle.elements import TOGETHER
 
 _NEGLIGIBLE = 1e-9  # gain below which a harmonic is omitted
-_LARGE = 2**18  # numbers; of larger bases only the last one is cached
-_LONG = 2**13  # instants; of the filters of longer recordings only the last one is cached
+_LARGE = 2**18  # numbers; of larger bases and filters only the last one is cached
 
 
 def series_of(forces: Array, harmonics: int, recording: Recording) -> Array:
@@ -37,8 +36,8 @@ def phases(recording: Recording, times: Array) -> Array:
 def basis_of(recording: Recording, harmonics: int) -> tuple[Array, Index]:
     """Cosines, then sines, of the harmonics that the recording's low-pass passes, at its T instants: [R, G, W].
 
-    They are followed by zeros, as :func:`synthesise` needs it. The second array [R] holds the index of the coefficient
-    of each of these R rows in the result of :func:`series_of`.
+    Each row is filled up with zeros to whole groups, as :func:`synthesise` needs it. The second array [R] holds the
+    index of the coefficient of each of these R rows in the result of :func:`series_of`.
     """
     k = np.arange(harmonics + 1)
     if recording.low_pass:
@@ -70,11 +69,13 @@ def _gain_at_harmonics(recording: Recording, low_pass: LowPass, harmonics: int) 
 def passed(added: Array, recording: Recording) -> Array:
     """Errors ``added`` [T, C] (N) of a balance at the recording's T instants, filtered by the recording's low-pass.
 
-    They stay unfiltered near the ends of a recording, where the low-pass gives no values.
+    They stay unfiltered near the ends of a recording, where the low-pass gives no values, and wherever they are not all
+    finite: then the forces are not either.
     """
     if recording.low_pass is None or not added.any() or not np.isfinite(added).all():
         return added
-    prepared = _last_filter if len(recording.times) > _LONG else _recent_filter
+    size = (2 * beat_harmonics(recording, recording.low_pass) + 1) * len(recording.times)
+    prepared = _last_filter if size > _LARGE else _recent_filter
     values = prepared(recording, recording.low_pass)(added)
     return np.where(np.isfinite(values), values, added)
 

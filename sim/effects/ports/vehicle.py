@@ -87,6 +87,7 @@ class VehicleScene:
         density: [B] of the air, kg/m^3.
         mass_factor: [B], factor on the mass of the wings per length.
         length, chord: [B], factors on radius and width of the wings' elements, and on their chord.
+        behind: [B]: distance, in chords, by which the wings lie further behind their axis of pitch than described.
         inflow: [B, n], m/s: added to the stream along body x over the beat.
         loading: [B, E + 8]: factor on the circulation at the E elements, then at the eight stations.
         fling: [B]: coefficient C of an additional circulation 1/2 C c^2 (-theta_w') while the wings peel apart (chord
@@ -109,6 +110,7 @@ class VehicleScene:
     mass_factor: Array
     length: Array
     chord: Array
+    behind: Array
     inflow: Array
     loading: Array
     fling: Array
@@ -135,8 +137,8 @@ class VehicleScene:
         one, none = np.ones(count), np.zeros(count)
         return cls(
             setting=setting, genes=genes, flap=flap, airspeed=airspeed, incidence=incidence, density=rho,
-            mass_factor=one, length=one, chord=one, inflow=inflow, loading=loading, fling=none, added=added,
-            together=together, carried=one, pitch=PitchError(none, none, none),
+            mass_factor=one, length=one, chord=one, behind=none, inflow=inflow, loading=loading, fling=none,
+            added=added, together=together, carried=one, pitch=PitchError(none, none, none),
         )  # fmt: skip
 
     def __len__(self) -> int:
@@ -309,11 +311,16 @@ class VehicleScene:
         (cosine, sine), places, (rows, _) = self.wings.turns, self.stations, self.wings.sides[0]
         factor = self.apart(rows) ** 2 * rows[:, PITCH_RATE] * (0.25 * np.pi * self.carried * self.density)[:, None]
         force = factor[:, :, None] * air * self.chords[:, None] ** 2 * places.twist
-        along, normal = self._share("inertial") * force * cosine, self._share("added_mass") * force * sine
+        along, normal = self.share("inertial") * force * cosine, self.share("added_mass") * force * sine
         x, z = along * sine + normal * cosine, along * cosine - normal * sine
         self.push(self.over_span(x, places.weight), self.over_span(z, places.weight))
 
-    def _share(self, row: str) -> Array:
+    @property
+    def lever(self) -> Array:
+        """Distance [B], in chords, of the point behind the axis of pitch whose velocity circulation by rotation has."""
+        return np.asarray(ROTATION_POINT - self.setting.vehicle.pitch_axis + self.behind)
+
+    def share(self, row: str) -> Array:
         """Return the factor [B, 1, 1] on the forces of the elements called ``row``, which has no coefficient."""
         own, more = float(row in self.setting.terms), self.included.get(row)
         return np.asarray(own + (self.genes[more] if more else np.zeros(len(self))))[:, None, None]
@@ -368,7 +375,7 @@ class VehicleScene:
         """
         on, rate = float("clap_and_peel" in self.setting.terms), self.angles.pitch[:, 1]
         rotation, fling = self._coefficients("C_r", "C_F").T[:, :, None]
-        turn = rotation * (ROTATION_POINT - self.setting.vehicle.pitch_axis)
+        turn = rotation * self.lever[:, None]
         more = (fling + turn) * on + self.fling[:, None]
         return np.asarray(turn * rate), np.asarray(-more * self.angles.peel * rate)
 

@@ -106,14 +106,16 @@ def test_effects_that_do_not_predict_are_named_with_limited_certainty() -> None:
 
 def test_alternatives_that_do_not_predict_are_not_named() -> None:
     """As a swept wing, which in some ways looks like a delay of the clock or of a filter."""
-    before, far, near = decision("ambiguous"), proof(15.0, 7.5, improved=True), proof(15.0, 1.9, improved=True)
-    after = doubted_by_held_out(before, far, data("forces"))
+    before = replace(decision("ambiguous"), named=("a", "b"), alternatives=(("a",), ("b",)))
+    far, claimed = proof(15.0, 7.5, improved=True), before.probabilities["ambiguous"]
+    after = doubted_by_held_out(before, far, data("forces"), none_predicts=True)
     assert (after.verdict, after.named, after.alternatives) == ("unnamed", (), ())
-    assert after.probabilities["unnamed"] == pytest.approx(1.0)
-    assert held_out_sentence(before, far, data("forces")).endswith("15 times the floor before, and 7.5 after.")
-    assert doubted_by_held_out(before, near, data("forces")) == before
-    assert doubted_by_held_out(before, far, data("series")) == before
-    assert held_out_sentence(before, near, data("forces")) == ""
+    assert after.probabilities["ambiguous"] == pytest.approx(POLICY.partial_doubt * claimed)
+    assert sum(after.probabilities.values()) == pytest.approx(1.0)
+    words = held_out_sentence(before, far, data("forces"), none_predicts=True)
+    assert words.endswith("with the most probable one their misfit is 7.5 times the floor.")
+    doubted = doubted_by_held_out(before, far, data("forces"))
+    assert (doubted.verdict, doubted.named) == ("ambiguous", ("a", "b")), "another one predicts"
 
 
 def test_a_recording_that_an_adequate_model_misses_is_stated() -> None:

@@ -86,6 +86,7 @@ def test_sigterm_stops_within_seconds_and_leaves_runs_to_be_resumed(
         watching.join(60)
         assert "event: generation" in lines
         assert "Traceback" not in first.log
+        assert "given up" not in first.log
     with server(data) as second:
         assert second.api.finish(run)["state"] == "SUCCEEDED"
         assert (numbers(second.api, run), second.api.get(f"/v1/runs/{run}/result")) == undisturbed

@@ -89,12 +89,13 @@ def test_a_cancelled_run_ends_though_its_worker_hangs(settings: Settings, hangin
         assert hanging.told(), "what no worker has begun is not worth computing"
 
 
-def test_the_service_stops_at_once_though_a_worker_hangs(settings: Settings, hanging: Hanging) -> None:
+def test_the_service_stops_at_once_though_a_worker_hangs(
+    settings: Settings, hanging: Hanging, caplog: pytest.LogCaptureFixture
+) -> None:
     app = create_app(settings, engine=Evaluating(), make_evaluator=lambda: hanging)
     with serving(app) as client:
         _, run = _hung(client, hanging)
-        began = time.monotonic()
-    assert time.monotonic() - began < 30
+    assert "given up" not in caplog.text
     with serving(create_app(settings, engine=toy.ToyEngine(), make_evaluator=toy.NoEvaluator)) as client:
         assert Api(client).finish(run)["state"] == "SUCCEEDED"
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 RUNS, EACH, LONGEST = 10_000, 2, 1_000
 ENOUGH_S = 1.0
-TRIES = 10  # at most: other work on the machine comes and goes: the best of them is the page's own time
+TRIES = 10  # at most, until one takes less: other work on the machine comes and goes
 
 
 @pytest.fixture(scope="module")

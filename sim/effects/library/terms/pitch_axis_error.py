@@ -6,28 +6,26 @@ import numpy as np
 
 from wingfit.records.array_types import Array
 from wingfit.sim.effects.contract import Effect, Parameter, Values
-from wingfit.sim.effects.ports.vehicle import ROTATION_POINT, VehicleScene, deferred
-
-_DEFERRED = deferred("mass", lambda scene, values: _push_air(scene, values["chords"]))
+from wingfit.sim.effects.ports.vehicle import VehicleScene
 
 
 def _vehicle(scene: VehicleScene, values: Values) -> None:
-    """Change the circulation of rotation, and the place of the air that is accelerated."""
-    described = ROTATION_POINT - scene.setting.vehicle.pitch_axis
-    if described and "C_r" in scene.genes:
-        scene.genes = {**scene.genes, "C_r": scene.genes["C_r"] * (1.0 + values["chords"] / described)}
-    _DEFERRED(scene, values)
+    """Change the circulation by rotation, and the place of the air that is accelerated."""
+    scene.behind = scene.behind + values["chords"]
+    scene.after("mass", lambda: _push_air(scene, values["chords"]))
 
 
 def _push_air(scene: VehicleScene, chords: Array) -> None:
-    """Add the forces on the added mass, which lies so many ``chords`` [B] further behind the axis."""
+    """Add the forces on the added mass, which lies so many ``chords`` [B] further behind the axis.
+
+    That by the rate of pitch is a part of the forces of a turning wing (Eqs. 12-14), the other of those of added mass.
+    """
     places, (cosine, sine), (rows, _) = scene.stations, scene.wings.turns, scene.wings.sides[0]
     air = chords * 0.25 * np.pi * scene.carried * scene.density
     mass = (air[:, None] * scene.apart(rows) ** 2)[:, :, None] * scene.chords[:, None] ** 3
-    once, twice = mass * places.twist, mass * places.twist**2
-    rate, acceleration = scene.angles.pitch[:, 1, :, None], scene.angles.pitch[:, 2, :, None]
-    x = acceleration * cosine * once - rate**2 * sine * twice
-    z = -acceleration * sine * once - rate**2 * cosine * twice
+    turned = scene.share("inertial") * mass * (scene.angles.pitch[:, 1, :, None] * places.twist) ** 2
+    accelerated = scene.share("added_mass") * mass * scene.angles.pitch[:, 2, :, None] * places.twist
+    x, z = accelerated * cosine - turned * sine, -accelerated * sine - turned * cosine
     scene.push(scene.over_span(x, places.weight), scene.over_span(z, places.weight))
 
 
@@ -41,7 +39,7 @@ EFFECT = Effect(
             "chords", "1", -0.4, 0.4, 0.05, "distance in chords by which the axis lies ahead of its described place"
         ),
     ),
-    law="V_z' = V_z + chords c theta_w'",
+    law="V_z' = V_z - chords c theta_w'",
     source="Sedov (1965), Two-Dimensional Problems in Hydrodynamics and Aerodynamics: a plate that turns about another "
     "point; Armanini et al. (2016), Eqs. 2 and 9",
     signature="a force in phase with the acceleration and the square of the rate of pitch, in proportion to the "

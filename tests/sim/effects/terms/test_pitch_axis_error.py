@@ -41,6 +41,32 @@ def test_it_grows_with_the_added_mass_and_less_of_the_chord_peeled() -> None:
     assert np.abs(start).max() < 0.01 * np.abs(once[1]).max()
 
 
+@pytest.mark.parametrize("axis", [DELFLY.pitch_axis, 0.75])
+def test_so_is_a_circulation_that_an_effect_adds(axis: float) -> None:
+    terms, added = without("rotation"), {"rotational_circulation__coefficient": 1.5}
+    here, other = replace(DELFLY, pitch_axis=axis), replace(DELFLY, pitch_axis=axis - 0.1)
+    change = flown(here, FAST, terms, pitch_axis_error__chords=0.1, **added)
+    change -= flown(here, FAST, terms, pitch_axis_error__chords=0.1)
+    wanted = flown(other, FAST, terms, **added) - flown(other, FAST, terms)
+    np.testing.assert_allclose(change, wanted, atol=1e-12)
+    assert np.abs(wanted).max() > 1e-4
+
+
+def test_forces_by_the_rate_of_pitch_are_those_of_the_inertial_terms() -> None:
+    """Each part acts where the model, or another effect, has its term."""
+    shift = {"pitch_axis_error__chords": 0.1}
+    both, bare = alone("inertial", "added_mass"), alone("added_mass")
+    whole = flown(RECTANGLE, FAST, both, **shift) - flown(RECTANGLE, FAST, both)
+    accelerated = flown(RECTANGLE, FAST, bare, **shift) - flown(RECTANGLE, FAST, bare)
+    share = {"inertial__share": 1.0}
+    again = flown(RECTANGLE, FAST, bare, **shift, **share) - flown(RECTANGLE, FAST, bare, **share)
+    np.testing.assert_allclose(again, whole, atol=1e-12)
+    turned = whole - accelerated  # towards the axis: with both signs of the rate, not of the acceleration
+    assert np.abs(turned).max() > 1e-4
+    assert np.abs(accelerated).max() > 1e-4
+    assert (turned[:, 0] * np.sign(-0.1)).min() > -1e-6
+
+
 def test_it_is_for_models_with_added_mass() -> None:
     assert not refused("pitch_axis_error", without())
     assert refused("pitch_axis_error", without("added_mass"))
