@@ -25,15 +25,15 @@ def test_none_predicts_if_each_misses(
 ) -> None:
     tried = []
 
-    def predicted(held_out: Any, context: Any, errors: Any, before: Any, after: str) -> tuple[str | None, tuple[()]]:
-        tried.append(after)
+    def predicted(*given: Any) -> tuple[str | None, tuple[()]]:
+        tried.append(given[-1])
         return other, ()
 
     monkeypatch.setattr(build_finding, "predict_held_out", predicted)
     monkeypatch.setattr(build_finding, "proof", lambda found, *_, **__: found)
     monkeypatch.setattr(build_finding, "unpredicted", lambda _, found, __: found == "missed")
     monkeypatch.setattr(build_finding, "_discretisation_error", lambda _: 0.0)
-    refits = tuple(SimpleNamespace(names=names, fit="+".join(names)) for names in ((), ("a",), ("b", "c"), ("d",)))
+    refits: Any = tuple(SimpleNamespace(names=names, fit="+".join(names)) for names in ((), ("a",), ("b", "c"), ("d",)))
     state: Any = SimpleNamespace(
         data=SimpleNamespace(unit="N"),
         fitted_nominal=SimpleNamespace(refit=refits[0]),
