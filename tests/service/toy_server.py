@@ -15,8 +15,9 @@ from wingfit.service.settings import Settings, SettingsError
 
 if __name__ == "__main__":
     try:
-        seconds, *slow = map(float, sys.argv[1:])
-        header_limits.SLOW_SECONDS = next(iter(slow), header_limits.SLOW_SECONDS)
+        seconds = float(sys.argv[1])
+        if len(sys.argv) > 2:
+            header_limits.SLOW_SECONDS = float(sys.argv[2])
         engine, diagnoser = ToyEngine(seconds), ToyDiagnoser(seconds)
         serve(Settings.from_env(), engine=engine, make_evaluator=NoEvaluator, diagnoser=diagnoser)
     except (ServeError, SettingsError) as error:
