@@ -93,7 +93,8 @@ def build_finding(
         and validation is not None
         and held_out_refutes(state.context, best.fit, validation, state.floor(_discretisation_error(state)))
     )
-    none_predicts = validation is not None and _none_predicts(state, decision, best, held_out, validation)
+    proved = None if validation is None else _proved(state, validation, best)
+    none_predicts = proved is not None and _none_predicts(state, decision, best, held_out, proved)
     located: Located | None = None
     for fraction, stage, found in _locate(state, decision, best, own, validation, refuted=refuted):
         located = found
@@ -107,32 +108,36 @@ def build_finding(
             advice = ranked
             yield 0.75 + 0.2 * part, "comparing what to record next", None
     finding = _finding(
-        state, name, decision, best, own, validation, advice, located, odd, named, refuted=refuted,
+        state, name, decision, best, own, validation, proved, advice, located, odd, named, refuted=refuted,
         none_predicts=none_predicts,
     )  # fmt: skip
     finding = replace(finding, remarks=(*finding.remarks, *failed))
     yield 1.0, "done", doubt.stated(finding, certain, decision)
 
 
+def _proved(state: SearchState, validation: ResidualPair, model: Refit) -> Proof:
+    """Return the misfit of what is held out, which the nominal model and ``model`` predict as in ``validation``."""
+    floor = state.floor(_discretisation_error(state))
+    return proof(validation, floor, state.data.unit, effects_added=bool(model.names))
+
+
 def _none_predicts(
-    state: SearchState, decision: Decision, best: Refit, held_out: Sequence[AnyRecording], validation: ResidualPair
+    state: SearchState, decision: Decision, best: Refit, held_out: Sequence[AnyRecording], proved: Proof
 ) -> bool:
     """Return whether none of the effects that recordings cannot distinguish predicts what is held out.
 
-    ``validation``: the prediction by the nominal model and by ``best``, one of them.
+    ``proved``: the prediction by ``best``, one of them.
     """
-    data, nominal, floor = state.data, state.fitted_nominal.refit, state.floor(_discretisation_error(state))
 
-    def missed(predicted: ResidualPair | None) -> bool:
-        proved = predicted and proof(predicted, floor, data.unit, effects_added=True)
-        return not proved or unpredicted(decision, proved, data)
+    def misses(one: Refit) -> bool:
+        nominal, errors = state.fitted_nominal.refit.fit, state.position_errors
+        validation, _ = predict_held_out(held_out, state.context, errors, nominal, one.fit)
+        return validation is None or unpredicted(decision, _proved(state, validation, one), state.data)
 
-    if decision.verdict != "ambiguous" or not missed(validation):
+    if decision.verdict != "ambiguous" or not unpredicted(decision, proved, state.data):
         return False
     possible = {frozenset(one) for one in decision.alternatives} - {frozenset(best.names)}
-    others = (one for one in state.final_weights.refits if frozenset(one.names) in possible)
-    errors = state.position_errors
-    return all(missed(predict_held_out(held_out, state.context, errors, nominal.fit, one.fit)[0]) for one in others)
+    return all(misses(one) for one in state.final_weights.refits if frozenset(one.names) in possible)
 
 
 def _locate(
@@ -173,6 +178,7 @@ def _finding(
     best: Refit,
     fitted: ResidualPair,
     validation: ResidualPair | None,
+    proved: Proof | None,
     advice: tuple[Advice, ...],
     located: Located,
     odd: tuple[OddRecording, ...],
@@ -184,10 +190,9 @@ def _finding(
     subject, data, weights = state.subject, state.data, state.final_weights
     nominal, floor, unit = state.fitted_nominal.refit, state.floor(_discretisation_error(state)), state.data.unit
     rows = recording_misfits(fitted, held_out=False, floor=floor)
-    decided, first, proved = decide(weights), decision, None
+    decided, first = decide(weights), decision
     if validation is not None:
         rows += recording_misfits(validation, held_out=True, floor=floor)
-        proved = proof(validation, floor, unit, effects_added=bool(best.names))
         decision = doubted_by_held_out(decision, proved, data, refuted=refuted, none_predicts=none_predicts)
     suspects, genes = {suspect.name: suspect for suspect in subject.suspects}, gene_values(data, best)
     weights = replace(weights, refits=tuple(best if one.names == best.names else one for one in weights.refits))

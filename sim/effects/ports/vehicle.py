@@ -293,6 +293,18 @@ class VehicleScene:
             self.added[:, 0] += self.wings.alike * x
             self.added[:, 1] += self.wings.alike * side.sign * rows[:, PROJECTION] * z
 
+    def push_behind(self, accelerated: Array, turned: Array) -> None:
+        """Add the forces -m a of a mass m at a distance e behind the axis of pitch of every wing, to the vehicle.
+
+        a is the acceleration of the vector -e (sin theta, cos theta) from the axis to the mass in body x and z, with
+        theta the pitch of the wing. ``accelerated`` and ``turned`` [B, n or 1, 8], kg: m e per length of span, for the
+        parts with theta'' and with theta'^2.
+        """
+        places, (cosine, sine), pitch = self.stations, self.wings.turns, self.angles.pitch[:, :, :, None]
+        along, inward = accelerated * pitch[:, 2] * places.twist, turned * (pitch[:, 1] * places.twist) ** 2
+        x, z = along * cosine - inward * sine, -along * sine - inward * cosine
+        self.push(self.over_span(x, places.weight), self.over_span(z, places.weight))
+
     def push_along_chord(self, force: Array) -> None:
         """Add a ``force`` [sides, B, n, 8] (N/m) towards the leading edge of every wing to the vehicle."""
         cosine, sine = self.wings.turns

@@ -43,6 +43,6 @@ def test_none_predicts_if_each_misses(
         context=None,
     )
     decision: Any = SimpleNamespace(verdict=verdict, alternatives=(("a",), ("c", "b")))
-    validation: Any = best
-    assert build_finding._none_predicts(state, decision, refits[1], (), validation) == none
+    proved: Any = best
+    assert build_finding._none_predicts(state, decision, refits[1], (), proved) == none
     assert tried == (["b+c"] if (verdict, best) == ("ambiguous", "missed") else []), "only the other alternative"

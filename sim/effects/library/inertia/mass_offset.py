@@ -20,19 +20,10 @@ def _wing(scene: WingScene, values: Values) -> None:
 
 
 def _shift_mass(scene: VehicleScene, values: Values) -> None:
-    """Add the force -m a of wings whose mass m lies at e behind the pitch axis, to the vehicle.
-
-    a is the acceleration of the vector -e (sin theta, cos theta) from the axis to the mass in body x and z; e is the
-    parameter ``distance``, theta the wing's pitch. The model itself has the mass on the axis.
-    """
-    places, (cosine, sine) = scene.stations, scene.wings.turns
-    rate, acceleration = scene.angles.pitch[:, 1], scene.angles.pitch[:, 2]
-    mass = places.mass * places.weight * scene.setting.vehicle.wing_mass
-    once, twice = mass * places.twist, mass * places.twist**2
-    moment = (values["distance"] * scene.mass_factor)[:, None]
-    x = acceleration * scene.over_span(cosine, once) - rate**2 * scene.over_span(sine, twice)
-    z = -acceleration * scene.over_span(sine, once) - rate**2 * scene.over_span(cosine, twice)
-    scene.push(moment * x, moment * z)
+    """Add the forces on the mass of the wings, which the model has on the axis of pitch."""
+    mass = scene.stations.mass * scene.setting.vehicle.wing_mass
+    moment = mass * (values["distance"] * scene.mass_factor)[:, None, None]
+    scene.push_behind(moment, moment)
 
 
 EFFECT = Effect(

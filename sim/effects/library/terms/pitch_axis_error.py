@@ -20,13 +20,10 @@ def _push_air(scene: VehicleScene, chords: Array) -> None:
 
     That by the rate of pitch is a part of the forces of a turning wing (Eqs. 12-14), the other of those of added mass.
     """
-    places, (cosine, sine), (rows, _) = scene.stations, scene.wings.turns, scene.wings.sides[0]
+    rows, _ = scene.wings.sides[0]
     air = chords * 0.25 * np.pi * scene.carried * scene.density
-    mass = (air[:, None] * scene.apart(rows) ** 2)[:, :, None] * scene.chords[:, None] ** 3
-    turned = scene.share("inertial") * mass * (scene.angles.pitch[:, 1, :, None] * places.twist) ** 2
-    accelerated = scene.share("added_mass") * mass * scene.angles.pitch[:, 2, :, None] * places.twist
-    x, z = accelerated * cosine - turned * sine, -accelerated * sine - turned * cosine
-    scene.push(scene.over_span(x, places.weight), scene.over_span(z, places.weight))
+    moment = (air[:, None] * scene.apart(rows) ** 2)[:, :, None] * scene.chords[:, None] ** 3
+    scene.push_behind(scene.share("added_mass") * moment, scene.share("inertial") * moment)
 
 
 EFFECT = Effect(
